@@ -1,0 +1,237 @@
+//! `embed`.
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use guardsplat_worker::device::DeviceChoice;
+use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verification, embed};
+use guardsplat_worker::message::Key;
+use guardsplat_worker::quality::{Quality, contact_sheet, write_picture};
+use guardsplat_worker::{Error, Result};
+use serde::Serialize;
+
+use super::display::Display;
+use super::{Exit, load, print_json, print_line};
+
+/// Name of the report's picture.
+const SHEET: &str = "comparison.png";
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene to mark, a 3DGS PLY
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// Where to write the marked scene
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    /// The key file
+    #[arg(long)]
+    key: PathBuf,
+    /// The message in hexadecimal, as many bits as the key has
+    #[arg(long, value_name = "HEX")]
+    message: String,
+    /// draft, standard or paper
+    #[arg(long, default_value = "standard")]
+    preset: Preset,
+    /// Decides views, backgrounds and augmentation
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Where to compute: auto, wgpu or cpu
+    #[arg(long, default_value = "auto")]
+    device: DeviceChoice,
+    /// Side of training views and of those of the verification, in pixels
+    #[arg(long, value_name = "PX")]
+    size: Option<u32>,
+    /// Writes the scene even when it misses its target
+    #[arg(long)]
+    force: bool,
+    /// A folder for pictures of original, marked and ten times their difference
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// A CLIP that was added with `models add`, instead of the one that the key names
+    #[arg(long)]
+    clip: Option<String>,
+    /// A JSON file with settings in place of the preset's, for experiments
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
+    settings: Option<PathBuf>,
+    /// Prints JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    bit_accuracy: f64,
+    bit_accuracy_worst_view: f64,
+    message: String,
+    message_recovered: bool,
+    #[serde(flatten)]
+    quality: Quality,
+    steps: usize,
+    view_steps: usize,
+    seconds: f64,
+    device: &'a str,
+    clip: &'a str,
+    preset: &'a str,
+    bits: usize,
+    views: usize,
+    size: u32,
+    gaussians: usize,
+    changed_gaussians: usize,
+    written: bool,
+    target_missed: &'a [String],
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let start = Instant::now();
+    let settings = settings(arguments)?;
+    let key = Key::read(&arguments.key)?;
+    let message = key.message(&arguments.message)?;
+    let engine = load::engine(
+        &arguments.key,
+        &key,
+        arguments.clip.as_deref(),
+        arguments.device,
+        true,
+    )?;
+    if settings.lambda.lpips > 0.0 && engine.lpips.is_none() {
+        eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
+    }
+    let job = Job {
+        input: &arguments.input,
+        output: &arguments.output,
+        message: &message,
+        settings: &settings,
+        force: arguments.force,
+    };
+    let mut display = Display::new("embedding");
+    let mut verifying = None;
+    let outcome = embed(&engine, &job, &mut |progress| {
+        show(&mut display, &mut verifying, progress);
+    })?;
+    display.finish();
+    drop(verifying);
+    if let Some(folder) = &arguments.report {
+        write_report(folder, &outcome.verification)?;
+    }
+    tell(arguments, &engine.compute.name, &key, &outcome, start)?;
+    Ok(if outcome.missed.is_empty() {
+        Exit::Done
+    } else {
+        Exit::Inconclusive
+    })
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings> {
+    let mut settings = arguments.preset.settings();
+    if let Some(path) = &arguments.settings {
+        let json = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        settings = settings.overridden(&json)?;
+    }
+    settings.seed = arguments.seed;
+    if let Some(size) = arguments.size {
+        settings.size = size;
+        settings.verify.size = Some(size);
+    }
+    settings.check()?;
+    Ok(settings)
+}
+
+fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {
+    match progress {
+        Progress::Step(step) => display.set(step.step, step.total, || {
+            format!(
+                "bits {:.1} %, PSNR {:.1} dB, message loss {:.3}",
+                100.0 * step.bit_accuracy,
+                step.psnr_db,
+                step.terms.message
+            )
+        }),
+        Progress::Check(check) => display.say(&format!(
+            "step {}: held-out bits {:.1} %, PSNR {:.2} dB, weakest bit {:+.2}",
+            check.step,
+            100.0 * check.bit_accuracy,
+            check.psnr_db,
+            check.margin
+        )),
+        Progress::Stopped { step } => {
+            display.say(&format!(
+                "enough after {step} steps: the held-out margin holds"
+            ));
+        }
+        Progress::Writing => display.finish(),
+        Progress::Verifying { done, total } => verifying
+            .get_or_insert_with(|| Display::new("verifying"))
+            .set(done, total, String::new),
+    }
+}
+
+fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    write_picture(&folder.join(SHEET), &contact_sheet(&verification.pairs)?)
+}
+
+fn tell(
+    arguments: &Arguments,
+    device: &str,
+    key: &Key,
+    outcome: &Outcome,
+    start: Instant,
+) -> Result<()> {
+    let found = &outcome.verification;
+    let report = Report {
+        bit_accuracy: found.comparison.bit_accuracy,
+        bit_accuracy_worst_view: found.comparison.bit_accuracy_worst_view,
+        message: found.message.to_string(),
+        message_recovered: found.message_recovered,
+        quality: found.quality,
+        steps: outcome.steps,
+        view_steps: outcome.view_steps,
+        seconds: start.elapsed().as_secs_f64(),
+        device,
+        clip: &key.clip.name,
+        preset: arguments.preset.name(),
+        bits: key.bits(),
+        views: found.views,
+        size: found.size,
+        gaussians: outcome.gaussians,
+        changed_gaussians: outcome.changed,
+        written: outcome.written,
+        target_missed: &outcome.missed,
+    };
+    if arguments.json {
+        print_json(&report)?;
+    } else {
+        let psnr = found
+            .quality
+            .psnr
+            .psnr_db
+            .map_or("identical".into(), |db| format!("{db:.2} dB"));
+        print_line(&format!(
+            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {device}",
+            100.0 * report.bit_accuracy,
+            100.0 * report.bit_accuracy_worst_view,
+            report.message,
+            if report.message_recovered {
+                "recovered"
+            } else {
+                "not recovered"
+            },
+            found.quality.ssim,
+            outcome.steps,
+            report.seconds
+        ));
+        if outcome.written {
+            print_line(&format!("written to {}", arguments.output.display()));
+        }
+    }
+    if !outcome.missed.is_empty() {
+        let kept = if outcome.written {
+            "written all the same"
+        } else {
+            "nothing was written"
+        };
+        eprintln!("target missed: {}; {kept}", outcome.missed.join(", "));
+    }
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! `key create`.
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::{Args, Subcommand};
+use guardsplat_worker::Result;
+use guardsplat_worker::clip::Parts;
+use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::embed::{NewKey, create_key, natural};
+use guardsplat_worker::message::training::Progress;
+use guardsplat_worker::message::{FitOptions, KeyOptions, TrainingOptions};
+use serde::Serialize;
+
+use super::display::Display;
+use super::{Exit, load, print_json, print_line};
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Makes a key and trains its decoder
+    Create(Create),
+}
+
+#[derive(Args)]
+pub struct Create {
+    /// Bits of its messages, 1 to 75
+    #[arg(long)]
+    bits: usize,
+    /// Makes the key reproducible, and no more secret than this number; without it, it is drawn at random
+    #[arg(long)]
+    seed: Option<u64>,
+    /// The key file
+    #[arg(short, long)]
+    output: PathBuf,
+    /// A CLIP that was added with `models add`, instead of the shipped one
+    #[arg(long)]
+    clip: Option<String>,
+    /// Where to compute: auto, wgpu or cpu
+    #[arg(long, default_value = "auto")]
+    device: DeviceChoice,
+    /// Directions of strongest natural variation to ignore; half of all at most, unless given
+    #[arg(long, hide_short_help = true)]
+    remove: Option<usize>,
+    /// Dimensions to keep of the rest; all unless given
+    #[arg(long, hide_short_help = true)]
+    keep: Option<usize>,
+    /// Noise in the decoder's training, times the natural variation
+    #[arg(long, hide_short_help = true, default_value_t = TrainingOptions::default().noise)]
+    noise: f32,
+    /// Prints JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    key: String,
+    bits: usize,
+    bit_accuracy_unseen: Option<f64>,
+    bit_accuracy_unseen_noisy: Option<f64>,
+    clip: &'a str,
+    device: &'a str,
+    seconds: f64,
+}
+
+pub fn run(command: Command) -> Result<Exit> {
+    let Command::Create(arguments) = command;
+    let start = Instant::now();
+    let compute = open(arguments.device)?;
+    let (clip, identity) = load::clip(arguments.clip.as_deref(), &compute, Parts::Both)?;
+    let default = FitOptions::default();
+    let projection = FitOptions {
+        remove: arguments
+            .remove
+            .unwrap_or(default.remove.min(clip.dim() / 2)),
+        keep: arguments.keep,
+    };
+    let options = KeyOptions {
+        bits: arguments.bits,
+        seed: arguments.seed,
+        training: TrainingOptions {
+            noise: arguments.noise,
+            ..TrainingOptions::default()
+        },
+    };
+    let pictures = natural::pictures(&compute, clip.config.vision.image_size as u32)?;
+    let mut display = Display::new("pictures");
+    let mut stage = 0;
+    let mut show = |number: usize, title: &'static str, done: usize, total: usize| {
+        if stage != number {
+            stage = number;
+            display = Display::new(title);
+        }
+        display.set(done, total, String::new);
+    };
+    let key = create_key(
+        &options,
+        projection,
+        &clip,
+        identity,
+        &compute,
+        pictures,
+        |progress| match progress {
+            NewKey::Pictures(done, total) => show(0, "pictures", done, total),
+            NewKey::Decoder(Progress::Encoding(done, total)) => show(1, "messages", done, total),
+            NewKey::Decoder(Progress::Training(done, total)) => show(2, "decoder", done, total),
+        },
+    )?;
+    drop(display);
+    key.write(&arguments.output)?;
+    let report = Report {
+        key: key.id(),
+        bits: key.bits(),
+        bit_accuracy_unseen: key.accuracy_unseen,
+        bit_accuracy_unseen_noisy: key.accuracy_unseen_noisy,
+        clip: &key.clip.name,
+        device: &compute.name,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    if arguments.json {
+        print_json(&report)?;
+    } else {
+        let unseen = key
+            .accuracy_unseen
+            .map_or("unknown".into(), |a| format!("{:.2} %", 100.0 * a));
+        print_line(&format!(
+            "key {} of {} bits written to {}; bits of unseen messages read from their texts: {unseen} ({:.0} s)",
+            report.key,
+            report.bits,
+            arguments.output.display(),
+            report.seconds
+        ));
+    }
+    Ok(Exit::Done)
+}

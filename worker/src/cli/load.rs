@@ -1,0 +1,57 @@
+//! Loads what commands have in common: key, CLIP, device and LPIPS.
+use std::path::Path;
+
+use guardsplat_worker::Result;
+use guardsplat_worker::clip::{Clip, Parts};
+use guardsplat_worker::device::{Compute, DeviceChoice, open};
+use guardsplat_worker::extract::Engine;
+use guardsplat_worker::message::{ClipIdentity, Key};
+use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
+use guardsplat_worker::quality::Lpips;
+
+/// What the CLIP in the repository is called.
+pub const SHIPPED: &str = "guardsplat";
+
+/// The CLIP of that name, the shipped one without a name.
+pub fn clip(name: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
+    let name = name.unwrap_or(SHIPPED);
+    let clip = if name == SHIPPED {
+        Clip::shipped(&compute.device, parts)?
+    } else {
+        Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?
+    };
+    let identity = ClipIdentity {
+        name: name.to_owned(),
+        hash: clip.hash.clone(),
+    };
+    Ok((clip, identity))
+}
+
+/// LPIPS, where its weights were added.
+pub fn lpips(compute: &Compute) -> Result<Option<Lpips>> {
+    let models = match Models::open() {
+        Ok(models) => models,
+        // Without a data folder nothing was added.
+        Err(_) => return Ok(None),
+    };
+    match models.dir(LPIPS) {
+        Ok(dir) => Lpips::load(&dir.join(WEIGHTS), &compute.device).map(Some),
+        Err(_) => Ok(None),
+    }
+}
+
+/// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names.
+pub fn engine(
+    path: &Path,
+    key: &Key,
+    clip_name: Option<&str>,
+    device: DeviceChoice,
+    with_lpips: bool,
+) -> Result<Engine> {
+    let compute = open(device)?;
+    let name = clip_name.unwrap_or(&key.clip.name);
+    let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
+    key.require_clip(path, &identity)?;
+    let lpips = if with_lpips { lpips(&compute)? } else { None };
+    Engine::new(compute, clip, key, lpips)
+}

@@ -1,0 +1,189 @@
+//! The command line: what there is to say, and what the process exits with.
+mod display;
+mod embed;
+mod key;
+mod load;
+mod models;
+mod render;
+mod sample;
+mod verify;
+
+use std::error::Error as _;
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use guardsplat_worker::{Error, Result};
+
+/// What a command that could be carried out found; errors exit with 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Exit {
+    /// Done, or the message matches.
+    Done,
+    /// The message does not match.
+    NoMatch,
+    /// Nothing could be decided, or a target was missed.
+    Inconclusive,
+}
+
+impl Exit {
+    fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::NoMatch => 2,
+            Self::Inconclusive => 3,
+        }
+    }
+}
+
+/// Marks 3D Gaussian Splatting scenes with a message and reads it back from pictures of them.
+///
+/// Exit codes: 0 done or match, 1 error, 2 no match, 3 inconclusive or target missed.
+#[derive(Parser)]
+#[command(name = "guardsplat-worker", version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Keys: secrets that messages are written and read with
+    #[command(subcommand)]
+    Key(key::Command),
+    /// Marks a scene with a message, verifies the file and only then writes it
+    Embed(embed::Arguments),
+    /// Reads the message of a scene, or of pictures of one
+    Verify(verify::Arguments),
+    /// Renders views of a scene
+    Render(render::Arguments),
+    /// Makes a small scene to try things with
+    Sample(sample::Arguments),
+    /// Weights of other CLIP models and of LPIPS
+    #[command(subcommand)]
+    Models(models::Command),
+}
+
+/// What is behind a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Background {
+    White,
+    Black,
+}
+
+impl Background {
+    fn rgb(self) -> [f32; 3] {
+        match self {
+            Self::White => [1.0; 3],
+            Self::Black => [0.0; 3],
+        }
+    }
+}
+
+/// Runs the command that the process was started with.
+pub fn run() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors. clap's own code for wrong usage, 2, means no match here.
+            let code = u8::from(error.use_stderr());
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    tracing_subscriber::fmt()
+        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
+    match carry_out(arguments.command) {
+        Ok(exit) => ExitCode::from(exit.code()),
+        Err(error) => {
+            eprintln!("error: {}", in_full(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn carry_out(command: Command) -> Result<Exit> {
+    match command {
+        Command::Key(command) => key::run(command),
+        Command::Embed(arguments) => embed::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Sample(arguments) => sample::run(&arguments),
+        Command::Models(command) => models::run(command),
+    }
+}
+
+/// An error and its causes, leaving out those whose text is part of the one before.
+fn in_full(error: &Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        let cause_text = cause.to_string();
+        if !text.contains(&cause_text) {
+            text = format!("{text}: {cause_text}");
+        }
+        source = cause.source();
+    }
+    text
+}
+
+/// Prints a value as JSON on standard output.
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Error::BadOption {
+        field: "--json",
+        reason: e.to_string(),
+    })?;
+    print_line(&text);
+    Ok(())
+}
+
+/// Prints a line on standard output; that nobody listens any more is no error.
+fn print_line(text: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn the_promised_commands_parse() {
+        for line in [
+            "key create --bits 32 --seed 7 -o K",
+            "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json",
+            "embed IN OUT --key K --message 0123abcd --force --report R",
+            "verify A B C --key K --message 0123abcd --json",
+            "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3",
+            "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
+            "models list",
+            "models verify",
+        ] {
+            let words = std::iter::once("guardsplat-worker").chain(line.split(' '));
+            assert!(Arguments::try_parse_from(words).is_ok(), "{line}");
+        }
+        let wrong = |line: &str| {
+            let words = std::iter::once("guardsplat-worker").chain(line.split(' '));
+            Arguments::try_parse_from(words).err().unwrap().to_string()
+        };
+        let device = wrong("embed IN OUT --key K --message 0 --device cuda");
+        assert!(device.contains("must be auto, wgpu or cpu"), "{device}");
+        assert!(wrong("verify --key K").contains("PATH"));
+    }
+
+    #[test]
+    fn causes_are_told_once() {
+        let inner = std::io::Error::other("disk on fire");
+        let error = Error::io("a.ply")(inner);
+        assert_eq!(in_full(&error), "a.ply: disk on fire");
+    }
+}

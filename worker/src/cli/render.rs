@@ -1,0 +1,146 @@
+//! `render`.
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::extract::rasterizer;
+use guardsplat_worker::quality::write_picture;
+use guardsplat_worker::scene::Scene;
+use guardsplat_worker::splat::{WeightCache, prepare, sh};
+use guardsplat_worker::view::{Camera, Split, ViewSampler, read_cameras, write_cameras};
+use guardsplat_worker::{Error, Result};
+
+use super::display::Display;
+use super::{Background, Exit, print_line};
+
+/// Side of views where neither a size nor a camera file says otherwise.
+const DEFAULT_SIZE: u32 = 512;
+/// Where the cameras are written, in the folder of the pictures.
+const CAMERAS: &str = "cameras.json";
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// 8 bits a channel
+    Png,
+    /// 32-bit float, values as rendered
+    Exr,
+}
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene, a 3DGS PLY
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// A folder for the pictures and their cameras
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// How many views; with --cameras, its first ones, all unless given
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), required_unless_present = "cameras")]
+    views: Option<u32>,
+    /// Cameras from a file (cameras.json or transforms.json) instead of ones spread around the scene
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<PathBuf>,
+    /// Side in pixels, 512 unless given; for cameras from a file, their longer side, as in the file unless given
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    size: Option<u32>,
+    /// What is behind the scene
+    #[arg(long, value_enum, default_value = "white")]
+    background: Background,
+    /// Format of the pictures
+    #[arg(long, value_enum, default_value = "png")]
+    format: Format,
+    /// Decides the views. No embedding uses any of them, whatever its seed
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Where to compute: auto, wgpu or cpu
+    #[arg(long, default_value = "auto")]
+    device: DeviceChoice,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let scene = Scene::read(&arguments.input)?.gaussians;
+    let cameras = match &arguments.cameras {
+        Some(path) => {
+            let mut cameras = read_cameras(path)?;
+            cameras.truncate(arguments.views.unwrap_or(u32::MAX) as usize);
+            if let Some(size) = arguments.size {
+                cameras.iter_mut().for_each(|camera| resize(camera, size));
+            }
+            cameras
+        }
+        None => {
+            let sampler = ViewSampler::new(&scene, arguments.seed)?;
+            let size = arguments.size.unwrap_or(DEFAULT_SIZE);
+            let views = 0..u64::from(arguments.views.unwrap_or(1));
+            views
+                .map(|index| sampler.camera(Split::HeldOut, index, size))
+                .collect()
+        }
+    };
+    let rasterizer = rasterizer(&open(arguments.device)?)?;
+    let folder = &arguments.folder;
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let extension = match arguments.format {
+        Format::Png => "png",
+        Format::Exr => "exr",
+    };
+    let mut display = Display::new("rendering");
+    for (index, camera) in cameras.iter().enumerate() {
+        let view = prepare(&scene, camera, WeightCache::None)?;
+        let colours = sh::colours(&scene.sh, None, &view);
+        let picture = rasterizer.render(&view, &colours, arguments.background.rgb())?;
+        write_picture(
+            &folder.join(format!("view_{index:03}.{extension}")),
+            &picture,
+        )?;
+        display.set(index + 1, cameras.len(), String::new);
+    }
+    write_cameras(&folder.join(CAMERAS), &cameras)?;
+    drop(display);
+    print_line(&format!(
+        "{} views and {CAMERAS} written to {}",
+        cameras.len(),
+        folder.display()
+    ));
+    Ok(Exit::Done)
+}
+
+/// Scales a camera so that its longer side has `size` pixels.
+fn resize(camera: &mut Camera, size: u32) {
+    let scale = size as f32 / camera.width.max(camera.height).max(1) as f32;
+    let side = |pixels: u32| ((pixels as f32 * scale).round() as u32).max(1);
+    camera.width = side(camera.width);
+    camera.height = side(camera.height);
+    for length in [
+        &mut camera.fx,
+        &mut camera.fy,
+        &mut camera.cx,
+        &mut camera.cy,
+    ] {
+        *length *= scale;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resized_cameras_see_the_same() {
+        let look = |width, height| {
+            Camera::look_at(
+                [0.0, 0.0, -3.0],
+                [0.0; 3],
+                [0.0, -1.0, 0.0],
+                0.8,
+                width,
+                height,
+            )
+        };
+        let mut camera = look(800, 600);
+        resize(&mut camera, 400);
+        assert_eq!((camera.width, camera.height), (400, 300));
+        let expected = look(400, 300);
+        assert!((camera.fx - expected.fx).abs() < 1e-3 && (camera.cy - 150.0).abs() < 1e-3);
+    }
+}

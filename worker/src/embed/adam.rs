@@ -1,0 +1,247 @@
+//! Adam (Kingma and Ba 2015) over the offsets of the Gaussians that some view has seen, with the offset penalty.
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::settings::within;
+use crate::error::Result;
+
+/// Rows that one task updates.
+const CHUNK: usize = 512;
+
+/// Rates and decays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdamOptions {
+    /// Learning rate of constant (DC) coefficients.
+    pub rate_dc: f32,
+    /// Learning rate of all others.
+    pub rate_rest: f32,
+    /// Both rates fall along a half cosine to this share at the last step; 1 keeps them.
+    pub final_rate: f32,
+    /// Decay of the mean of gradients.
+    pub beta1: f32,
+    /// Decay of the mean of their squares.
+    pub beta2: f32,
+    /// Added to the root of the latter. Gradients of the penalty are down to 1e-9 in large scenes, so the common 1e-8
+    /// would freeze them.
+    pub epsilon: f32,
+}
+
+impl Default for AdamOptions {
+    fn default() -> Self {
+        Self {
+            rate_dc: 5e-3,
+            rate_rest: 5e-3 / 20.0,
+            final_rate: 1.0,
+            beta1: 0.9,
+            beta2: 0.999,
+            epsilon: 1e-15,
+        }
+    }
+}
+
+impl AdamOptions {
+    pub(super) fn check(&self) -> Result<()> {
+        within("adam.rate_dc", f64::from(self.rate_dc), 0.0, 10.0)?;
+        within("adam.rate_rest", f64::from(self.rate_rest), 0.0, 10.0)?;
+        within("adam.final_rate", f64::from(self.final_rate), 0.0, 1.0)?;
+        within("adam.beta1", f64::from(self.beta1), 0.0, 0.999_999)?;
+        within("adam.beta2", f64::from(self.beta2), 0.0, 0.999_999)?;
+        within("adam.epsilon", f64::from(self.epsilon), 1e-30, 1.0)
+    }
+}
+
+/// `dc * mean(o_dc^2) + rest * mean(o_rest^2)`, means over all Gaussians of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Penalty {
+    /// Weight of constant coefficients.
+    pub dc: f32,
+    /// Weight of the others.
+    pub rest: f32,
+}
+
+impl Penalty {
+    /// Value for offsets `[n][stride]`, of which the first three of a Gaussian are constant coefficients.
+    pub fn value(&self, offsets: &[f32], stride: usize) -> f64 {
+        // Partial sums are added in order, so that the value does not depend on the number of threads.
+        let parts: Vec<[f64; 2]> = offsets
+            .par_chunks(CHUNK * stride)
+            .map(|chunk| {
+                let mut sums = [0.0; 2];
+                for row in chunk.chunks_exact(stride) {
+                    for (k, &o) in row.iter().enumerate() {
+                        sums[usize::from(k >= 3)] += f64::from(o).powi(2);
+                    }
+                }
+                sums
+            })
+            .collect();
+        let [dc, rest] = parts
+            .iter()
+            .fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+        let [scale_dc, scale_rest] = self.scales(offsets.len() / stride, stride);
+        dc * scale_dc + rest * scale_rest
+    }
+
+    /// What a squared offset of each kind is multiplied by: weight over count.
+    fn scales(&self, rows: usize, stride: usize) -> [f64; 2] {
+        let over = |weight: f32, count: usize| match count {
+            0 => 0.0, // no Gaussians, or no coefficients beyond the constant one
+            count => f64::from(weight) / count as f64,
+        };
+        [
+            over(self.dc, 3 * rows),
+            over(self.rest, (stride - 3) * rows),
+        ]
+    }
+}
+
+/// The state of the optimiser. Memory of Gaussians that no view sees is reserved but never touched, so the system
+/// does not hand it out.
+pub struct Adam {
+    options: AdamOptions,
+    stride: usize,
+    steps: i32,
+    mean: Vec<f32>,
+    square: Vec<f32>,
+}
+
+impl Adam {
+    /// For `rows` Gaussians of `stride` coefficients each.
+    pub fn new(options: AdamOptions, rows: usize, stride: usize) -> Self {
+        Self {
+            options,
+            stride,
+            steps: 0,
+            mean: vec![0.0; rows * stride],
+            square: vec![0.0; rows * stride],
+        }
+    }
+
+    /// One step on the rows that are `seen`; rates are multiplied by `rate`. The penalty's gradient is added to
+    /// `gradient`, which is all zero afterwards in these rows. Rows not seen keep their offsets, which are 0.
+    pub fn step(
+        &mut self,
+        rate: f32,
+        penalty: Penalty,
+        seen: &[bool],
+        offsets: &mut [f32],
+        gradient: &mut [f32],
+    ) {
+        self.steps = self.steps.saturating_add(1);
+        let (o, stride) = (self.options, self.stride);
+        let [dc, rest] = penalty.scales(seen.len(), stride).map(|s| 2.0 * s as f32);
+        let correction = |beta: f32| 1.0 - f64::from(beta).powi(self.steps);
+        let root = correction(o.beta2).sqrt() as f32;
+        let scale = f64::from(rate) / correction(o.beta1);
+        let [rate_dc, rate_rest] =
+            [o.rate_dc, o.rate_rest].map(|rate| (f64::from(rate) * scale) as f32);
+        let size = CHUNK * stride;
+        (
+            seen.par_chunks(CHUNK),
+            offsets.par_chunks_mut(size),
+            gradient.par_chunks_mut(size),
+            self.mean.par_chunks_mut(size),
+            self.square.par_chunks_mut(size),
+        )
+            .into_par_iter()
+            .for_each(|(seen, offsets, gradient, mean, square)| {
+                for row in (0..seen.len()).filter(|row| seen[*row]) {
+                    for k in 0..stride {
+                        let at = row * stride + k;
+                        let (rate, pull) = if k < 3 {
+                            (rate_dc, dc)
+                        } else {
+                            (rate_rest, rest)
+                        };
+                        let g = gradient[at] + pull * offsets[at];
+                        gradient[at] = 0.0;
+                        mean[at] = o.beta1 * mean[at] + (1.0 - o.beta1) * g;
+                        square[at] = o.beta2 * square[at] + (1.0 - o.beta2) * g * g;
+                        offsets[at] -= rate * mean[at] / (square[at].sqrt() / root + o.epsilon);
+                    }
+                }
+            });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: Penalty = Penalty { dc: 0.0, rest: 0.0 };
+
+    #[test]
+    fn follows_a_sequence_computed_by_hand() {
+        let options = AdamOptions {
+            rate_dc: 0.1,
+            rate_rest: 0.01,
+            ..AdamOptions::default()
+        };
+        let mut adam = Adam::new(options, 1, 12);
+        let mut offsets = vec![0.0; 12];
+        let mut step = |g: f32, offsets: &mut Vec<f32>| {
+            let mut gradient = vec![0.0; 12];
+            (gradient[0], gradient[3]) = (g, g);
+            adam.step(1.0, NONE, &[true], offsets, &mut gradient);
+            assert_eq!(gradient, [0.0; 12]);
+        };
+        // Gradients 1 and -2: means 0.1 and -0.11, squares 0.001 and 0.004999, corrected by 0.1, 0.19, 0.001, 0.001999.
+        step(1.0, &mut offsets);
+        assert!((offsets[0] + 0.1).abs() < 1e-6 && (offsets[3] + 0.01).abs() < 1e-7);
+        step(-2.0, &mut offsets);
+        let second = 0.1 * (0.11 / 0.19) / (0.004_999_f32 / 0.001_999).sqrt();
+        assert!(
+            (offsets[0] - (-0.1 + second)).abs() < 1e-6,
+            "{}",
+            offsets[0]
+        );
+        assert!((offsets[3] - 0.1 * (-0.1 + second)).abs() < 1e-7);
+        assert_eq!(offsets[1], 0.0);
+    }
+
+    #[test]
+    fn tiny_gradients_move_offsets_and_unseen_rows_stay() {
+        let mut adam = Adam::new(AdamOptions::default(), 2, 3);
+        let mut offsets = vec![0.0; 6];
+        let mut gradient = vec![1e-10; 6];
+        adam.step(0.5, NONE, &[true, false], &mut offsets, &mut gradient);
+        assert!((offsets[0] + 2.5e-3).abs() < 1e-6, "{}", offsets[0]);
+        assert_eq!(offsets[3..], [0.0; 3]);
+    }
+
+    #[test]
+    fn the_penalty_pulls_by_its_gradient() {
+        // Two Gaussians of degree 1: 6 constant coefficients, 18 others.
+        let penalty = Penalty { dc: 6.0, rest: 1.8 };
+        let mut offsets = vec![0.0; 24];
+        (offsets[0], offsets[15]) = (0.5, -2.0);
+        let value = penalty.value(&offsets, 12);
+        assert!((value - (0.25 + 0.1 * 4.0)).abs() < 1e-6, "{value}");
+        // With both betas at 0 a step is rate * g / |g|; the root of the second moment is |g|.
+        let options = AdamOptions {
+            beta1: 0.0,
+            beta2: 0.0,
+            epsilon: 1.0,
+            rate_dc: 1.0,
+            rate_rest: 1.0,
+            ..AdamOptions::default()
+        };
+        let mut adam = Adam::new(options, 2, 12);
+        let before = offsets.clone();
+        adam.step(1.0, penalty, &[true; 2], &mut offsets, &mut [0.0; 24]);
+        for at in 0..24 {
+            let h = 1e-3;
+            let at_step = |sign: f32| {
+                let mut moved = before.clone();
+                moved[at] += sign * h;
+                penalty.value(&moved, 12)
+            };
+            let slope = ((at_step(1.0) - at_step(-1.0)) / (2.0 * f64::from(h))) as f32;
+            let expected = before[at] - slope / (slope.abs() + 1.0);
+            assert!((offsets[at] - expected).abs() < 1e-4, "{at}");
+        }
+        // Degree 0 has no other coefficients.
+        assert_eq!(penalty.value(&[1.0, 0.0, 0.0], 3), 2.0);
+    }
+}

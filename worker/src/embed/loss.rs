@@ -1,0 +1,137 @@
+//! The part of the loss that is computed on pictures: reconstruction and message, and its gradient to the pictures.
+//!
+//! `reconstruction * (l1 * L1 + ssim * (1 - SSIM) + lpips * LPIPS) + message * BCE`, means over the views of a step.
+use burn::tensor::{Tensor, TensorData};
+use rand_chacha::ChaCha8Rng;
+
+use super::progress::Terms;
+use super::settings::Settings;
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+use crate::message::{Message, bce_from_logits};
+use crate::picture::Picture;
+use crate::quality::{Ssim, batch, unbatch};
+
+/// What is fixed for a run.
+pub(super) struct Loss<'a> {
+    engine: &'a Engine,
+    settings: Settings,
+    targets: Vec<f32>,
+    ssim: Ssim,
+}
+
+/// The loss of a batch of views.
+pub(super) struct Evaluated {
+    /// Its terms; the offset penalty is added elsewhere.
+    pub terms: Terms,
+    /// Gradient to each picture, laid out as its pixels.
+    pub gradients: Vec<Picture>,
+    /// Share of right bits in the augmented views.
+    pub bit_accuracy: f64,
+}
+
+impl<'a> Loss<'a> {
+    pub fn new(engine: &'a Engine, settings: &Settings, message: &Message) -> Self {
+        let side = settings.size as usize;
+        Self {
+            engine,
+            settings: *settings,
+            targets: message.targets().collect(),
+            ssim: Ssim::new(side, side, &engine.compute.device),
+        }
+    }
+
+    /// Loss and gradient of `pictures` against `references`; `factor` multiplies reconstruction.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] with the term, or a failing device.
+    pub fn evaluate(
+        &self,
+        step: usize,
+        pictures: &[&Picture],
+        references: &[&Picture],
+        factor: f32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Evaluated> {
+        let device = &self.engine.compute.device;
+        let lambda = &self.settings.lambda;
+        let views = pictures.len();
+        let leaf = batch(pictures, &device.clone().autodiff())?.require_grad();
+        // What a file can hold; beyond it nothing is seen, so there is no gradient either.
+        let marked = leaf.clone().clamp(0.0, 1.0);
+        let original = batch(references, device)?.clamp(0.0, 1.0);
+        let original = Tensor::from_inner(original);
+
+        let l1 = (marked.clone() - original.clone()).abs().mean();
+        let ssim = -self.ssim.mean(original.clone(), marked.clone()) + 1.0;
+        let mut reconstruction = l1.clone() * lambda.l1 + ssim.clone() * lambda.ssim;
+        let lpips = match &self.engine.lpips {
+            Some(lpips) if lambda.lpips > 0.0 => {
+                let distance = lpips.per_view(original, marked.clone())?.mean();
+                reconstruction = reconstruction + distance.clone() * lambda.lpips;
+                Some(distance)
+            }
+            _ => None,
+        };
+        let seen = self.settings.augmentation.apply(marked, rng);
+        let logits = self.engine.logits(seen);
+        let bits = self.targets.len();
+        let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
+        let targets = Tensor::<2>::from_data(targets, device);
+        let message = bce_from_logits(logits.clone(), Tensor::from_inner(targets));
+        let total =
+            reconstruction * (lambda.reconstruction * factor) + message.clone() * lambda.message;
+
+        // One transfer for all terms.
+        let mut parts = vec![l1, ssim, message];
+        parts.extend(lpips);
+        let values = self.engine.to_host(Tensor::cat(parts, 0).inner())?;
+        let terms = Terms {
+            l1: values[0],
+            ssim: values[1],
+            message: values[2],
+            lpips: values.get(3).copied(),
+            offset: 0.0,
+        };
+        check_finite(step, &terms)?;
+
+        let gradients = total.backward();
+        let gradient = leaf.grad(&gradients).ok_or_else(|| Error::Device {
+            device: self.engine.compute.name.clone(),
+            reason: "the loss has no gradient to the pictures".into(),
+        })?;
+        let gradients = unbatch(gradient)?;
+        let sum: f32 = gradients
+            .iter()
+            .flat_map(|g| &g.pixels)
+            .map(|g| g.abs())
+            .sum();
+        finite(step, "gradient", sum)?;
+        let logits = self.engine.to_host(logits.inner())?;
+        let right = logits
+            .iter()
+            .zip(self.targets.iter().cycle())
+            .filter(|(logit, target)| (**logit > 0.0) == (**target > 0.5))
+            .count();
+        Ok(Evaluated {
+            terms,
+            gradients,
+            bit_accuracy: right as f64 / logits.len() as f64,
+        })
+    }
+}
+
+fn check_finite(step: usize, terms: &Terms) -> Result<()> {
+    finite(step, "L1", terms.l1)?;
+    finite(step, "SSIM", terms.ssim)?;
+    finite(step, "LPIPS", terms.lpips.unwrap_or(0.0))?;
+    finite(step, "message", terms.message)
+}
+
+/// Fails with [`Error::NotFinite`] unless `value` is a number.
+pub(super) fn finite(step: usize, term: &'static str, value: f32) -> Result<()> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::NotFinite { step, term, value })
+}

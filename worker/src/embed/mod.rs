@@ -1,0 +1,27 @@
+//! Embedding: learns small changes of a scene's colours that make its views read as a message.
+//!
+//! Geometry and opacity are frozen. [`optimise`] is the loop, [`embed`] goes from file to verified file.
+mod adam;
+mod augment;
+mod balance;
+mod check;
+mod loss;
+pub mod natural;
+mod new_key;
+mod optimise;
+mod output;
+mod pool;
+mod progress;
+mod settings;
+mod timing;
+mod verify;
+
+pub use adam::{Adam, AdamOptions, Penalty};
+pub use augment::Augmentation;
+pub use balance::{Balance, Balancer};
+pub use new_key::{NewKey, create_key};
+pub use optimise::{Optimised, optimise};
+pub use output::{Job, Outcome, embed};
+pub use progress::{Check, Progress, Step, Terms};
+pub use settings::{EarlyStop, Lambdas, Preset, Settings, Target, Verify};
+pub use verify::{Verification, verify};

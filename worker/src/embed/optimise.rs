@@ -1,0 +1,343 @@
+//! The loop: offsets on the colours of frozen Gaussians, until the message is read from views never used.
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::adam::{Adam, Penalty};
+use super::balance::Balancer;
+use super::check::HeldOut;
+use super::loss::{Loss, finite};
+use super::pool::{Pool, PooledView};
+use super::progress::{Progress, Step};
+use super::settings::Settings;
+use super::timing::{Stage, Timing};
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+use crate::message::Message;
+use crate::picture::Picture;
+use crate::scene::{Gaussians, Sh};
+use crate::splat::sh;
+use crate::view::ViewSampler;
+
+/// Steps between two reports of the timing.
+const TIMED_STEPS: usize = 20;
+
+/// The outcome of the loop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Optimised {
+    /// Learned changes, laid out as the scene's coefficients. Gaussians that no view saw have 0.
+    pub offsets: Vec<f32>,
+    /// Whether any view saw a Gaussian.
+    pub seen: Vec<bool>,
+    /// Steps taken.
+    pub steps: usize,
+    /// Views drawn in all steps.
+    pub view_steps: usize,
+}
+
+impl Optimised {
+    /// The scene's colours with the offsets on them.
+    pub fn colours(&self, original: &Sh) -> Sh {
+        let pairs = original.coefficients.iter().zip(&self.offsets);
+        Sh {
+            degree: original.degree,
+            coefficients: pairs.map(|(h, o)| h + o).collect(),
+        }
+    }
+}
+
+/// Optimises offsets that make views of the scene read as `message`. The same arguments on the same device give the
+/// same offsets, bit by bit.
+///
+/// # Errors
+/// Settings out of range, a message of another length than the key's, a scene without Gaussians,
+/// [`Error::NotFinite`] when a term stops being a number, or a failing device.
+pub fn optimise(
+    engine: &Engine,
+    gaussians: &Gaussians,
+    message: &Message,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Optimised> {
+    settings.check()?;
+    if message.len() != engine.bits {
+        return Err(Error::BadOption {
+            field: "message",
+            reason: format!("{} bits, but the key has {}", message.len(), engine.bits),
+        });
+    }
+    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+    let mut held_out = settings
+        .early_stop
+        .map(|stop| HeldOut::new(engine, gaussians, &sampler, settings, stop))
+        .transpose()?;
+    let mut run = Run::new(engine, gaussians, message, settings, sampler);
+    let mut timing = Timing::new();
+    let mut steps = 0;
+    while steps < settings.steps {
+        timing.start();
+        steps += 1;
+        progress(Progress::Step(run.step(steps, &mut timing)?));
+        let mut enough = false;
+        if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
+            let check;
+            (check, enough) = held_out.check(engine, gaussians, &run.offsets, message, steps)?;
+            progress(Progress::Check(check));
+        }
+        timing.lap(Stage::Check);
+        timing.end_step(steps, TIMED_STEPS);
+        if enough {
+            progress(Progress::Stopped { step: steps });
+            break;
+        }
+    }
+    Ok(Optimised {
+        offsets: run.offsets,
+        seen: run.seen,
+        view_steps: steps * settings.views_per_step,
+        steps,
+    })
+}
+
+/// The state of a run.
+struct Run<'a> {
+    engine: &'a Engine,
+    gaussians: &'a Gaussians,
+    settings: &'a Settings,
+    loss: Loss<'a>,
+    pool: Pool,
+    adam: Adam,
+    balancer: Balancer,
+    augmentation: ChaCha8Rng,
+    seen: Vec<bool>,
+    offsets: Vec<f32>,
+    gradient: Vec<f32>,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        engine: &'a Engine,
+        gaussians: &'a Gaussians,
+        message: &Message,
+        settings: &'a Settings,
+        sampler: ViewSampler,
+    ) -> Self {
+        let stride = gaussians.sh.per_gaussian();
+        let count = gaussians.sh.coefficients.len();
+        let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
+        augmentation.set_stream(u64::MAX - 1);
+        Self {
+            engine,
+            gaussians,
+            settings,
+            loss: Loss::new(engine, settings, message),
+            pool: Pool::new(sampler, settings),
+            adam: Adam::new(settings.adam, gaussians.len(), stride),
+            balancer: Balancer::new(settings.balance),
+            augmentation,
+            seen: vec![false; gaussians.len()],
+            offsets: vec![0.0; count],
+            gradient: vec![0.0; count],
+        }
+    }
+
+    /// One step; `step` counts from 1.
+    fn step(&mut self, step: usize, timing: &mut Timing) -> Result<Step> {
+        let (views, fresh) = self.pool.batch(self.engine, self.gaussians)?;
+        for view in &views[..fresh] {
+            let rows = view.view.visible.iter();
+            rows.for_each(|&row| self.seen[row as usize] = true);
+        }
+        timing.lap(Stage::Prepare);
+        let mut figures = self.differentiate(step, &views, timing)?;
+
+        let lambda = &self.settings.lambda;
+        let penalty = Penalty {
+            dc: lambda.offset_dc,
+            rest: lambda.offset_rest,
+        };
+        let stride = self.gaussians.sh.per_gaussian();
+        figures.terms.offset = penalty.value(&self.offsets, stride) as f32;
+        finite(step, "offset", figures.terms.offset)?;
+        let rate = self.rate(step);
+        self.adam.step(
+            rate,
+            penalty,
+            &self.seen,
+            &mut self.offsets,
+            &mut self.gradient,
+        );
+        self.balancer.update(figures.psnr_db, figures.bit_accuracy);
+        timing.lap(Stage::Adam);
+        Ok(figures)
+    }
+
+    /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
+    /// `self.gradient`.
+    fn differentiate(
+        &mut self,
+        step: usize,
+        views: &[Arc<PooledView>],
+        timing: &mut Timing,
+    ) -> Result<Step> {
+        let (engine, scene) = (self.engine, self.gaussians);
+        let offsets = &self.offsets;
+        let colours = engine.each(views, |v| {
+            Ok(sh::colours(&scene.sh, Some(offsets), &v.view))
+        })?;
+        timing.lap(Stage::Colours);
+        let drawn: Vec<(&PooledView, &Vec<f32>)> =
+            views.iter().map(AsRef::as_ref).zip(&colours).collect();
+        let pictures = engine.each(&drawn, |(v, colours)| {
+            engine.rasterizer.render(&v.view, colours, v.background)
+        })?;
+        timing.lap(Stage::Render);
+
+        let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
+        let pictures: Vec<&Picture> = pictures.iter().collect();
+        let balance = self.balancer.factor();
+        let rng = &mut self.augmentation;
+        let found = self
+            .loss
+            .evaluate(step, &pictures, &references, balance, rng)?;
+        let psnr_db = mean_psnr(&references, &pictures);
+        timing.lap(Stage::Loss);
+
+        let drawn: Vec<(&PooledView, &Picture)> = views
+            .iter()
+            .map(AsRef::as_ref)
+            .zip(&found.gradients)
+            .collect();
+        let gradients = engine.each(&drawn, |(v, gradient)| {
+            engine.rasterizer.backward(&v.view, &gradient.pixels)
+        })?;
+        timing.lap(Stage::Backward);
+        // One view after the other: sums in a fixed order.
+        for ((v, colours), gradient) in views.iter().zip(&colours).zip(&gradients) {
+            let degree = scene.sh.degree;
+            sh::backward(degree, &v.view, colours, gradient, &mut self.gradient);
+        }
+        timing.lap(Stage::ShBackward);
+        Ok(Step {
+            step,
+            total: self.settings.steps,
+            bit_accuracy: found.bit_accuracy,
+            psnr_db,
+            terms: found.terms,
+            balance,
+        })
+    }
+
+    /// Factor on the learning rates: a half cosine from 1 to the final rate.
+    fn rate(&self, step: usize) -> f32 {
+        let last = self.settings.adam.final_rate;
+        let turn = std::f32::consts::PI * (step - 1) as f32 / self.settings.steps as f32;
+        last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
+    }
+}
+
+/// Mean PSNR of clamped pictures, infinite where all are identical.
+fn mean_psnr(references: &[&Picture], pictures: &[&Picture]) -> f64 {
+    let of = |(a, b): (&&Picture, &&Picture)| {
+        let squares = a.pixels.iter().zip(&b.pixels).map(|(a, b)| {
+            let difference = a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0);
+            f64::from(difference * difference)
+        });
+        let mse = squares.sum::<f64>() / a.pixels.len() as f64;
+        -10.0 * mse.log10()
+    };
+    let views = references.iter().zip(pictures);
+    views.map(of).sum::<f64>() / pictures.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clip::{Clip, ClipConfig, ClipModel, Parts};
+    use crate::device::{DeviceChoice, open};
+    use crate::embed::{Augmentation, Preset};
+    use crate::message::key::Secret;
+    use crate::message::{ClipIdentity, DecoderWeights, Key, Projection};
+    use crate::sample::sample;
+    use rand::RngExt;
+
+    const TINY: &str = r#"{"embed_dim": 16,
+        "vision_cfg": {"image_size": 32, "layers": [1, 1, 1, 1], "width": 8},
+        "text_cfg": {"context_length": 5, "vocab_size": 9, "width": 8, "heads": 1, "layers": 1}}"#;
+
+    /// A tiny random CLIP and an untrained decoder.
+    fn engine() -> Engine {
+        let compute = open(DeviceChoice::Cpu).unwrap();
+        let config = ClipConfig::parse("tiny", TINY).unwrap();
+        let model = ClipModel::init(&config, Parts::Image, &compute.device, 5);
+        let clip = Clip::from_model(config, String::new(), model);
+        let mut projection = Projection::identity(16);
+        projection.matrix_image.iter_mut().for_each(|v| *v *= 8.0);
+        let key = Key {
+            secret: Secret::from_seed(1),
+            seed: None,
+            clip: ClipIdentity {
+                name: String::new(),
+                hash: String::new(),
+            },
+            projection,
+            decoder: DecoderWeights::seeded(16, 4, 1),
+            accuracy_unseen: None,
+            accuracy_unseen_noisy: None,
+        };
+        Engine::new(compute, clip, &key, None).unwrap()
+    }
+
+    /// Along its own direction the gradient must be as steep as its length, from pictures back to coefficients.
+    #[test]
+    fn the_gradient_is_that_of_the_loss() {
+        let engine = engine();
+        let scene = sample(300, 2, 3).unwrap().gaussians;
+        let message = Message::parse("6", 4).unwrap();
+        let mut settings = Preset::Draft.settings();
+        (settings.views_per_step, settings.size) = (2, 40);
+        settings.augmentation = Augmentation {
+            brightness: 0.0,
+            ..settings.augmentation
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let start: Vec<f32> = (0..scene.sh.coefficients.len())
+            .map(|_| 0.2 * (rng.random::<f32>() - 0.5))
+            .collect();
+        for (message_weight, weight) in [(1.0, 0.0), (0.0, 1.0), (0.5, 2.0)] {
+            (settings.lambda.message, settings.lambda.reconstruction) = (message_weight, weight);
+            let sampler = ViewSampler::new(&scene, 1).unwrap();
+            let mut run = Run::new(&engine, &scene, &message, &settings, sampler);
+            let (views, _) = run.pool.batch(&engine, &scene).unwrap();
+            let mut at = |offsets: Vec<f32>| {
+                run.offsets = offsets;
+                run.gradient.fill(0.0);
+                // The same augmentation every time.
+                run.augmentation = ChaCha8Rng::seed_from_u64(4);
+                let t = run
+                    .differentiate(1, &views, &mut Timing::new())
+                    .unwrap()
+                    .terms;
+                let l = &settings.lambda;
+                let reconstruction = l.l1 * t.l1 + l.ssim * t.ssim;
+                let loss = l.message * t.message + l.reconstruction * reconstruction;
+                (f64::from(loss), run.gradient.clone())
+            };
+            let (_, gradient) = at(start.clone());
+            let length = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
+            assert!(length > 0.0);
+            let mut moved = |step: f32| {
+                let pairs = start.iter().zip(&gradient);
+                at(pairs.map(|(o, g)| o + step * g / length).collect()).0
+            };
+            let step = 0.02;
+            let slope = (moved(step) - moved(-step)) / (2.0 * f64::from(step));
+            let ratio = slope / f64::from(length);
+            assert!(
+                (ratio - 1.0).abs() < 0.02,
+                "{message_weight} {weight}: {ratio}"
+            );
+        }
+    }
+}

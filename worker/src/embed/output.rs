@@ -1,0 +1,225 @@
+//! From file to file: the marked scene is written aside, read back and verified before it gets its name.
+use std::path::Path;
+
+use tempfile::TempPath;
+
+use super::optimise::optimise;
+use super::progress::Progress;
+use super::settings::Settings;
+use super::verify::{Verification, verify};
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+use crate::message::Message;
+use crate::scene::Scene;
+
+/// What to embed where.
+pub struct Job<'a> {
+    /// The scene file to mark.
+    pub input: &'a Path,
+    /// Where the marked scene goes; a file there is replaced.
+    pub output: &'a Path,
+    /// The message, of the key's length.
+    pub message: &'a Message,
+    /// How.
+    pub settings: &'a Settings,
+    /// Writes a scene that misses its target all the same.
+    pub force: bool,
+}
+
+/// What became of a job.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What the verification of the file found.
+    pub verification: Verification,
+    /// What misses the target, in words.
+    pub missed: Vec<String>,
+    /// Whether the output was written.
+    pub written: bool,
+    /// Steps taken.
+    pub steps: usize,
+    /// Views drawn in all steps.
+    pub view_steps: usize,
+    /// Gaussians of the scene.
+    pub gaussians: usize,
+    /// Gaussians whose colours changed.
+    pub changed: usize,
+}
+
+/// Marks a scene file. A result that misses its target is not written, unless the job forces it.
+///
+/// # Errors
+/// Whatever reading, optimising, verifying and writing may fail with; the output is then as it was before.
+pub fn embed(
+    engine: &Engine,
+    job: &Job<'_>,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Outcome> {
+    job.settings.check()?;
+    let scene = Scene::read(job.input)?;
+    let aside = reserve(job, &scene)?;
+    let optimised = optimise(
+        engine,
+        &scene.gaussians,
+        job.message,
+        job.settings,
+        progress,
+    )?;
+
+    progress(Progress::Writing);
+    let colours = optimised.colours(&scene.gaussians.sh);
+    // The new file is complete before it replaces the reserved one, so free that one's space first.
+    std::fs::write(&aside, []).map_err(Error::io(job.output))?;
+    scene
+        .write(&aside, &colours)
+        .map_err(|e| named(e, job.output))?;
+    drop(colours);
+    let marked = Scene::read(&aside)
+        .map_err(|e| named(e, job.output))?
+        .gaussians;
+    check_geometry(job.output, &scene, &marked)?;
+
+    let total = job.settings.verify.views;
+    let verification = verify(
+        engine,
+        &scene.gaussians,
+        &marked,
+        job.message,
+        job.settings,
+        |done| progress(Progress::Verifying { done, total }),
+    )?;
+    let missed = verification.missed(&job.settings.target);
+    let written = missed.is_empty() || job.force;
+    if written {
+        aside
+            .persist(job.output)
+            .map_err(|e| Error::io(job.output)(e.error))?;
+    }
+    let stride = scene.gaussians.sh.per_gaussian();
+    let rows = optimised.offsets.chunks_exact(stride);
+    Ok(Outcome {
+        verification,
+        missed,
+        written,
+        steps: optimised.steps,
+        view_steps: optimised.view_steps,
+        gaussians: scene.gaussians.len(),
+        changed: rows.filter(|row| row.iter().any(|o| *o != 0.0)).count(),
+    })
+}
+
+/// A file beside the output that holds as much as the output will. A folder that is missing, read-only or full is
+/// thereby known before the work, not after it. It is deleted when dropped.
+fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
+    let refuse = |reason: &str| {
+        Err(Error::io(job.output)(std::io::Error::other(
+            reason.to_owned(),
+        )))
+    };
+    match std::fs::metadata(job.output) {
+        Ok(there) if !there.is_file() => return refuse("exists and is not a regular file"),
+        Ok(_) if same_file(job.input, job.output) => {
+            return refuse("is the input; the unmarked scene would be lost");
+        }
+        _ => {}
+    }
+    let folder = match job.output.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let aside = tempfile::Builder::new()
+        .prefix(".guardsplat-")
+        .suffix(".ply.part")
+        .tempfile_in(folder)
+        .map_err(Error::io(job.output))?
+        .into_temp_path();
+    scene
+        .write(&aside, &scene.gaussians.sh)
+        .map_err(|e| named(e, job.output))?;
+    Ok(aside)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// The error of the file aside, told of the output that the user knows.
+fn named(error: Error, output: &Path) -> Error {
+    match error {
+        Error::Io { source, .. } => Error::io(output)(source),
+        Error::BadScene { reason, .. } => Error::BadScene {
+            path: output.into(),
+            reason,
+        },
+        other => other,
+    }
+}
+
+fn check_geometry(output: &Path, scene: &Scene, marked: &crate::scene::Gaussians) -> Result<()> {
+    let original = &scene.gaussians;
+    let same = original.positions == marked.positions
+        && original.rotations == marked.rotations
+        && original.log_scales == marked.log_scales
+        && original.opacity_logits == marked.opacity_logits
+        && original.sh.degree == marked.sh.degree;
+    if same {
+        return Ok(());
+    }
+    Err(Error::BadScene {
+        path: output.into(),
+        reason: "the file reads back with other geometry than was written; the disk may be failing"
+            .into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::Preset;
+    use crate::sample::sample;
+
+    #[test]
+    fn places_that_cannot_be_written_are_known_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = sample(10, 0, 1).unwrap();
+        let input = folder.path().join("in.ply");
+        scene.write(&input, &scene.gaussians.sh).unwrap();
+        let message = Message::parse("a", 4).unwrap();
+        let settings = Preset::Draft.settings();
+        let reserve = |output: &Path| {
+            let job = Job {
+                input: &input,
+                output,
+                message: &message,
+                settings: &settings,
+                force: false,
+            };
+            reserve(&job, &scene)
+        };
+        let reason = |output: &Path| reserve(output).unwrap_err().to_string();
+        assert!(reason(&input).contains("is the input"));
+        assert!(reason(folder.path()).contains("not a regular file"));
+        let missing = folder.path().join("none/out.ply");
+        assert!(reason(&missing).starts_with(missing.to_str().unwrap()));
+        let aside = reserve(&folder.path().join("out.ply")).unwrap();
+        assert_eq!(
+            std::fs::metadata(&aside).unwrap().len(),
+            std::fs::metadata(&input).unwrap().len()
+        );
+        drop(aside);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn other_geometry_is_noticed() {
+        let scene = sample(10, 0, 1).unwrap();
+        let mut marked = scene.gaussians.clone();
+        marked.sh.coefficients[0] += 1.0;
+        let output = Path::new("out.ply");
+        check_geometry(output, &scene, &marked).unwrap();
+        marked.positions[3][1] += 1e-3;
+        assert!(check_geometry(output, &scene, &marked).is_err());
+    }
+}

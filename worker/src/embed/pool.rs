@@ -1,0 +1,115 @@
+//! The views of each step: some never used before, the others drawn from those kept from earlier steps.
+//!
+//! Fixed sets of views are memorised instead of generalised from; always preparing all views anew wastes what a view
+//! keeps. So every step adds fresh views to the pool, and the oldest leave it.
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::settings::Settings;
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::picture::Picture;
+use crate::scene::Gaussians;
+use crate::splat::{PreparedView, prepare};
+use crate::view::{Camera, Split, ViewSampler};
+
+/// A view with what it looks like unmarked.
+pub(super) struct PooledView {
+    pub view: PreparedView,
+    pub background: [f32; 3],
+    /// The unmarked picture.
+    pub reference: Picture,
+}
+
+impl PooledView {
+    pub fn new(
+        engine: &Engine,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        background: [f32; 3],
+    ) -> Result<Self> {
+        let cache = engine.weight_cache(camera.width);
+        let view = prepare(gaussians, camera, cache)?;
+        let reference = engine.draw(gaussians, None, &view, background)?;
+        Ok(Self {
+            view,
+            background,
+            reference,
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        self.view.bytes() + size_of_val(&self.reference.pixels[..])
+    }
+}
+
+/// Training views, kept within a number and a budget of bytes.
+pub(super) struct Pool {
+    sampler: ViewSampler,
+    settings: Settings,
+    next: u64,
+    kept: VecDeque<Arc<PooledView>>,
+    picks: ChaCha8Rng,
+}
+
+impl Pool {
+    pub fn new(sampler: ViewSampler, settings: &Settings) -> Self {
+        let mut picks = ChaCha8Rng::seed_from_u64(settings.seed);
+        picks.set_stream(u64::MAX);
+        Self {
+            sampler,
+            settings: *settings,
+            next: 0,
+            kept: VecDeque::new(),
+            picks,
+        }
+    }
+
+    /// The views of the next step; the first `fresh` of them are new. There are more fresh ones than the settings say
+    /// while the pool does not hold enough others.
+    pub fn batch(
+        &mut self,
+        engine: &Engine,
+        gaussians: &Gaussians,
+    ) -> Result<(Vec<Arc<PooledView>>, usize)> {
+        let s = &self.settings;
+        let old = (s.views_per_step - s.fresh_per_step).min(self.kept.len());
+        let fresh = s.views_per_step - old;
+        let wanted: Vec<u64> = (self.next..self.next + fresh as u64).collect();
+        let made = engine.each(&wanted, |&index| {
+            let camera = self.sampler.camera(Split::Training, index, s.size);
+            let view = PooledView::new(engine, gaussians, &camera, self.background(index))?;
+            Ok(Arc::new(view))
+        })?;
+        self.next += fresh as u64;
+        let mut batch = made.clone();
+        // A partial shuffle of the numbers of the kept views: all are distinct.
+        let mut numbers: Vec<usize> = (0..self.kept.len()).collect();
+        for i in 0..old {
+            let j = self.picks.random_range(i..numbers.len());
+            numbers.swap(i, j);
+            batch.push(self.kept[numbers[i]].clone());
+        }
+        self.kept.extend(made);
+        let budget = s.pool_mebibytes << 20;
+        let mut bytes: usize = self.kept.iter().map(|view| view.bytes()).sum();
+        while self.kept.len() > s.pool_views || bytes > budget {
+            let Some(oldest) = self.kept.pop_front() else {
+                break;
+            };
+            bytes -= oldest.bytes();
+        }
+        Ok((batch, fresh))
+    }
+
+    /// White, or black for a seeded share of the views.
+    fn background(&self, index: u64) -> [f32; 3] {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed.wrapping_add(1));
+        rng.set_stream(index);
+        let black = rng.random::<f32>() < self.settings.black_backgrounds;
+        if black { [0.0; 3] } else { [1.0; 3] }
+    }
+}

@@ -1,0 +1,377 @@
+//! Every number of an embedding, and the presets that choose them.
+use serde::{Deserialize, Serialize};
+
+use super::adam::AdamOptions;
+use super::augment::Augmentation;
+use super::balance::Balance;
+use crate::error::{Error, Result};
+
+/// Weights of the terms of the loss.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lambdas {
+    /// Of all terms that compare pictures.
+    pub reconstruction: f32,
+    /// Of the mean absolute difference, within reconstruction.
+    pub l1: f32,
+    /// Of 1 - SSIM, within reconstruction.
+    pub ssim: f32,
+    /// Of LPIPS, within reconstruction; without its weights, or at 0, it is left out.
+    pub lpips: f32,
+    /// Of the binary cross entropy of the message.
+    pub message: f32,
+    /// Of the mean squared offset of constant (DC) coefficients.
+    pub offset_dc: f32,
+    /// Of the mean squared offset of all other coefficients.
+    pub offset_rest: f32,
+}
+
+/// When to stop before the last step: held-out views, other ones than those of the verification, are read every so
+/// often, and all of this must hold.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EarlyStop {
+    /// Steps between checks.
+    pub every: usize,
+    /// Views a check.
+    pub views: usize,
+    /// First step that may be the last.
+    pub min_steps: usize,
+    /// Mean bit accuracy needed.
+    pub bit_accuracy: f64,
+    /// Mean logit needed of the weakest bit, in the right direction.
+    pub margin: f64,
+    /// Mean PSNR needed, dB.
+    pub psnr_db: f64,
+    /// Checks in a row that must hold.
+    pub patience: usize,
+}
+
+/// How the marked file is verified.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verify {
+    /// Held-out views.
+    pub views: usize,
+    /// Their side in pixels; `None` takes twice CLIP's input.
+    pub size: Option<u32>,
+    /// The message must be right from so many of them.
+    pub message_views: usize,
+}
+
+/// What a marked scene must reach to be written.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Mean bit accuracy on held-out views.
+    pub bit_accuracy: f64,
+    /// Mean PSNR on held-out views, dB.
+    pub psnr_db: f64,
+    /// Whether the whole message must be right from [`Verify::message_views`] views.
+    pub message: bool,
+}
+
+/// The numbers of an embedding.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Decides views, backgrounds and augmentation.
+    pub seed: u64,
+    /// Most optimiser steps.
+    pub steps: usize,
+    /// Views a step.
+    pub views_per_step: usize,
+    /// How many of them were never used before; the others are drawn from the pool. With 0 the first step's views are
+    /// all there ever are.
+    pub fresh_per_step: usize,
+    /// Views that are kept for later steps; fresh ones replace the oldest.
+    pub pool_views: usize,
+    /// Memory for kept views, in MiB; the oldest go first.
+    pub pool_mebibytes: usize,
+    /// Side of training views in pixels.
+    pub size: u32,
+    /// Share of training views over black instead of white.
+    pub black_backgrounds: f32,
+    /// Weights of the loss.
+    pub lambda: Lambdas,
+    /// The optimiser.
+    pub adam: AdamOptions,
+    /// Holds a PSNR by changing the weight of reconstruction; `None` leaves it.
+    pub balance: Option<Balance>,
+    /// What CLIP sees of a training view besides the view itself.
+    pub augmentation: Augmentation,
+    /// When to stop before the last step.
+    pub early_stop: Option<EarlyStop>,
+    /// How the result is verified.
+    pub verify: Verify,
+    /// What it must reach.
+    pub target: Target,
+}
+
+/// A named choice of all settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// Minutes on two CPU cores; a weaker mark.
+    Draft,
+    /// What the figures in the documentation were made with.
+    #[default]
+    Standard,
+    /// Steps, views, sizes and weights as the GuardSplat paper has them.
+    Paper,
+}
+
+impl std::str::FromStr for Preset {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "draft" => Ok(Self::Draft),
+            "standard" => Ok(Self::Standard),
+            "paper" => Ok(Self::Paper),
+            other => Err(Error::BadOption {
+                field: "preset",
+                reason: format!("{other:?} is not a preset, must be draft, standard or paper"),
+            }),
+        }
+    }
+}
+
+impl Preset {
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Standard => "standard",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// The table of presets.
+    pub fn settings(self) -> Settings {
+        let standard = Settings {
+            seed: 0,
+            steps: 1300,
+            views_per_step: 16,
+            fresh_per_step: 8,
+            pool_views: 128,
+            pool_mebibytes: 1024,
+            size: 128,
+            black_backgrounds: 0.2,
+            lambda: Lambdas {
+                reconstruction: 1.0,
+                l1: 0.8,
+                ssim: 0.2,
+                lpips: 0.0,
+                message: 0.03,
+                offset_dc: 10.0,
+                offset_rest: 10.0,
+            },
+            adam: AdamOptions::default(),
+            balance: Some(Balance {
+                target_psnr_db: 36.5,
+                ..Balance::default()
+            }),
+            augmentation: Augmentation::default(),
+            early_stop: Some(EarlyStop {
+                every: 25,
+                views: 8,
+                min_steps: 200,
+                bit_accuracy: 0.985,
+                margin: 1.0,
+                psnr_db: 36.3,
+                patience: 2,
+            }),
+            verify: Verify {
+                views: 20,
+                size: None,
+                message_views: 5,
+            },
+            target: Target {
+                bit_accuracy: 0.97,
+                psnr_db: 36.0,
+                message: true,
+            },
+        };
+        match self {
+            Self::Standard => standard,
+            Self::Draft => Settings {
+                steps: 400,
+                views_per_step: 8,
+                fresh_per_step: 4,
+                pool_views: 64,
+                balance: Some(Balance {
+                    target_psnr_db: 34.5,
+                    ..Balance::default()
+                }),
+                early_stop: standard.early_stop.map(|stop| EarlyStop {
+                    min_steps: 100,
+                    bit_accuracy: 0.95,
+                    margin: 0.5,
+                    psnr_db: 34.3,
+                    ..stop
+                }),
+                target: Target {
+                    bit_accuracy: 0.9,
+                    psnr_db: 34.0,
+                    message: true,
+                },
+                ..standard
+            },
+            Self::Paper => Settings {
+                fresh_per_step: 16,
+                size: 224,
+                black_backgrounds: 0.0,
+                lambda: Lambdas {
+                    lpips: 1.0,
+                    ..standard.lambda
+                },
+                balance: None,
+                augmentation: Augmentation {
+                    brightness: 0.0,
+                    scale: 0.0,
+                    shift: 0.0,
+                },
+                early_stop: None,
+                ..standard
+            },
+        }
+    }
+}
+
+impl Settings {
+    /// These settings with the fields of a JSON object in place of their own; for experiments.
+    ///
+    /// # Errors
+    /// Text that is not a JSON object, unknown fields, values of another kind, or what [`Settings::check`] refuses.
+    pub fn overridden(&self, json: &str) -> Result<Self> {
+        let bad = |e: serde_json::Error| Error::BadOption {
+            field: "settings",
+            reason: e.to_string(),
+        };
+        let changes: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(json).map_err(bad)?;
+        let mut all = serde_json::to_value(self).map_err(bad)?;
+        merge(&mut all, serde_json::Value::Object(changes));
+        let settings: Settings = serde_json::from_value(all).map_err(bad)?;
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// Checks every number that could make a run fail, hang or lose its meaning.
+    ///
+    /// # Errors
+    /// [`Error::BadOption`] naming the setting and its limits.
+    pub fn check(&self) -> Result<()> {
+        let count =
+            |field, value: usize, most: usize| within(field, value as f64, 1.0, most as f64);
+        count("steps", self.steps, 10_000_000)?;
+        count("views_per_step", self.views_per_step, 1024)?;
+        within(
+            "fresh_per_step",
+            self.fresh_per_step as f64,
+            0.0,
+            self.views_per_step as f64,
+        )?;
+        count("pool_views", self.pool_views, 1_000_000)?;
+        within("size", f64::from(self.size), 16.0, 4096.0)?;
+        within(
+            "black_backgrounds",
+            f64::from(self.black_backgrounds),
+            0.0,
+            1.0,
+        )?;
+        let l = &self.lambda;
+        for (field, value) in [
+            ("lambda.reconstruction", l.reconstruction),
+            ("lambda.l1", l.l1),
+            ("lambda.ssim", l.ssim),
+            ("lambda.lpips", l.lpips),
+            ("lambda.message", l.message),
+            ("lambda.offset_dc", l.offset_dc),
+            ("lambda.offset_rest", l.offset_rest),
+        ] {
+            within(field, f64::from(value), 0.0, 1e9)?;
+        }
+        self.adam.check()?;
+        self.augmentation.check()?;
+        if let Some(balance) = &self.balance {
+            balance.check()?;
+        }
+        if let Some(stop) = &self.early_stop {
+            count("early_stop.every", stop.every, usize::MAX)?;
+            count("early_stop.views", stop.views, 1000)?;
+            count("early_stop.patience", stop.patience, usize::MAX)?;
+        }
+        count("verify.views", self.verify.views, 1000)?;
+        count(
+            "verify.message_views",
+            self.verify.message_views,
+            self.verify.views,
+        )?;
+        if let Some(size) = self.verify.size {
+            within("size", f64::from(size), 16.0, 4096.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// Fails unless `low <= value <= high`.
+pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<()> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(Error::BadOption {
+        field,
+        reason: format!("{value} is outside {low} to {high}"),
+    })
+}
+
+/// Puts `changes` over `base`, object by object.
+fn merge(base: &mut serde_json::Value, changes: serde_json::Value) {
+    match (base, changes) {
+        (serde_json::Value::Object(base), serde_json::Value::Object(changes)) => {
+            for (field, value) in changes {
+                merge(base.entry(field).or_insert(serde_json::Value::Null), value);
+            }
+        }
+        (base, changes) => *base = changes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_valid_and_grow() {
+        let [draft, standard, paper] =
+            [Preset::Draft, Preset::Standard, Preset::Paper].map(Preset::settings);
+        for settings in [draft, standard, paper] {
+            settings.check().unwrap();
+        }
+        let view_steps = |s: &Settings| s.steps * s.views_per_step;
+        assert!(view_steps(&draft) < view_steps(&standard));
+        assert_eq!(view_steps(&paper), 20_800);
+        for preset in [Preset::Draft, Preset::Standard, Preset::Paper] {
+            assert_eq!(preset.name().parse::<Preset>().unwrap(), preset);
+        }
+        assert!("fast".parse::<Preset>().is_err());
+    }
+
+    #[test]
+    fn overrides_reach_inner_fields_and_leave_the_rest() {
+        let standard = Preset::Standard.settings();
+        let changed = standard
+            .overridden(r#"{"steps": 7, "lambda": {"message": 0.5}, "early_stop": null}"#)
+            .unwrap();
+        assert_eq!((changed.steps, changed.lambda.message), (7, 0.5));
+        assert_eq!(changed.early_stop, None);
+        assert_eq!(changed.lambda.l1, standard.lambda.l1);
+        assert_eq!(changed.target, standard.target);
+        let reason = |json| standard.overridden(json).unwrap_err().to_string();
+        assert!(reason(r#"{"stepz": 7}"#).contains("stepz"));
+        assert!(reason("[]").contains("settings"));
+        assert!(reason(r#"{"fresh_per_step": 99}"#).contains("99 is outside 0 to 16"));
+        assert!(reason(r#"{"size": 4}"#).contains("outside 16"));
+    }
+}

@@ -1,0 +1,95 @@
+//! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views over the sphere.
+use super::settings::{Settings, Target};
+use crate::error::Result;
+use crate::extract::{Comparison, Engine, Reading, default_size};
+use crate::message::Message;
+use crate::picture::Picture;
+use crate::quality::{Quality, measure};
+use crate::scene::Gaussians;
+use crate::view::{Split, ViewSampler};
+
+/// Pairs of pictures that are kept to look at.
+const KEPT_PAIRS: usize = 5;
+
+/// What the verification found.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    /// How the views compare with the message.
+    pub comparison: Comparison,
+    /// What was read from the first few views.
+    pub message: Message,
+    /// Whether that is the whole message.
+    pub message_recovered: bool,
+    /// How much the mark shows.
+    pub quality: Quality,
+    /// How many views.
+    pub views: usize,
+    /// Side of the views in pixels.
+    pub size: u32,
+    /// Original and marked pictures of the first views.
+    pub pairs: Vec<(Picture, Picture)>,
+}
+
+/// Renders held-out views of both scenes over white, compares and reads them.
+///
+/// # Errors
+/// An empty scene or a failing device.
+pub fn verify(
+    engine: &Engine,
+    original: &Gaussians,
+    marked: &Gaussians,
+    message: &Message,
+    settings: &Settings,
+    mut done: impl FnMut(usize),
+) -> Result<Verification> {
+    let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
+    // From the original, so that both scenes are seen by the same cameras whatever happened to the other.
+    let sampler = ViewSampler::new(original, settings.seed)?;
+    let mut pairs = Vec::with_capacity(settings.verify.views);
+    let mut logits = Vec::with_capacity(settings.verify.views);
+    for index in 0..settings.verify.views {
+        let camera = sampler.camera(Split::HeldOut, index as u64, size);
+        let [before, after] =
+            [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
+        let after = after?;
+        logits.extend(engine.read_logits(std::slice::from_ref(&after))?);
+        pairs.push((before?, after));
+        done(index + 1);
+    }
+    let quality = measure(&pairs, engine.lpips.as_ref(), &engine.compute.device)?;
+    pairs.truncate(KEPT_PAIRS);
+    let reading = Reading::new(logits)?;
+    let read = reading.of_first(settings.verify.message_views)?.message()?;
+    Ok(Verification {
+        comparison: reading.compare(message)?,
+        message_recovered: read == *message,
+        message: read,
+        quality,
+        views: settings.verify.views,
+        size,
+        pairs,
+    })
+}
+
+impl Verification {
+    /// What misses the target, in words; nothing when all is reached.
+    pub fn missed(&self, target: &Target) -> Vec<String> {
+        let mut missed = Vec::new();
+        let accuracy = self.comparison.bit_accuracy;
+        if accuracy < target.bit_accuracy {
+            missed.push(format!(
+                "bit accuracy {accuracy:.4} is below {}",
+                target.bit_accuracy
+            ));
+        }
+        if let Some(psnr) = self.quality.psnr.psnr_db
+            && psnr < target.psnr_db
+        {
+            missed.push(format!("PSNR {psnr:.2} dB is below {} dB", target.psnr_db));
+        }
+        if target.message && !self.message_recovered {
+            missed.push(format!("the message reads {}", self.message));
+        }
+        missed
+    }
+}

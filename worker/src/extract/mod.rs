@@ -1,0 +1,55 @@
+//! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
+mod engine;
+mod pictures;
+mod reading;
+
+pub use engine::{Engine, rasterizer};
+pub use pictures::{MAX_PICTURES, Source, find_source};
+pub use reading::{Comparison, Reading};
+
+use crate::error::Result;
+use crate::picture::Picture;
+use crate::scene::Gaussians;
+use crate::view::{Split, ViewSampler};
+
+/// Views that a scene is read from where nothing else is asked for.
+pub const DEFAULT_VIEWS: usize = 20;
+
+/// Side of views in pixels where nothing else is asked for: twice what CLIP takes in, between 128 and 512. Sharper
+/// pictures change what CLIP sees only within its own resampling.
+pub fn default_size(engine: &Engine) -> u32 {
+    (2 * engine.clip.config.vision.image_size).clamp(128, 512) as u32
+}
+
+/// Reads pictures, whatever their sizes.
+///
+/// # Errors
+/// No pictures, or a failing device.
+pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<Reading> {
+    Reading::new(engine.read_logits(pictures)?)
+}
+
+/// Renders `views` held-out 8-bit views of a scene, `size` by `size` pixels, and reads them. `done` hears of every
+/// view.
+///
+/// # Errors
+/// An empty scene, a size out of range, or a failing device.
+pub fn read_scene(
+    engine: &Engine,
+    gaussians: &Gaussians,
+    views: usize,
+    size: u32,
+    background: [f32; 3],
+    seed: u64,
+    mut done: impl FnMut(usize),
+) -> Result<Reading> {
+    let sampler = ViewSampler::new(gaussians, seed)?;
+    let mut logits = Vec::with_capacity(views);
+    for index in 0..views {
+        let camera = sampler.camera(Split::HeldOut, index as u64, size);
+        let picture = engine.picture(gaussians, &camera, background)?;
+        logits.extend(engine.read_logits(&[picture])?);
+        done(index + 1);
+    }
+    Reading::new(logits)
+}

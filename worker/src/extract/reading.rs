@@ -1,0 +1,184 @@
+//! What was read: logits summed per bit over views, one decision.
+use crate::error::{Error, Result};
+use crate::message::{Decision, Message, decide};
+
+/// Logits of some views of one scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Logits of each view, `bits` a view.
+    pub views: Vec<Vec<f32>>,
+    /// Their sum over the views, a bit.
+    pub summed: Vec<f32>,
+}
+
+/// How a reading compares with a message that was claimed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The decision on the summed logits. Views are one reading, never independent trials.
+    pub decision: Decision,
+    /// Mean over views of the share of right bits.
+    pub bit_accuracy: f64,
+    /// The share of right bits of the worst view.
+    pub bit_accuracy_worst_view: f64,
+}
+
+impl Reading {
+    /// Sums the logits of views.
+    ///
+    /// # Errors
+    /// No views, views of different lengths, or logits that are not finite.
+    pub fn new(views: Vec<Vec<f32>>) -> Result<Self> {
+        let bad = |reason: String| {
+            Err(Error::BadOption {
+                field: "views",
+                reason,
+            })
+        };
+        let Some(bits) = views.first().map(Vec::len).filter(|bits| *bits > 0) else {
+            return bad("there is nothing to read".into());
+        };
+        let mut summed = vec![0.0_f32; bits];
+        for (index, view) in views.iter().enumerate() {
+            if view.len() != bits {
+                return bad(format!("view {index} has {} bits, not {bits}", view.len()));
+            }
+            if let Some(value) = view.iter().find(|v| !v.is_finite()) {
+                return bad(format!("a logit of view {index} is {value}"));
+            }
+            summed.iter_mut().zip(view).for_each(|(sum, v)| *sum += v);
+        }
+        Ok(Self { views, summed })
+    }
+
+    /// The first `count` views only, all of them if there are fewer.
+    ///
+    /// # Errors
+    /// When `count` is 0.
+    pub fn of_first(&self, count: usize) -> Result<Self> {
+        Self::new(self.views[..count.min(self.views.len())].to_vec())
+    }
+
+    /// The message that the summed logits decide for.
+    ///
+    /// # Errors
+    /// When there are more bits than a message may have.
+    pub fn message(&self) -> Result<Message> {
+        Message::from_logits(&self.summed)
+    }
+
+    /// Compares with a message.
+    ///
+    /// # Errors
+    /// When lengths differ.
+    pub fn compare(&self, message: &Message) -> Result<Comparison> {
+        if message.len() != self.summed.len() {
+            return Err(Error::BadOption {
+                field: "message",
+                reason: format!(
+                    "{} bits, but the key has {}",
+                    message.len(),
+                    self.summed.len()
+                ),
+            });
+        }
+        let accuracies = self
+            .views
+            .iter()
+            .map(|view| Ok(Message::from_logits(view)?.accuracy(message)))
+            .collect::<Result<Vec<f64>>>()?;
+        let matched = self.message()?.matches(message);
+        Ok(Comparison {
+            decision: decide(message.len() as u32, matched as u32, 1),
+            bit_accuracy: accuracies.iter().sum::<f64>() / accuracies.len() as f64,
+            bit_accuracy_worst_view: accuracies.iter().copied().fold(1.0, f64::min),
+        })
+    }
+
+    /// Mean size of a view's logits.
+    pub fn mean_abs_logit(&self) -> f64 {
+        let all = self.views.iter().flatten();
+        let count = self.views.len() * self.summed.len();
+        all.map(|v| f64::from(v.abs())).sum::<f64>() / count as f64
+    }
+
+    /// Share of a view's bits that agree with the summed decision, mean over views; 0.5 is chance for many views.
+    pub fn agreement(&self) -> f64 {
+        let agreeing = |view: &Vec<f32>| {
+            let pairs = view.iter().zip(&self.summed);
+            pairs
+                .filter(|(v, sum)| (**v > 0.0) == (**sum > 0.0))
+                .count()
+        };
+        let count = self.views.len() * self.summed.len();
+        self.views.iter().map(agreeing).sum::<usize>() as f64 / count as f64
+    }
+
+    /// The weakest bit of `message`: its summed logit, positive when right, a view.
+    pub fn margin(&self, message: &Message) -> f64 {
+        let signed = self.summed.iter().zip(message.bits());
+        let weakest = signed
+            .map(|(&sum, &bit)| f64::from(if bit { sum } else { -sum }))
+            .fold(f64::INFINITY, f64::min);
+        weakest / self.views.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::Verdict;
+
+    fn reading() -> Reading {
+        Reading::new(vec![
+            vec![3.0, -1.0, 0.5, -0.5],
+            vec![-1.0, -1.0, 0.5, 0.25],
+            vec![-1.0, -1.0, 0.5, 0.125],
+        ])
+        .unwrap()
+    }
+
+    #[test]
+    fn logits_are_summed_and_votes_are_not_counted() {
+        let reading = reading();
+        assert_eq!(reading.summed, [1.0, -3.0, 1.5, -0.125]);
+        // Two of three views vote against the first and the last bit; the sums decide otherwise.
+        assert_eq!(reading.message().unwrap().to_string(), "a");
+        assert_eq!(reading.of_first(1).unwrap().summed, [3.0, -1.0, 0.5, -0.5]);
+        assert_eq!(reading.of_first(9).unwrap(), reading);
+    }
+
+    #[test]
+    fn accuracy_is_per_view_and_the_decision_is_one() {
+        let message = Message::parse("a", 4).unwrap();
+        let found = reading().compare(&message).unwrap();
+        assert_eq!(found.decision.matched_bits, 4);
+        assert_eq!(found.decision.bits, 4);
+        assert_eq!(found.decision.verdict, Verdict::Inconclusive);
+        assert!((found.bit_accuracy - (1.0 + 0.5 + 0.5) / 3.0).abs() < 1e-12);
+        assert_eq!(found.bit_accuracy_worst_view, 0.5);
+        assert!(
+            reading()
+                .compare(&Message::parse("aa", 8).unwrap())
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn confidence_without_a_message() {
+        let reading = reading();
+        assert!((reading.agreement() - 8.0 / 12.0).abs() < 1e-12);
+        assert!((reading.mean_abs_logit() - 10.375 / 12.0).abs() < 1e-6);
+        let margin = |text| reading.margin(&Message::parse(text, 4).unwrap());
+        assert!((margin("a") - 0.125 / 3.0).abs() < 1e-6);
+        assert!((margin("e") + 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_refused() {
+        assert!(Reading::new(vec![]).is_err());
+        assert!(Reading::new(vec![vec![]]).is_err());
+        assert!(Reading::new(vec![vec![1.0], vec![1.0, 2.0]]).is_err());
+        let error = Reading::new(vec![vec![1.0], vec![f32::NAN]]).unwrap_err();
+        assert!(error.to_string().contains("view 1 is NaN"), "{error}");
+    }
+}

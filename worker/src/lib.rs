@@ -1,0 +1,18 @@
+//! The GuardSplat engine: marks a 3D Gaussian Splatting scene and reads the mark back from pictures of it.
+pub mod clip;
+pub mod device;
+pub mod embed;
+pub mod error;
+pub mod extract;
+pub mod message;
+pub mod models;
+pub mod picture;
+pub mod quality;
+pub mod sample;
+pub mod scene;
+pub mod splat;
+#[doc(hidden)]
+pub mod testing;
+pub mod view;
+
+pub use error::{Error, Result};

@@ -1,0 +1,343 @@
+//! Builds a [`Projection`] from features of natural pictures and of messages.
+//!
+//! All pictures sit in one corner of CLIP's space and all texts in another, and features of a scene change from view
+//! to view more than a mark can move them. So: centre each tower by its own mean, drop the directions in which natural
+//! pictures vary most, bring both towers to the same spread, and keep what natural variation is left as the noise that
+//! the decoder must learn to stand.
+use super::eigen::{self, dot};
+use super::projection::{MAX_WIDTH, Projection};
+use crate::error::{Error, Result};
+
+/// How to build a projection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FitOptions {
+    /// How many of the strongest directions of natural variation to drop.
+    pub remove: usize,
+    /// Dimensions to keep: those of the rest along which texts vary most. `None` keeps all.
+    pub keep: Option<usize>,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            remove: 64,
+            keep: None,
+        }
+    }
+}
+
+/// Fits a projection to image features of unmarked pictures `[n][width]` and text features `[m][width]`, both
+/// L2-normalised.
+///
+/// # Errors
+/// Fewer than two rows, numbers that are not finite, more directions to drop or keep than there are, or features
+/// without any variation in what is kept.
+pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> Result<Projection> {
+    let bad = |field, reason| Err(Error::BadOption { field, reason });
+    if width == 0 || width > MAX_WIDTH {
+        return bad("width", format!("{width} is outside 1 to {MAX_WIDTH}"));
+    }
+    if options.remove >= width {
+        return bad(
+            "remove",
+            format!("{} directions leave nothing of {width}", options.remove),
+        );
+    }
+    let rest = width - options.remove;
+    let rank = options.keep.unwrap_or(rest);
+    if rank == 0 || rank > rest {
+        return bad("keep", format!("{rank} is outside 1 to {rest}"));
+    }
+    let (mean_image, image) = covariance("image features", images, width)?;
+    let (mean_text, text) = covariance("text features", texts, width)?;
+    let samples = images.len() / width;
+    if samples <= options.remove + 1 {
+        return bad(
+            "remove",
+            format!(
+                "{samples} pictures do not show {} directions",
+                options.remove
+            ),
+        );
+    }
+
+    let natural = decompose(image.clone(), width)?;
+    let mut basis = natural[options.remove * width..].to_vec(); // rest x width, orthonormal rows
+    if rank < rest {
+        let turn = decompose(congruence(&basis, &text, width), rest)?;
+        basis = product(&turn[..rank * rest], &basis, rest, width);
+    }
+    let (image, text) = (
+        congruence(&basis, &image, width),
+        congruence(&basis, &text, width),
+    );
+    let (image_scale, text_scale) = (
+        unit_spread("image", &image, rank)?,
+        unit_spread("text", &text, rank)?,
+    );
+    let scaled: Vec<f64> = image
+        .iter()
+        .map(|c| c * image_scale * image_scale)
+        .collect();
+    Ok(Projection {
+        width,
+        rank,
+        mean_image: mean_image.iter().map(|&v| v as f32).collect(),
+        mean_text: mean_text.iter().map(|&v| v as f32).collect(),
+        matrix_image: transposed(&basis, width, image_scale),
+        matrix_text: transposed(&basis, width, text_scale),
+        noise: cholesky(scaled, rank),
+    })
+}
+
+/// Mean and covariance (`width` x `width`) of feature rows.
+fn covariance(what: &'static str, rows: &[f32], width: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+    let bad = |reason| {
+        Err(Error::BadOption {
+            field: what,
+            reason,
+        })
+    };
+    let n = rows.len() / width;
+    if n < 2 || n * width != rows.len() {
+        return bad(format!(
+            "{} numbers are not two or more rows of {width}",
+            rows.len()
+        ));
+    }
+    if let Some(at) = rows.iter().position(|v| !v.is_finite()) {
+        return bad(format!("row {} holds {}", at / width, rows[at]));
+    }
+    let mut mean = vec![0.0; width];
+    for row in rows.chunks_exact(width) {
+        mean.iter_mut()
+            .zip(row)
+            .for_each(|(m, &v)| *m += f64::from(v) / n as f64);
+    }
+    let mut sum = vec![0.0; width * width];
+    let mut centred = vec![0.0; width];
+    for row in rows.chunks_exact(width) {
+        centred
+            .iter_mut()
+            .zip(row.iter().zip(&mean))
+            .for_each(|(c, (&v, m))| *c = f64::from(v) - m);
+        for i in 0..width {
+            let scale = centred[i] / (n - 1) as f64;
+            sum[i * width + i..(i + 1) * width]
+                .iter_mut()
+                .zip(&centred[i..])
+                .for_each(|(s, c)| *s += scale * c);
+        }
+    }
+    for i in 0..width {
+        for j in 0..i {
+            sum[i * width + j] = sum[j * width + i];
+        }
+    }
+    Ok((mean, sum))
+}
+
+fn decompose(matrix: Vec<f64>, n: usize) -> Result<Vec<f64>> {
+    let eigen = eigen::symmetric(matrix, n).ok_or_else(|| Error::BadOption {
+        field: "features",
+        reason: "their covariance has no principal directions".into(),
+    })?;
+    debug_assert!(eigen.values.len() == n);
+    Ok(eigen.vectors)
+}
+
+/// `B C B^T` of orthonormal rows B (k x width) and a symmetric C.
+fn congruence(basis: &[f64], matrix: &[f64], width: usize) -> Vec<f64> {
+    let turned = product(basis, matrix, width, width);
+    turned
+        .chunks_exact(width)
+        .flat_map(|row| basis.chunks_exact(width).map(move |b| dot(row, b)))
+        .collect()
+}
+
+/// Product of row-major `[.. x inner]` and `[inner x columns]`.
+fn product(a: &[f64], b: &[f64], inner: usize, columns: usize) -> Vec<f64> {
+    let mut out = vec![0.0; a.len() / inner * columns];
+    for (row, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
+        for (&x, b) in row.iter().zip(b.chunks_exact(columns)) {
+            out.iter_mut().zip(b).for_each(|(o, b)| *o += x * b);
+        }
+    }
+    out
+}
+
+/// The factor that gives a covariance a mean variance of 1 a dimension.
+fn unit_spread(what: &str, covariance: &[f64], n: usize) -> Result<f64> {
+    let trace: f64 = (0..n).map(|i| covariance[i * n + i]).sum();
+    // Features are of unit length in f32: less variance than this is rounding.
+    if trace / n as f64 <= 1e-12 {
+        let reason = format!("{what} features do not vary in the {n} dimensions that are kept");
+        return Err(Error::BadOption {
+            field: "features",
+            reason,
+        });
+    }
+    Ok((n as f64 / trace).sqrt())
+}
+
+/// `scale * B^T` as f32: columns are the basis vectors.
+fn transposed(basis: &[f64], width: usize, scale: f64) -> Vec<f32> {
+    (0..width)
+        .flat_map(|i| {
+            basis
+                .iter()
+                .skip(i)
+                .step_by(width)
+                .map(move |v| (scale * v) as f32)
+        })
+        .collect()
+}
+
+/// Lower factor F with `F F^T` = C for a covariance that may be of lower rank: pivots at rounding level become zero.
+fn cholesky(mut c: Vec<f64>, n: usize) -> Vec<f32> {
+    let negligible = 1e-10 * (0..n).map(|i| c[i * n + i]).fold(0.0, f64::max);
+    for j in 0..n {
+        let (done, below) = c.split_at_mut((j + 1) * n);
+        let row = &mut done[j * n..];
+        let pivot = row[j] - dot(&row[..j], &row[..j]);
+        row[j] = if pivot > negligible {
+            pivot.sqrt()
+        } else {
+            0.0
+        };
+        row[j + 1..].fill(0.0);
+        for other in below.chunks_exact_mut(n) {
+            let value = other[j] - dot(&other[..j], &row[..j]);
+            other[j] = if row[j] > 0.0 { value / row[j] } else { 0.0 };
+        }
+    }
+    c.iter().map(|&v| v as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    const WIDTH: usize = 12;
+
+    /// Rows around `offset` whose dimension i has spread `spread(i)`.
+    fn rows(n: usize, seed: u64, offset: f32, spread: impl Fn(usize) -> f32) -> Vec<f32> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..n * WIDTH)
+            .map(|i| offset + spread(i % WIDTH) * (rng.random::<f32>() - 0.5))
+            .collect()
+    }
+
+    fn features() -> (Vec<f32>, Vec<f32>) {
+        // Pictures vary most in dimensions 0 and 1, texts least in 2.
+        let images = rows(
+            400,
+            1,
+            0.3,
+            |i| if i < 2 { 5.0 } else { 0.2 + 0.02 * i as f32 },
+        );
+        let texts = rows(300, 2, -0.4, |i| if i == 2 { 0.001 } else { 0.05 });
+        (images, texts)
+    }
+
+    fn check_spread(projected: &[f32], rank: usize) -> Vec<f64> {
+        let (mean, covariance) = covariance("projected", projected, rank).unwrap();
+        assert!(mean.iter().all(|m| m.abs() < 1e-4), "{mean:?}");
+        let trace: f64 = (0..rank).map(|i| covariance[i * rank + i]).sum();
+        assert!((trace / rank as f64 - 1.0).abs() < 1e-3, "{trace}");
+        covariance
+    }
+
+    #[test]
+    fn strong_natural_directions_vanish_and_spreads_agree() {
+        let (images, texts) = features();
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: None,
+            },
+        )
+        .unwrap();
+        p.check().unwrap();
+        assert_eq!((p.width, p.rank), (WIDTH, 10));
+        for matrix in [&p.matrix_image, &p.matrix_text] {
+            let norm = |row: &[f32]| row.iter().map(|v| v * v).sum::<f32>().sqrt();
+            assert!(norm(&matrix[..2 * p.rank]) < 0.05 * norm(&matrix[2 * p.rank..]));
+        }
+        check_spread(&p.project_text(&texts), p.rank);
+        check_spread(&p.project_image(&images), p.rank);
+    }
+
+    #[test]
+    fn noise_has_the_covariance_of_projected_pictures() {
+        let (images, texts) = features();
+        for keep in [None, Some(4)] {
+            let p = fit(&images, &texts, WIDTH, FitOptions { remove: 3, keep }).unwrap();
+            let covariance = check_spread(&p.project_image(&images), p.rank);
+            let f: Vec<f64> = p.noise.iter().map(|&v| f64::from(v)).collect();
+            for (i, row) in f.chunks_exact(p.rank).enumerate() {
+                assert!(row[i + 1..].iter().all(|&v| v == 0.0));
+                for (j, other) in f.chunks_exact(p.rank).enumerate() {
+                    assert!((dot(row, other) - covariance[i * p.rank + j]).abs() < 1e-3);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn keep_takes_the_directions_in_which_texts_vary() {
+        let (images, texts) = features();
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: Some(9),
+            },
+        )
+        .unwrap();
+        let dimension_2 = &p.matrix_text[2 * p.rank..3 * p.rank];
+        let other = &p.matrix_text[5 * p.rank..6 * p.rank];
+        let norm = |row: &[f32]| row.iter().map(|v| v * v).sum::<f32>();
+        assert!(norm(dimension_2) < 0.01 * norm(other));
+    }
+
+    #[test]
+    fn fewer_pictures_than_dimensions_are_enough() {
+        let (_, texts) = features();
+        let images = rows(6, 4, 0.0, |_| 1.0);
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: None,
+            },
+        )
+        .unwrap();
+        p.check().unwrap();
+    }
+
+    #[test]
+    fn bad_input_is_refused() {
+        let (images, texts) = features();
+        let options = |remove, keep| FitOptions { remove, keep };
+        let reason = |i: &[f32], t: &[f32], o| fit(i, t, WIDTH, o).unwrap_err().to_string();
+        assert!(reason(&images, &texts, options(12, None)).contains("leave nothing of 12"));
+        assert!(reason(&images, &texts, options(2, Some(11))).contains("1 to 10"));
+        assert!(reason(&images[..WIDTH], &texts, options(0, None)).contains("two or more rows"));
+        assert!(reason(&images[..4 * WIDTH], &texts, options(4, None)).contains("4 pictures"));
+        assert!(reason(&images, &[0.5; 3 * WIDTH], options(0, None)).contains("do not vary"));
+        let mut broken = texts.clone();
+        broken[WIDTH + 1] = f32::INFINITY;
+        assert!(reason(&images, &broken, options(0, None)).contains("row 1 holds inf"));
+    }
+}

@@ -1,0 +1,284 @@
+//! A key: the secret, the decoder trained for it, and the CLIP that both belong to.
+use std::fmt;
+use std::path::Path;
+
+use burn::tensor::Device;
+use rand::TryRng;
+use rand::rngs::SysRng;
+use serde::{Deserialize, Serialize};
+
+use super::bits::{Message, check_bits};
+use super::decoder::DecoderWeights;
+use super::key_file;
+use super::projection::Projection;
+use super::reader::Reader;
+use super::tokens::{CONTEXT, TokenTable, hmac_sha256};
+use super::training::{Progress, TrainingOptions, train};
+use crate::error::{Error, Result};
+
+/// Which CLIP a key belongs to.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ClipIdentity {
+    /// Its name, for people.
+    pub name: String,
+    /// SHA-256 of its weights in hexadecimal; what counts.
+    pub hash: String,
+}
+
+/// What a key is made from, besides a CLIP.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyOptions {
+    /// Bits of its messages, 1 to 75.
+    pub bits: usize,
+    /// Makes the key reproducible, and only as secret as the seed; `None` asks the operating system for a secret.
+    pub seed: Option<u64>,
+    /// How to train the decoder; its own seed is replaced.
+    pub training: TrainingOptions,
+}
+
+/// 32 secret bytes that do not show up in logs.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Secret([u8; 32]);
+
+impl Secret {
+    /// These bytes.
+    pub fn new(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// A secret from the operating system's random numbers.
+    pub fn random() -> Result<Self> {
+        let mut bytes = [0; 32];
+        SysRng
+            .try_fill_bytes(&mut bytes)
+            .map_err(|e| Error::BadOption {
+                field: "seed",
+                reason: format!("the operating system has no random numbers ({e}); give a seed"),
+            })?;
+        Ok(Self(bytes))
+    }
+
+    /// The secret of a seed: as easy to guess as the seed.
+    pub fn from_seed(seed: u64) -> Self {
+        Self(hmac_sha256(
+            b"guardsplat key secret v1",
+            &[&seed.to_le_bytes()],
+        ))
+    }
+
+    /// The bytes, for who may have them.
+    pub fn expose(&self) -> &[u8; 32] {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Secret {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Secret(..)")
+    }
+}
+
+/// What embedding and extraction need besides a scene and a CLIP.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Key {
+    /// Decides which tokens stand for which bits.
+    pub secret: Secret,
+    /// The seed that the secret came from, if it did.
+    pub seed: Option<u64>,
+    /// The CLIP whose features the decoder reads.
+    pub clip: ClipIdentity,
+    /// What happens to features before the decoder.
+    pub projection: Projection,
+    /// The decoder.
+    pub decoder: DecoderWeights,
+    /// Share of right bits on text features of messages not seen in training; `None` for lengths of so few messages
+    /// that none could be kept apart.
+    pub accuracy_unseen: Option<f64>,
+    /// The same under the noise of the training.
+    pub accuracy_unseen_noisy: Option<f64>,
+}
+
+impl Key {
+    /// Makes a key: draws or derives the secret, and trains its decoder on `device`. `encode` is the text tower of
+    /// `clip`, as in [`train`]. Fails as [`train`] does.
+    pub fn create(
+        options: &KeyOptions,
+        clip: ClipIdentity,
+        projection: Projection,
+        encode: impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
+        device: &Device,
+        progress: impl FnMut(Progress),
+    ) -> Result<Self> {
+        check_bits(options.bits)?;
+        projection.check().map_err(|reason| Error::BadOption {
+            field: "projection",
+            reason,
+        })?;
+        let secret = match options.seed {
+            Some(seed) => Secret::from_seed(seed),
+            None => Secret::random()?,
+        };
+        let table = TokenTable::new(secret.expose(), options.bits)?;
+        // The training's seed follows from the secret, so that one seed decides the whole file.
+        let [a, b, c, d, e, f, g, h, ..] =
+            hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
+        let seed = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+        let training = TrainingOptions {
+            seed,
+            ..options.training.clone()
+        };
+        let trained = train(&table, &projection, encode, &training, device, progress)?;
+        Ok(Self {
+            secret,
+            seed: options.seed,
+            clip,
+            projection,
+            decoder: trained.weights,
+            accuracy_unseen: trained.accuracy_unseen,
+            accuracy_unseen_noisy: trained.accuracy_unseen_noisy,
+        })
+    }
+
+    /// Bits of its messages.
+    pub fn bits(&self) -> usize {
+        self.decoder.bits()
+    }
+
+    /// 32 hexadecimal digits that name the key and give nothing of the secret away: an HMAC over everything in it.
+    pub fn id(&self) -> String {
+        let bits = (self.bits() as u64).to_le_bytes();
+        let tensors: Vec<Vec<u8>> = key_file::tensors(self)
+            .iter()
+            .map(key_file::Named::little_endian)
+            .collect();
+        let mut parts: Vec<&[u8]> = vec![b"guardsplat key id v1", &bits, self.clip.hash.as_bytes()];
+        parts.extend(tensors.iter().map(Vec::as_slice));
+        hex::encode(&hmac_sha256(self.secret.expose(), &parts)[..16])
+    }
+
+    /// The key's token table.
+    pub fn tokens(&self) -> Result<TokenTable> {
+        TokenTable::new(self.secret.expose(), self.bits())
+    }
+
+    /// Parses a message of the key's length from hexadecimal.
+    pub fn message(&self, text: &str) -> Result<Message> {
+        Message::parse(text, self.bits())
+    }
+
+    /// Projection and decoder on a device.
+    pub fn reader(&self, device: &Device) -> Reader {
+        Reader::new(&self.projection, &self.decoder, device)
+    }
+
+    /// Fails unless the key belongs to the CLIP with these weights; `path` is the key's file, for the message.
+    pub fn require_clip(&self, path: &Path, clip: &ClipIdentity) -> Result<()> {
+        if self.clip.hash == clip.hash {
+            return Ok(());
+        }
+        let short = |hash: &str| hash.chars().take(12).collect::<String>();
+        Err(Error::BadKey {
+            path: path.into(),
+            reason: format!(
+                "it belongs to the CLIP {:?} ({}), not to {:?} ({})",
+                self.clip.name,
+                short(&self.clip.hash),
+                clip.name,
+                short(&clip.hash)
+            ),
+        })
+    }
+
+    /// Writes the key file, readable by its owner only; a file that is there is replaced whole, or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        key_file::write(self, path)
+    }
+
+    /// Reads a key file and checks every part of it. Damage of any kind is [`Error::BadKey`].
+    pub fn read(path: &Path) -> Result<Self> {
+        key_file::read(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn encode(sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
+        Ok(sequences
+            .iter()
+            .flat_map(|s| (1..9).map(|i| ((s[i] * 7 + i as i64) % 13) as f32 / 13.0 - 0.5))
+            .collect())
+    }
+
+    fn create(seed: Option<u64>) -> Key {
+        let training = TrainingOptions {
+            messages: 64,
+            epochs: Some(1),
+            ..TrainingOptions::default()
+        };
+        let clip = ClipIdentity {
+            name: "tiny".into(),
+            hash: "ab".repeat(32),
+        };
+        let options = KeyOptions {
+            bits: 8,
+            seed,
+            training,
+        };
+        Key::create(
+            &options,
+            clip,
+            Projection::identity(8),
+            encode,
+            &Device::flex(),
+            |_| {},
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_seed_decides_the_whole_key_and_no_seed_is_always_another() {
+        let (a, b) = (create(Some(1)), create(Some(1)));
+        assert_eq!(a, b);
+        assert_eq!(a.id(), b.id());
+        assert_ne!(create(Some(2)).id(), a.id());
+        assert_ne!(create(None).secret, create(None).secret);
+    }
+
+    #[test]
+    fn another_clip_is_an_error_that_names_both() {
+        let key = create(Some(1));
+        let path = Path::new("mine.key");
+        key.require_clip(path, &key.clip).unwrap();
+        let other = ClipIdentity {
+            name: "large".into(),
+            hash: "cd".repeat(32),
+        };
+        let text = key.require_clip(path, &other).unwrap_err().to_string();
+        let expected =
+            r#"belongs to the CLIP "tiny" (abababababab), not to "large" (cdcdcdcdcdcd)"#;
+        assert!(
+            text.starts_with("key mine.key: ") && text.ends_with(expected),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn secrets_are_not_printed_and_messages_have_the_keys_length() {
+        let key = create(Some(1));
+        let printed = format!("{key:?}");
+        assert!(
+            printed.contains("Secret(..)")
+                && !printed.contains(&format!("{:?}", key.secret.expose()))
+        );
+        assert_eq!(key.message("a5").unwrap().to_string(), "a5");
+        assert!(
+            key.message("a5a5")
+                .unwrap_err()
+                .to_string()
+                .contains("longer than the key's 8 bits")
+        );
+        assert_eq!(key.tokens().unwrap().bits(), 8);
+    }
+}

@@ -1,0 +1,390 @@
+//! Trains the decoder on text features of fresh random messages, and measures it on messages it never saw.
+use burn::module::Module;
+use burn::optim::{AdamConfig, GradientsParams};
+use burn::tensor::Device;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha20Rng;
+
+use super::bits::Message;
+use super::decoder::{Decoder, DecoderWeights, bce_from_logits};
+use super::projection::Projection;
+use super::samples::{Samples, distinct_messages, noise_pool, shuffle};
+use super::tokens::{CONTEXT, TokenTable};
+use crate::error::{Error, Result};
+
+/// Sequences given to the text tower at once.
+const ENCODE_BATCH: usize = 64;
+
+/// How to train a decoder.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainingOptions {
+    /// Distinct messages to train on (fewer where the length has fewer).
+    pub messages: usize,
+    /// Messages kept apart to measure on, at most a quarter of all that the length has.
+    pub unseen: usize,
+    /// Messages a step.
+    pub batch: usize,
+    /// Passes over the training messages; `None` takes 24, 36 or 48 for up to 16, 48 or more bits.
+    pub epochs: Option<usize>,
+    /// Adam's rate at the start; it falls to zero along a half cosine.
+    pub learning_rate: f64,
+    /// Natural variation added to the features: times what unmarked pictures show (the projection's noise).
+    pub noise: f32,
+    /// Decides messages, initial weights, order and noise.
+    pub seed: u64,
+}
+
+impl Default for TrainingOptions {
+    fn default() -> Self {
+        Self {
+            messages: 2048,
+            unseen: 256,
+            batch: 64,
+            epochs: None,
+            learning_rate: 5e-3,
+            noise: 0.5,
+            seed: 0,
+        }
+    }
+}
+
+/// A trained decoder and how well it reads text features.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trained {
+    /// The weights.
+    pub weights: DecoderWeights,
+    /// Share of right bits on the training messages, without noise.
+    pub accuracy_seen: f64,
+    /// Share of right bits on unseen messages, without noise; `None` where the length has too few messages.
+    pub accuracy_unseen: Option<f64>,
+    /// As `accuracy_unseen`, under the noise of the training.
+    pub accuracy_unseen_noisy: Option<f64>,
+    /// Optimiser steps taken.
+    pub steps: usize,
+}
+
+/// What training is doing, for a progress display: the stage, steps done, steps in all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Messages passed through the text tower.
+    Encoding(usize, usize),
+    /// Optimiser steps.
+    Training(usize, usize),
+}
+
+/// Trains a decoder for the messages of `table` behind `projection` on `device`.
+///
+/// `encode` is the text tower: token sequences to L2-normalised features, `[n][projection.width]` row-major; it is
+/// called with at most 64 sequences at a time. On the CPU the same seed gives the same weights.
+///
+/// # Errors
+/// Those of `encode`, features of another size or not finite, and a loss that stops being a number.
+pub fn train(
+    table: &TokenTable,
+    projection: &Projection,
+    mut encode: impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
+    options: &TrainingOptions,
+    device: &Device,
+    mut progress: impl FnMut(Progress),
+) -> Result<Trained> {
+    check(options)?;
+    let bits = table.bits();
+    let mut rng = ChaCha20Rng::seed_from_u64(options.seed);
+    let (seen, unseen) = distinct_messages(bits, options.messages, options.unseen, &mut rng)?;
+    let total = seen.len() + unseen.len();
+    let mut encoded = 0;
+    let mut sample = |messages: &[Message]| -> Result<Samples> {
+        let mut features = Vec::with_capacity(messages.len() * projection.rank);
+        for chunk in messages.chunks(ENCODE_BATCH) {
+            let sequences = chunk
+                .iter()
+                .map(|m| table.sequence(m))
+                .collect::<Result<Vec<_>>>()?;
+            let raw = encode(&sequences)?;
+            check_features(&raw, chunk.len() * projection.width)?;
+            features.extend(projection.project_text(&raw));
+            encoded += chunk.len();
+            progress(Progress::Encoding(encoded, total));
+        }
+        let targets = messages.iter().flat_map(Message::targets).collect();
+        Ok(Samples {
+            features,
+            targets,
+            rank: projection.rank,
+            bits,
+        })
+    };
+    let (seen, unseen) = (sample(&seen)?, sample(&unseen)?);
+    let noise = noise_pool(projection, options.noise, &mut rng, device)?;
+
+    let tracking = device.clone().without_autodiff().autodiff();
+    let mut decoder = Decoder::new(
+        &DecoderWeights::seeded(projection.rank, bits, rng.next_u64()),
+        &tracking,
+    );
+    let mut optimizer = AdamConfig::new().with_epsilon(1e-8).init();
+    let mut order: Vec<usize> = (0..seen.len()).collect();
+    let epochs = options.epochs.unwrap_or(match bits {
+        0..=16 => 24,
+        17..=48 => 36,
+        _ => 48,
+    });
+    let steps = epochs * seen.len().div_ceil(options.batch);
+    let mut step = 0;
+    for _ in 0..epochs {
+        shuffle(&mut order, &mut rng);
+        for rows in order.chunks(options.batch) {
+            let (features, targets) = seen.batch(rows, Some((&noise, &mut rng)), &tracking);
+            let loss = bce_from_logits(decoder.forward(features), targets);
+            if step % 64 == 0 {
+                finite(step, loss.clone().into_scalar::<f32>())?;
+                progress(Progress::Training(step, steps));
+            }
+            let gradients = GradientsParams::from_grads(loss.backward(), &decoder);
+            let rate = options.learning_rate
+                * 0.5
+                * (1.0 + (std::f64::consts::PI * step as f64 / steps as f64).cos());
+            decoder = optimizer.step(rate, decoder, gradients);
+            step += 1;
+        }
+    }
+    progress(Progress::Training(steps, steps));
+
+    let decoder = decoder.valid();
+    let weights = decoder.weights()?;
+    if weights.check().is_err() {
+        return Err(Error::NotFinite {
+            step,
+            term: "decoder",
+            value: f32::NAN,
+        });
+    }
+    let device = device.clone().without_autodiff();
+    Ok(Trained {
+        accuracy_seen: seen.accuracy(&decoder, None, &device)?.unwrap_or(0.0),
+        accuracy_unseen: unseen.accuracy(&decoder, None, &device)?,
+        accuracy_unseen_noisy: unseen.accuracy(&decoder, Some((&noise, &mut rng)), &device)?,
+        weights,
+        steps,
+    })
+}
+
+fn check(options: &TrainingOptions) -> Result<()> {
+    let bad = |field, reason: &str| {
+        Err(Error::BadOption {
+            field,
+            reason: reason.into(),
+        })
+    };
+    if options.messages == 0 || options.batch == 0 || options.epochs == Some(0) {
+        return bad("training", "messages, batch and epochs must be at least 1");
+    }
+    if !(options.noise >= 0.0 && options.noise.is_finite()) {
+        return bad("noise", "must be zero or a positive number");
+    }
+    if !(options.learning_rate > 0.0 && options.learning_rate.is_finite()) {
+        return bad("learning rate", "must be a positive number");
+    }
+    Ok(())
+}
+
+fn check_features(features: &[f32], expected: usize) -> Result<()> {
+    let reason = if features.len() != expected {
+        format!("{} numbers, not {expected}", features.len())
+    } else if let Some(v) = features.iter().find(|v| !v.is_finite()) {
+        format!("a feature is {v}")
+    } else {
+        return Ok(());
+    };
+    Err(Error::BadModel {
+        name: "text tower".into(),
+        reason,
+    })
+}
+
+fn finite(step: usize, value: f32) -> Result<()> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::NotFinite {
+            step,
+            term: "decoder",
+            value,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::decoder::unit;
+    use super::*;
+
+    const WIDTH: usize = 48;
+
+    /// A text tower in miniature: random embeddings of tokens at positions, summed, off centre and normalised.
+    fn tower(sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
+        let mut features = Vec::new();
+        for sequence in sequences {
+            let mut row = [0.5_f32; WIDTH];
+            for (position, &token) in sequence.iter().enumerate().filter(|(_, t)| **t > 0) {
+                let mut rng = ChaCha20Rng::seed_from_u64(token as u64 * 100 + position as u64);
+                row.iter_mut()
+                    .for_each(|x| *x += 0.2 * (unit(&mut rng) - 0.5));
+            }
+            let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt();
+            features.extend(row.iter().map(|x| x / norm));
+        }
+        Ok(features)
+    }
+
+    /// Centred and scaled, with equal noise in all dimensions.
+    fn projection(table: &TokenTable, noise: f32) -> Projection {
+        let mut rng = ChaCha20Rng::seed_from_u64(77);
+        let sequences: Vec<_> = (0..200)
+            .map(|_| {
+                table
+                    .sequence(&Message::random(table.bits(), &mut rng).unwrap())
+                    .unwrap()
+            })
+            .collect();
+        let mut projection = Projection::identity(WIDTH);
+        let features = tower(&sequences).unwrap();
+        for (i, mean) in projection.mean_text.iter_mut().enumerate() {
+            *mean = features.iter().skip(i).step_by(WIDTH).sum::<f32>() / 200.0;
+        }
+        projection.matrix_text.iter_mut().for_each(|v| *v *= 20.0);
+        projection
+            .noise
+            .iter_mut()
+            .step_by(WIDTH + 1)
+            .for_each(|v| *v = noise);
+        projection
+    }
+
+    fn options() -> TrainingOptions {
+        TrainingOptions {
+            messages: 512,
+            unseen: 64,
+            epochs: Some(20),
+            seed: 3,
+            ..TrainingOptions::default()
+        }
+    }
+
+    #[test]
+    fn unseen_messages_are_read_and_the_seed_decides() {
+        let table = TokenTable::new(&[9; 32], 16).unwrap();
+        let projection = projection(&table, 0.1);
+        let run = |seed| {
+            let options = TrainingOptions { seed, ..options() };
+            train(
+                &table,
+                &projection,
+                tower,
+                &options,
+                &Device::flex(),
+                |_| {},
+            )
+            .unwrap()
+        };
+        let first = run(3);
+        assert_eq!(first.steps, 160);
+        assert!(first.accuracy_seen > 0.99, "{first:?}");
+        assert!(
+            first.accuracy_unseen.unwrap() > 0.98,
+            "{:?}",
+            first.accuracy_unseen
+        );
+        assert!(
+            first.accuracy_unseen_noisy.unwrap() > 0.95,
+            "{:?}",
+            first.accuracy_unseen_noisy
+        );
+        assert_eq!(run(3), first);
+        assert_ne!(run(4).weights, first.weights);
+    }
+
+    #[test]
+    fn noise_costs_accuracy_and_none_costs_none() {
+        let table = TokenTable::new(&[9; 32], 16).unwrap();
+        let run = |noise| {
+            train(
+                &table,
+                &projection(&table, noise),
+                tower,
+                &options(),
+                &Device::flex(),
+                |_| {},
+            )
+            .unwrap()
+        };
+        let loud = run(8.0);
+        assert!(
+            loud.accuracy_unseen_noisy < loud.accuracy_unseen,
+            "{:?}",
+            loud.accuracy_unseen_noisy
+        );
+        let silent = run(0.0);
+        assert_eq!(silent.accuracy_unseen_noisy, silent.accuracy_unseen);
+    }
+
+    #[test]
+    fn one_bit_has_nothing_unseen() {
+        let table = TokenTable::new(&[9; 32], 1).unwrap();
+        let trained = train(
+            &table,
+            &projection(&table, 0.0),
+            tower,
+            &options(),
+            &Device::flex(),
+            |_| {},
+        )
+        .unwrap();
+        assert_eq!(trained.accuracy_unseen, None);
+        assert_eq!(trained.accuracy_seen, 1.0);
+    }
+
+    #[test]
+    fn failures_are_errors() {
+        let table = TokenTable::new(&[9; 32], 8).unwrap();
+        let p = Projection::identity(WIDTH);
+        let run = |encode: fn(&[[i64; CONTEXT]]) -> Result<Vec<f32>>, options: &TrainingOptions| {
+            train(&table, &p, encode, options, &Device::flex(), |_| {})
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(run(|_| Ok(vec![0.0; 3]), &options()).contains("3 numbers"));
+        assert!(run(|s| Ok(vec![f32::NAN; s.len() * WIDTH]), &options()).contains("NaN"));
+        let no_batch = TrainingOptions {
+            batch: 0,
+            ..options()
+        };
+        assert!(run(tower, &no_batch).contains("at least 1"));
+        let bad_noise = TrainingOptions {
+            noise: f32::NAN,
+            ..options()
+        };
+        assert!(run(tower, &bad_noise).contains("noise"));
+    }
+
+    #[test]
+    fn progress_is_told_to_the_end() {
+        let table = TokenTable::new(&[9; 32], 8).unwrap();
+        let mut told = Vec::new();
+        let options = TrainingOptions {
+            epochs: Some(1),
+            ..options()
+        };
+        train(
+            &table,
+            &projection(&table, 0.0),
+            tower,
+            &options,
+            &Device::flex(),
+            |p| told.push(p),
+        )
+        .unwrap();
+        assert!(told.contains(&Progress::Encoding(256, 256)));
+        assert!(matches!(told.last(), Some(Progress::Training(done, all)) if done == all));
+    }
+}

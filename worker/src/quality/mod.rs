@@ -1,0 +1,17 @@
+//! How much a mark shows: PSNR, SSIM and LPIPS of marked against original views, and pictures to look at.
+pub mod batch;
+pub mod compare;
+pub mod files;
+pub mod lpips;
+mod lpips_weights;
+pub mod measure;
+pub mod psnr;
+pub mod ssim;
+
+pub use batch::{batch, unbatch};
+pub use compare::{contact_sheet, difference};
+pub use files::{PictureFormat, decode_picture, encode_picture, read_picture, write_picture};
+pub use lpips::Lpips;
+pub use measure::{Quality, measure};
+pub use psnr::{MeanPsnr, Psnr, mean_psnr, psnr};
+pub use ssim::{Ssim, ssim};

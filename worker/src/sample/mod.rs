@@ -1,0 +1,199 @@
+//! A scene of the project's own: Gaussians on textured solid shapes that stand on a disc of ground.
+//!
+//! Points are spread over each surface in proportion to its area. A Gaussian there is as wide as the spacing of
+//! points and a tenth of that thick along the surface normal, so that the surface closes without fringes. Its
+//! constant colour is the texture under a lamp and a sky; its highlight is a Phong lobe fitted into the spherical
+//! harmonics of the scene's degree.
+mod highlight;
+mod shapes;
+mod texture;
+
+use crate::error::{Error, Result};
+use crate::scene::{Gaussians, MAX_DEGREE, Scene, Sh};
+use crate::view::vector::{along, cross, dot, perpendicular, unit};
+use highlight::Highlight;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use shapes::{Solid, arrange};
+use texture::Texture;
+
+/// Most Gaussians of a sample; it is meant to be small.
+pub const MAX_GAUSSIANS: usize = 10_000_000;
+
+/// Standard deviation along the surface, in spacings of points: neighbours overlap at 0.8 of their height.
+const WIDTH: f64 = 0.6;
+/// Standard deviation along the normal, in those along the surface.
+const FLATNESS: f64 = 0.1;
+/// Logit of the opacity of every Gaussian: 0.98.
+const OPACITY_LOGIT: f32 = 4.0;
+/// Constant term of the spherical harmonics.
+const SH_C0: f32 = 0.282_094_8;
+/// Direction from which the lamp shines, before it is brought to length 1; y points down, as in captured scenes.
+const LAMP: [f32; 3] = [0.45, -0.8, 0.4];
+
+/// Makes a sample scene; the same arguments give the same scene.
+///
+/// It is about 3 units across, y points down. `sh_degree` is 0 to 4; degree 0 has no highlights.
+///
+/// # Errors
+/// [`Error::BadOption`] for no Gaussians or more than [`MAX_GAUSSIANS`], or a degree above 4.
+pub fn sample(gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
+    if !(1..=MAX_GAUSSIANS).contains(&gaussians) {
+        let reason = format!("{gaussians} is not between 1 and {MAX_GAUSSIANS}");
+        return Err(Error::BadOption {
+            field: "--gaussians",
+            reason,
+        });
+    }
+    if sh_degree > MAX_DEGREE {
+        let reason = format!("{sh_degree} is above the largest degree, {MAX_DEGREE}");
+        return Err(Error::BadOption {
+            field: "--sh-degree",
+            reason,
+        });
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let solids = arrange(&mut random);
+    let lamp = unit(LAMP).unwrap_or([0.0, -1.0, 0.0]);
+    let highlight = Highlight::new(sh_degree);
+    let area: f64 = solids.iter().map(Solid::area).sum();
+    let mut scene = Gaussians {
+        sh: Sh {
+            degree: sh_degree,
+            ..Sh::default()
+        },
+        ..Gaussians::default()
+    };
+    let mut area_done = 0.0;
+    for solid in &solids {
+        let texture = Texture::random(&mut random, solid.is_ground());
+        area_done += solid.area();
+        // Rounding the running total gives the last solid exactly what is left.
+        let count = (gaussians as f64 * area_done / area).round() as usize - scene.len();
+        let spacing = (solid.area() / count.max(1) as f64).sqrt();
+        for i in 0..count {
+            // A low-discrepancy grid over the surface, loosened a little to hide its rows.
+            let jitter: [f64; 2] = [random.random(), random.random()];
+            let u = (i as f64 + jitter[0]) / count as f64;
+            let v = (i as f64 * 0.618_033_988_749_894_9 + 0.3 * jitter[1] / (count as f64).sqrt())
+                .fract();
+            let (position, normal) = solid.point(u, v);
+            let shade = shade(texture.colour(solid.to_own_axes(position)), normal, lamp);
+            let deviation = WIDTH * spacing;
+            scene.positions.push(position);
+            scene.rotations.push(facing(normal));
+            scene
+                .log_scales
+                .push([deviation, deviation, deviation * FLATNESS].map(|s| s.ln() as f32));
+            scene.opacity_logits.push(OPACITY_LOGIT);
+            let mut coefficients = highlight.fitted(reflected(lamp, normal), texture.gloss());
+            for (channel, value) in shade.into_iter().enumerate() {
+                coefficients[channel] += (value - 0.5) / SH_C0;
+            }
+            scene.sh.coefficients.extend(coefficients);
+        }
+    }
+    Ok(Scene::from_gaussians(scene))
+}
+
+/// Matt colour under the lamp and a sky that is brightest overhead.
+fn shade(albedo: [f32; 3], normal: [f32; 3], lamp: [f32; 3]) -> [f32; 3] {
+    let direct = dot(normal, lamp).max(0.0);
+    let sky = 0.5 - 0.5 * normal[1];
+    albedo.map(|a| a * (0.3 + 0.25 * sky + 0.55 * direct))
+}
+
+/// The direction in which a surface mirrors the lamp.
+fn reflected(lamp: [f32; 3], normal: [f32; 3]) -> Option<[f32; 3]> {
+    let cosine = dot(lamp, normal);
+    (cosine > 0.0).then(|| along(lamp.map(|x| -x), 2.0 * cosine, normal))
+}
+
+/// Quaternion w, x, y, z that turns the z axis to the unit vector `normal`.
+fn facing(normal: [f32; 3]) -> [f32; 4] {
+    let z = [0.0, 0.0, 1.0];
+    // Half-way construction: (1 + cos, axis sin) before normalisation; it vanishes only at half a turn.
+    let [x, y, zz] = cross(z, normal);
+    let q = [1.0 + normal[2], x, y, zz];
+    let length = q.iter().map(|v| v * v).sum::<f32>().sqrt();
+    if length > 1e-4 {
+        q.map(|v| v / length)
+    } else {
+        let [x, y, z] = perpendicular(z);
+        [0.0, x, y, z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Extent;
+
+    #[test]
+    fn has_what_was_asked_for_and_nothing_odd() {
+        for (count, degree) in [(1, 0), (2, 4), (37, 1), (1000, 2), (2000, 3)] {
+            let g = sample(count, degree, 7).unwrap().gaussians;
+            assert_eq!((g.len(), g.sh.degree), (count, degree));
+            assert_eq!(g.sh.coefficients.len(), count * g.sh.per_gaussian());
+            let flat = g
+                .positions
+                .iter()
+                .flatten()
+                .chain(g.log_scales.iter().flatten());
+            assert!(
+                flat.chain(g.rotations.iter().flatten())
+                    .chain(&g.sh.coefficients)
+                    .all(|v| v.is_finite())
+            );
+        }
+    }
+
+    #[test]
+    fn seeds_decide_everything() {
+        let scene = |seed| sample(500, 3, seed).unwrap().gaussians;
+        assert_eq!(scene(1), scene(1));
+        assert_ne!(scene(1), scene(2));
+    }
+
+    #[test]
+    fn silly_arguments_are_refused() {
+        for (count, degree, field) in [
+            (0, 3, "--gaussians"),
+            (MAX_GAUSSIANS + 1, 3, "--gaussians"),
+            (10, 5, "--sh-degree"),
+        ] {
+            let error = sample(count, degree, 0).unwrap_err().to_string();
+            assert!(error.starts_with(field), "{error}");
+        }
+    }
+
+    #[test]
+    fn stands_upright_on_ground() {
+        for seed in 0..6 {
+            let extent = Extent::of(&sample(3000, 0, seed).unwrap().gaussians).unwrap();
+            assert_eq!(
+                (extent.up, extent.on_ground),
+                ([0.0, -1.0, 0.0], true),
+                "seed {seed}"
+            );
+        }
+    }
+
+    #[test]
+    fn thin_axes_are_normals() {
+        for normal in [
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+            [0.6, -0.8, 0.0],
+            [0.36, 0.48, -0.8],
+        ] {
+            let [w, x, y, z] = facing(normal);
+            let third = [
+                2.0 * (x * z + w * y),
+                2.0 * (y * z - w * x),
+                1.0 - 2.0 * (x * x + y * y),
+            ];
+            assert!(dot(third, normal) > 0.9999, "{normal:?} {third:?}");
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! Solids with area-preserving parametrisations of their surfaces, and how they stand on the ground.
+use crate::view::vector::{cross, dot, unit};
+use rand::{Rng, RngExt};
+use std::f64::consts::{PI, TAU};
+
+/// Radius of the ground.
+const GROUND: f64 = 1.4;
+
+/// A shape around the origin, before it is turned and moved; lengths in world units, axis along y.
+#[derive(Clone, Copy)]
+enum Shape {
+    /// Level disc; its underside is the same Gaussians.
+    Ground {
+        radius: f64,
+    },
+    Sphere {
+        radius: f64,
+    },
+    /// Radius of the ring and of its tube.
+    Torus {
+        ring: f64,
+        tube: f64,
+    },
+    /// Half the sides.
+    Block {
+        half: [f64; 3],
+    },
+    Cylinder {
+        radius: f64,
+        half: f64,
+    },
+    /// Apex upwards (at `-half`), base below.
+    Cone {
+        radius: f64,
+        half: f64,
+    },
+}
+
+/// A shape in its place.
+pub(super) struct Solid {
+    shape: Shape,
+    /// Own axes in the world.
+    axes: [[f32; 3]; 3],
+    centre: [f32; 3],
+}
+
+impl Solid {
+    /// Surface area.
+    pub fn area(&self) -> f64 {
+        match self.shape {
+            Shape::Ground { radius } => PI * radius * radius,
+            Shape::Sphere { radius } => 4.0 * PI * radius * radius,
+            Shape::Torus { ring, tube } => TAU * ring * TAU * tube,
+            Shape::Block { half: [a, b, c] } => 8.0 * (a * b + b * c + c * a),
+            Shape::Cylinder { radius, half } => TAU * radius * (radius + 2.0 * half),
+            Shape::Cone { radius, half } => PI * radius * (radius + radius.hypot(2.0 * half)),
+        }
+    }
+
+    /// Whether this is the ground.
+    pub fn is_ground(&self) -> bool {
+        matches!(self.shape, Shape::Ground { .. })
+    }
+
+    /// The point and outward unit normal for `u`, `v` in [0, 1): even in the square is even on the surface.
+    pub fn point(&self, u: f64, v: f64) -> ([f32; 3], [f32; 3]) {
+        let (point, normal) = surface(self.shape, u, v);
+        let place = |p: [f64; 3]| -> [f32; 3] {
+            std::array::from_fn(|k| (0..3).map(|a| p[a] as f32 * self.axes[a][k]).sum())
+        };
+        let normal = unit(place(normal)).unwrap_or([0.0, -1.0, 0.0]);
+        let point = place(point);
+        (std::array::from_fn(|k| point[k] + self.centre[k]), normal)
+    }
+
+    /// A world point in the solid's own axes.
+    pub fn to_own_axes(&self, p: [f32; 3]) -> [f32; 3] {
+        let from_centre = std::array::from_fn(|k| p[k] - self.centre[k]);
+        self.axes.map(|axis| dot(axis, from_centre))
+    }
+}
+
+fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
+    let (sine, cosine) = (TAU * v).sin_cos();
+    // A disc of area-preserving radius at height y.
+    let disc = |radius: f64, share: f64, y: f64| {
+        [
+            radius * share.sqrt() * cosine,
+            y,
+            radius * share.sqrt() * sine,
+        ]
+    };
+    match shape {
+        Shape::Ground { radius } => (disc(radius, u, 0.0), [0.0, -1.0, 0.0]),
+        Shape::Sphere { radius } => {
+            let y = 1.0 - 2.0 * u;
+            let level = (1.0 - y * y).max(0.0).sqrt();
+            let normal = [level * cosine, y, level * sine];
+            (normal.map(|x| radius * x), normal)
+        }
+        Shape::Torus { ring, tube } => {
+            // Around the tube the density is 1 + (tube / ring) cos t: Newton inverts its integral.
+            let goal = TAU * u;
+            let mut t = goal;
+            for _ in 0..8 {
+                t -= (t + tube / ring * t.sin() - goal) / (1.0 + tube / ring * t.cos());
+            }
+            let normal = [t.cos() * cosine, t.sin(), t.cos() * sine];
+            (
+                [
+                    cosine * ring + tube * normal[0],
+                    tube * normal[1],
+                    sine * ring + tube * normal[2],
+                ],
+                normal,
+            )
+        }
+        Shape::Block { half } => {
+            let faces = [half[1] * half[2], half[2] * half[0], half[0] * half[1]];
+            let mut left = 2.0 * u * faces.iter().sum::<f64>();
+            let mut face = 0;
+            while face < 5 && left >= faces[face / 2] {
+                left -= faces[face / 2];
+                face += 1;
+            }
+            let (axis, side) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
+            normal[axis] = side;
+            point[axis] = side * half[axis];
+            point[a] = half[a] * (2.0 * (left / faces[axis]).min(1.0) - 1.0);
+            point[b] = half[b] * (2.0 * v - 1.0);
+            (point, normal)
+        }
+        Shape::Cylinder { radius, half } => {
+            let ends = radius / (2.0 * radius + 4.0 * half);
+            if u < ends {
+                (disc(radius, u / ends, half), [0.0, 1.0, 0.0])
+            } else if u < 2.0 * ends {
+                (disc(radius, u / ends - 1.0, -half), [0.0, -1.0, 0.0])
+            } else {
+                let y = half * (2.0 * (u - 2.0 * ends) / (1.0 - 2.0 * ends) - 1.0);
+                ([radius * cosine, y, radius * sine], [cosine, 0.0, sine])
+            }
+        }
+        Shape::Cone { radius, half } => {
+            // y points down: the base is at +half.
+            let side = radius.hypot(2.0 * half);
+            let base = radius / (radius + side);
+            if u < base {
+                (disc(radius, u / base, half), [0.0, 1.0, 0.0])
+            } else {
+                let share = (u - base) / (1.0 - base);
+                let y = half * (2.0 * share.sqrt() - 1.0);
+                let normal = [
+                    2.0 * half / side * cosine,
+                    -radius / side,
+                    2.0 * half / side * sine,
+                ];
+                (disc(radius, share, y), normal)
+            }
+        }
+    }
+}
+
+/// The ground, a solid in its middle and four around, each of another shape; y points down.
+pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
+    let size: [f64; 5] = std::array::from_fn(|_| random.random_range(0.85..1.15));
+    let mut shapes = [
+        Shape::Sphere {
+            radius: 0.34 * size[0],
+        },
+        Shape::Torus {
+            ring: 0.28 * size[1],
+            tube: 0.12 * size[1],
+        },
+        Shape::Block {
+            half: [0.24 * size[2], 0.3 * size[2], 0.2],
+        },
+        Shape::Cylinder {
+            radius: 0.19,
+            half: 0.42 * size[3],
+        },
+        Shape::Cone {
+            radius: 0.3,
+            half: 0.36 * size[4],
+        },
+    ];
+    // Fisher-Yates; the first then stands in the middle.
+    for i in (1..shapes.len()).rev() {
+        shapes.swap(i, random.random_range(0..=i));
+    }
+    let start = random.random_range(0.0..TAU);
+    let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut solids = vec![Solid {
+        shape: Shape::Ground { radius: GROUND },
+        axes: upright,
+        centre: [0.0; 3],
+    }];
+    for (i, shape) in shapes.into_iter().enumerate() {
+        let angle = start + 0.25 * TAU * i as f64 + random.random_range(-0.15..0.15);
+        let reach = if i == 0 { 0.0 } else { 0.9 * GROUND - 0.42 };
+        let turn = random.random_range(0.0..TAU);
+        let (axes, height) = match shape {
+            Shape::Ground { .. } => (upright, 0.0),
+            Shape::Sphere { radius } => (turned(turn), radius),
+            // The ring stands on its rim, so that one sees through it.
+            Shape::Torus { ring, tube } => (on_edge(turn), ring + tube),
+            Shape::Block { half } => (turned(turn), half[1]),
+            Shape::Cylinder { half, .. } | Shape::Cone { half, .. } => (turned(turn), half),
+        };
+        let centre = [reach * angle.cos(), -height, reach * angle.sin()].map(|x| x as f32);
+        solids.push(Solid {
+            shape,
+            axes,
+            centre,
+        });
+    }
+    solids
+}
+
+/// Axes turned about the vertical.
+fn turned(angle: f64) -> [[f32; 3]; 3] {
+    let (s, c) = (angle.sin() as f32, angle.cos() as f32);
+    [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
+}
+
+/// Axes with the y axis level.
+fn on_edge(angle: f64) -> [[f32; 3]; 3] {
+    let [level, down, _] = turned(angle);
+    [down, level, cross(down, level)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn points_are_on_the_solid_and_spread_by_area() {
+        let solids = arrange(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1));
+        assert_eq!(solids.len(), 6);
+        for solid in &solids {
+            let (n, e) = (40, 1e-4);
+            for i in 0..n * n {
+                let (u, v) = (
+                    (f64::from(i / n) + 0.37) / f64::from(n),
+                    (f64::from(i % n) + 0.41) / f64::from(n),
+                );
+                let at = |u: f64, v: f64| surface(solid.shape, u, v);
+                let ((p, normal), (a, _), (b, _)) = (at(u, v), at(u + e, v), at(u, v + e));
+                let (a, b): ([f64; 3], [f64; 3]) = (
+                    std::array::from_fn(|k| (a[k] - p[k]) / e),
+                    std::array::from_fn(|k| (b[k] - p[k]) / e),
+                );
+                let c = [
+                    a[1] * b[2] - a[2] * b[1],
+                    a[2] * b[0] - a[0] * b[2],
+                    a[0] * b[1] - a[1] * b[0],
+                ];
+                let stretch = c.iter().map(|x| x * x).sum::<f64>().sqrt();
+                // Steps across an edge have no tangent.
+                if stretch < 3.0 * solid.area() {
+                    assert!(
+                        (stretch / solid.area() - 1.0).abs() < 0.01,
+                        "{}",
+                        stretch / solid.area()
+                    );
+                    let along: f64 = (0..3).map(|k| c[k] * normal[k]).sum();
+                    assert!((along.abs() / stretch - 1.0).abs() < 1e-3);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn everything_stands_on_the_ground() {
+        for seed in 0..20 {
+            for solid in arrange(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed)) {
+                let mut lowest = f32::NEG_INFINITY;
+                for i in 0..2000 {
+                    let (p, normal) =
+                        solid.point(f64::from(i) / 2000.0, f64::from(i) * 0.618 % 1.0);
+                    lowest = lowest.max(p[1]);
+                    assert!(p[0].hypot(p[2]) < GROUND as f32 + 0.01);
+                    assert!((dot(normal, normal) - 1.0).abs() < 1e-4);
+                }
+                assert!(lowest.abs() < 0.01, "{lowest}");
+            }
+        }
+    }
+}

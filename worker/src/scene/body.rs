@@ -1,0 +1,217 @@
+//! The rows of a PLY file: decoded column by column, and written back with nothing but colours changed.
+use super::fields::{Field, Rows};
+use super::gaussians::{Gaussians, Sh};
+use super::header::{Layout, Storage, quote, truncated};
+use std::io::{self, Write};
+
+/// Decodes the body of a file, all the bytes after its header; `Err` is the reason why not.
+pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> {
+    let mut values = vec![0.0; layout.fields.all.len()];
+    match layout.storage {
+        Storage::Binary { big_endian } => {
+            let rows = binary_rows(layout, body)?;
+            let mut collected = Rows::with_capacity(layout.fields.degree, layout.rows as usize);
+            for row in rows {
+                for (value, field) in values.iter_mut().zip(&layout.fields.all) {
+                    *value = get(row, *field, big_endian);
+                }
+                collected.push(&values)?;
+            }
+            Ok(collected.finish())
+        }
+        Storage::Ascii => {
+            // Again, since a file can shrink between the look at its size and the read.
+            layout.check_size(body.len() as u64)?;
+            let mut collected = Rows::with_capacity(layout.fields.degree, layout.rows as usize);
+            let mut words = Vec::with_capacity(layout.columns);
+            let mut lines = ascii_lines(body).filter(|line| !line.trim_ascii().is_empty());
+            for _ in 0..layout.skip {
+                lines
+                    .next()
+                    .ok_or("the body ends before the first Gaussian")?;
+            }
+            for row in 0..layout.rows {
+                let line = lines.next().ok_or_else(|| truncated(row, layout.rows))?;
+                split(line, &mut words);
+                if words.len() < layout.columns && lines.next().is_none() {
+                    return Err(truncated(row, layout.rows));
+                }
+                if words.len() != layout.columns {
+                    return Err(format!(
+                        "row {row} has {} values, not {}",
+                        words.len(),
+                        layout.columns
+                    ));
+                }
+                for (i, field) in layout.fields.all.iter().enumerate() {
+                    let word = &line[words[field.column].clone()];
+                    values[i] = number(word).ok_or_else(|| {
+                        let (name, word) = (super::fields::name(i), String::from_utf8_lossy(word));
+                        format!(
+                            "property {name} of row {row} is {:?}, not a number",
+                            quote(&word)
+                        )
+                    })?;
+                }
+                collected.push(&values)?;
+            }
+            Ok(collected.finish())
+        }
+    }
+}
+
+/// Writes the body with the colours `sh`. Values that are as they were keep their bytes.
+///
+/// `layout` and `body` are those of a successful [`decode`], and `sh` has the same degree and rows.
+pub(super) fn encode(
+    layout: &Layout,
+    body: &[u8],
+    sh: &Sh,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let degree = layout.fields.degree;
+    let order: Vec<usize> = (0..sh.per_gaussian())
+        .map(|i| super::fields::sh_index(degree, i))
+        .collect();
+    let mut colours = sh.coefficients.chunks_exact(sh.per_gaussian());
+    match layout.storage {
+        Storage::Binary { big_endian } => {
+            let rows = binary_rows(layout, body).map_err(io::Error::other)?;
+            let end = layout.skip as usize + rows.len() * layout.row_bytes;
+            out.write_all(&body[..layout.skip as usize])?;
+            let mut patched = vec![0; layout.row_bytes];
+            for (row, colour) in rows.zip(&mut colours) {
+                patched.copy_from_slice(row);
+                for (field, i) in layout.fields.colour().iter().zip(&order) {
+                    set(&mut patched, *field, big_endian, colour[*i]);
+                }
+                out.write_all(&patched)?;
+            }
+            out.write_all(&body[end..])
+        }
+        Storage::Ascii => {
+            let (mut skip, mut words) = (layout.skip, Vec::new());
+            for line in ascii_lines(body) {
+                if line.trim_ascii().is_empty() {
+                    out.write_all(line)?;
+                } else if skip > 0 {
+                    skip -= 1;
+                    out.write_all(line)?;
+                } else if let Some(colour) = colours.next() {
+                    split(line, &mut words);
+                    encode_line(layout, line, &words, |i| colour[order[i]], out)?;
+                } else {
+                    out.write_all(line)?;
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+fn encode_line(
+    layout: &Layout,
+    line: &[u8],
+    words: &[std::ops::Range<usize>],
+    colour: impl Fn(usize) -> f32,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut changed: Vec<(usize, f32)> = Vec::new();
+    for (i, field) in layout.fields.colour().iter().enumerate() {
+        let old = number(&line[words[field.column].clone()]);
+        if old.map(f32::to_bits) != Some(colour(i).to_bits()) {
+            changed.push((field.column, colour(i)));
+        }
+    }
+    changed.sort_unstable_by_key(|(column, _)| *column);
+    let mut done = 0;
+    for (column, value) in changed {
+        out.write_all(&line[done..words[column].start])?;
+        // The shortest text that reads back as the same number.
+        write!(out, "{value:?}")?;
+        done = words[column].end;
+    }
+    out.write_all(&line[done..])
+}
+
+/// The promised rows, checked against the bytes that are there.
+fn binary_rows<'a>(
+    layout: &Layout,
+    body: &'a [u8],
+) -> Result<std::slice::ChunksExact<'a, u8>, String> {
+    // Again, since a file can shrink between the look at its size and the read.
+    layout.check_size(body.len() as u64)?;
+    let start = layout.skip as usize;
+    let bytes = layout.rows as usize * layout.row_bytes;
+    Ok(body[start..start + bytes].chunks_exact(layout.row_bytes))
+}
+
+/// Lines with their ends.
+fn ascii_lines(body: &[u8]) -> impl Iterator<Item = &[u8]> {
+    body.split_inclusive(|b| *b == b'\n')
+}
+
+/// The places of the words of a line.
+fn split(line: &[u8], words: &mut Vec<std::ops::Range<usize>>) {
+    words.clear();
+    let mut start = None;
+    for (i, byte) in line.iter().enumerate() {
+        match (start, byte.is_ascii_whitespace()) {
+            (None, false) => start = Some(i),
+            (Some(first), true) => {
+                words.push(first..i);
+                start = None;
+            }
+            _ => (),
+        }
+    }
+    words.extend(start.map(|first| first..line.len()));
+}
+
+fn number(word: &[u8]) -> Option<f32> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// A value of a binary row. Offsets come from the header and lie within the row.
+fn get(row: &[u8], field: Field, big_endian: bool) -> f32 {
+    if field.double {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&row[field.offset..field.offset + 8]);
+        (if big_endian {
+            f64::from_be_bytes(bytes)
+        } else {
+            f64::from_le_bytes(bytes)
+        }) as f32
+    } else {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&row[field.offset..field.offset + 4]);
+        if big_endian {
+            f32::from_be_bytes(bytes)
+        } else {
+            f32::from_le_bytes(bytes)
+        }
+    }
+}
+
+/// Puts a value into a binary row, unless it is there already: a double keeps its lower digits.
+fn set(row: &mut [u8], field: Field, big_endian: bool, value: f32) {
+    if get(row, field, big_endian).to_bits() == value.to_bits() {
+        return;
+    }
+    if field.double {
+        let value = f64::from(value);
+        let bytes = if big_endian {
+            value.to_be_bytes()
+        } else {
+            value.to_le_bytes()
+        };
+        row[field.offset..field.offset + 8].copy_from_slice(&bytes);
+    } else {
+        let bytes = if big_endian {
+            value.to_be_bytes()
+        } else {
+            value.to_le_bytes()
+        };
+        row[field.offset..field.offset + 4].copy_from_slice(&bytes);
+    }
+}

@@ -1,0 +1,272 @@
+//! What every rasteriser must do: run for the CPU here and for the GPU in its module.
+use super::compare::GradientError;
+use super::{
+    CpuRasterizer, PreparedView, Rasterizer, WeightCache, extremes, prepare, reference, sh,
+};
+use crate::scene::{Gaussians, Scene, Sh};
+use crate::testing::scene_path;
+use crate::view::Camera;
+
+/// A square picture from the origin along +z, 60 degrees wide; the scenes of [`scene`] are in front of it.
+pub(super) fn camera(size: u32) -> Camera {
+    Camera::look_at(
+        [0.0; 3],
+        [0.0, 0.0, 1.0],
+        [0.0, -1.0, 0.0],
+        1.05,
+        size,
+        size,
+    )
+}
+
+/// `n` Gaussians of all shapes between depths 2 and 6, some of their colours clamped.
+pub(super) fn scene(n: usize, degree: usize) -> Gaussians {
+    let mut state = 1u64;
+    let mut random = move |low: f32, high: f32| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let mut g = Gaussians {
+        sh: Sh {
+            degree,
+            coefficients: Vec::new(),
+        },
+        ..Gaussians::default()
+    };
+    for _ in 0..n {
+        let z = random(2.0, 6.0);
+        g.positions
+            .push([random(-0.5, 0.5) * z, random(-0.5, 0.5) * z, z]);
+        g.rotations.push(std::array::from_fn(|_| random(-1.0, 1.0)));
+        g.log_scales
+            .push(std::array::from_fn(|_| random(-4.0, -1.0)));
+        g.opacity_logits.push(random(-3.0, 6.0));
+        let count = g.sh.per_gaussian();
+        g.sh.coefficients.extend((0..count).map(|k| {
+            if k < 3 {
+                random(-2.5, 2.5)
+            } else {
+                random(-0.9, 0.9)
+            }
+        }));
+    }
+    g
+}
+
+fn playbot() -> Option<Gaussians> {
+    Some(
+        Scene::read(&scene_path("playbot_8k.ply")?)
+            .unwrap()
+            .gaussians,
+    )
+}
+
+/// A camera that has the middle of `g` in view.
+fn facing(g: &Gaussians, size: u32) -> Camera {
+    let median = |mut v: Vec<f32>| {
+        v.sort_by(f32::total_cmp);
+        v[v.len() / 2]
+    };
+    let centre: [f32; 3] =
+        std::array::from_fn(|k| median(g.positions.iter().map(|p| p[k]).collect()));
+    let spread = (0..3)
+        .map(|k| {
+            median(
+                g.positions
+                    .iter()
+                    .map(|p| (p[k] - centre[k]).abs())
+                    .collect(),
+            )
+        })
+        .fold(0.0, f32::max);
+    let eye = [
+        centre[0] + 4.0 * spread,
+        centre[1] + 2.0 * spread,
+        centre[2] + 5.0 * spread,
+    ];
+    Camera::look_at(eye, centre, [0.0, 1.0, 0.0], 0.8, size, size)
+}
+
+pub(super) const BACKGROUND: [f32; 3] = [0.2, 0.6, 1.0];
+
+/// Picture and gradient agree with the reference: pixels within 1e-4 where no decision hangs on the last digits, and
+/// those that do are few and within one decision; gradients by four measures.
+fn agrees(rasterizer: &dyn Rasterizer, cache: WeightCache, g: &Gaussians, camera: &Camera) {
+    let view = prepare(g, camera, cache).unwrap();
+    let colours = sh::colours(&g.sh, None, &view);
+    let picture = rasterizer.render(&view, &colours, BACKGROUND).unwrap();
+    let want = reference::render(g, camera, BACKGROUND.map(f64::from));
+    let (mut worst, mut worst_uncertain) = (0.0f64, 0.0f64);
+    for (i, (got, want_value)) in picture.pixels.iter().zip(&want.pixels).enumerate() {
+        let error = (f64::from(*got) - want_value).abs();
+        let worst = if want.uncertain[i / 3] {
+            &mut worst_uncertain
+        } else {
+            &mut worst
+        };
+        *worst = worst.max(error);
+        assert!(error.is_finite());
+    }
+    let uncertain =
+        want.uncertain.iter().filter(|u| **u).count() as f64 / want.uncertain.len() as f64;
+
+    let mut picture_gradient: Vec<f64> = (0..want.pixels.len())
+        .map(|i| (i as f64 * 0.61).sin() + 0.3)
+        .collect();
+    for (i, value) in picture_gradient.iter_mut().enumerate() {
+        if want.uncertain[i / 3] {
+            *value = 0.0;
+        }
+        *value = f64::from(*value as f32);
+    }
+    let single: Vec<f32> = picture_gradient.iter().map(|v| *v as f32).collect();
+    let colour_gradient = rasterizer.backward(&view, &single).unwrap();
+    let mut got = vec![0.0; g.sh.coefficients.len()];
+    sh::backward(g.sh.degree, &view, &colours, &colour_gradient, &mut got);
+    let error = GradientError::new(&got, &reference::gradient(g, camera, &picture_gradient));
+    println!(
+        "{} {cache:?}, {} Gaussians, {} px: pixels {worst:.1e} ({:.2} % uncertain: {worst_uncertain:.1e}), \
+         gradient L1 {:.1e}, L2 {:.1e}, angle {:.1e}, bias {:.1e}",
+        rasterizer.name(),
+        g.len(),
+        camera.width,
+        100.0 * uncertain,
+        error.l1,
+        error.l2,
+        error.angle,
+        error.bias
+    );
+    assert!(worst <= 1e-4, "pixels differ by {worst}");
+    assert!(uncertain <= 0.05, "{uncertain} of the pixels are uncertain");
+    assert!(
+        worst_uncertain <= 0.02,
+        "an uncertain pixel differs by {worst_uncertain}"
+    );
+    assert!(error.within(1e-4), "{error:?}");
+}
+
+/// All that a rasteriser must do, for one kind of prepared view.
+pub(super) fn conforms(rasterizer: &dyn Rasterizer, cache: WeightCache) {
+    for degree in 0..=4 {
+        agrees(rasterizer, cache, &scene(300, degree), &camera(70));
+    }
+    agrees(
+        rasterizer,
+        cache,
+        &scene(3000, 1),
+        &Camera {
+            width: 50,
+            height: 41,
+            cx: 21.0,
+            cy: 22.5,
+            ..camera(41)
+        },
+    );
+    agrees(rasterizer, cache, &extremes::shapes(), &camera(64));
+    extremes::all(rasterizer, cache);
+    if let Some(g) = playbot() {
+        agrees(rasterizer, cache, &g, &facing(&g, 96));
+    }
+}
+
+#[test]
+fn the_cpu_agrees_with_the_reference() {
+    conforms(&CpuRasterizer, WeightCache::Weights);
+    conforms(&CpuRasterizer, WeightCache::None);
+}
+
+#[test]
+fn cached_and_fresh_weights_give_the_same_bytes() {
+    let g = scene(2000, 1);
+    let camera = camera(75);
+    let run = |cache| {
+        let view = prepare(&g, &camera, cache).unwrap();
+        let colours = sh::colours(&g.sh, None, &view);
+        let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
+        let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
+        let mut all = vec![0.0f32; g.sh.coefficients.len()];
+        sh::backward(1, &view, &colours, &gradient, &mut all);
+        (view, picture, all)
+    };
+    let (plain, kept) = (run(WeightCache::None), run(WeightCache::Weights));
+    assert_eq!(plain.1, kept.1);
+    assert_eq!(plain.2, kept.2);
+    assert!(
+        kept.0.visible.len() < plain.0.visible.len(),
+        "hidden Gaussians are dropped"
+    );
+    assert!(kept.0.visible.is_sorted() && kept.0.weight_count() > Some(10_000));
+    // A view whose hidden pairs were dropped still composites to the same picture.
+    let again = PreparedView {
+        weights: None,
+        ..kept.0
+    };
+    let colours = sh::colours(&g.sh, None, &again);
+    assert_eq!(
+        CpuRasterizer.render(&again, &colours, BACKGROUND).unwrap(),
+        plain.1
+    );
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let g = scene(9000, 2);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let view = prepare(&g, &camera(90), WeightCache::Weights).unwrap();
+            let colours = sh::colours(&g.sh, None, &view);
+            let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
+            let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
+            let mut all = vec![0.0f32; g.sh.coefficients.len()];
+            sh::backward(2, &view, &colours, &gradient, &mut all);
+            (view, picture, all)
+        })
+    };
+    let (one, two) = (run(1), run(2));
+    assert_eq!(one.0, two.0);
+    assert_eq!(
+        bytemuck::cast_slice::<f32, u8>(&one.1.pixels),
+        bytemuck::cast_slice::<f32, u8>(&two.1.pixels)
+    );
+    assert_eq!(
+        bytemuck::cast_slice::<f32, u8>(&one.2),
+        bytemuck::cast_slice::<f32, u8>(&two.2)
+    );
+}
+
+#[test]
+fn wrong_sizes_and_cameras_are_errors() {
+    let g = scene(5, 0);
+    let view = prepare(&g, &camera(20), WeightCache::Weights).unwrap();
+    assert!(
+        CpuRasterizer
+            .render(&view, &[0.0; 2], BACKGROUND)
+            .unwrap_err()
+            .to_string()
+            .starts_with("colours: 2 numbers")
+    );
+    assert!(CpuRasterizer.backward(&view, &[0.0; 7]).is_err());
+    let broken: [fn(&mut Camera); 5] = [
+        |c| c.width = 0,
+        |c| c.height = 1 << 20,
+        |c| c.fx = 0.0,
+        |c| c.fy = f32::NAN,
+        |c| c.translation[1] = f32::INFINITY,
+    ];
+    for change in broken {
+        let mut camera = camera(20);
+        change(&mut camera);
+        assert!(
+            prepare(&g, &camera, WeightCache::None)
+                .unwrap_err()
+                .to_string()
+                .starts_with("camera: ")
+        );
+    }
+}

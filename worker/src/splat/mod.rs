@@ -1,0 +1,49 @@
+//! Splatting: pictures of a scene, and the gradient of a picture to the colours of its Gaussians.
+//!
+//! Geometry is frozen, so a pixel is `sum_i w_i max(0, SH_i(d) + 0.5) + T background` with weights that do not depend on
+//! what is learned. [`prepare`] computes per view what stays fixed; a [`Rasterizer`] applies it and its transpose.
+#[cfg(test)]
+mod checks;
+#[cfg(test)]
+mod compare;
+mod cpu;
+#[cfg(test)]
+mod extremes;
+mod gpu;
+mod kernels;
+mod prepare;
+mod project;
+pub mod reference;
+pub mod sh;
+mod tiles;
+mod uploads;
+mod walk;
+mod weights;
+
+use crate::error::Result;
+use crate::picture::Picture;
+
+pub use cpu::CpuRasterizer;
+pub use gpu::GpuRasterizer;
+pub use prepare::{PreparedView, WeightCache, prepare};
+pub use project::Splat2d;
+pub use tiles::{MAX_PAIRS, TILE, TileLists};
+
+/// Draws prepared views; both implementations are deterministic and agree with [`reference`].
+pub trait Rasterizer: Send + Sync {
+    /// Where it runs, for people.
+    fn name(&self) -> &str;
+
+    /// The picture of `view` with `colours` (`[visible][3]`, as [`sh::colours`] returns them) over `background`.
+    ///
+    /// # Errors
+    /// When `colours` has another length, or the device fails.
+    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3])
+    -> Result<Picture>;
+
+    /// Gradient to the colours (`[visible][3]`) from the gradient to the picture (`[height][width][3]`).
+    ///
+    /// # Errors
+    /// When `picture_gradient` has another length, or the device fails.
+    fn backward(&self, view: &PreparedView, picture_gradient: &[f32]) -> Result<Vec<f32>>;
+}

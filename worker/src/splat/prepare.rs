@@ -1,0 +1,186 @@
+//! What is fixed for a view while only colours are learned: visible splats, tile lists, weights.
+use super::project::{Projector, Splat2d, TileRect};
+use super::tiles::{TILE, TileLists};
+use super::weights::SparseWeights;
+use crate::error::{Error, Result};
+use crate::scene::Gaussians;
+use crate::view::Camera;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Largest picture side; keeps all products of tiles and pixels well within 32 bits.
+pub const MAX_SIDE: u32 = 16_384;
+/// Rows projected at a time by one thread.
+const CHUNK: usize = 4096;
+
+/// What a prepared view keeps besides its tile lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WeightCache {
+    /// Nothing: weights are computed anew at every use. For large pictures and for the GPU.
+    None,
+    /// Every weight (5 bytes each): drawing and its gradient become sparse products. For pictures drawn repeatedly.
+    Weights,
+}
+
+/// Tells views apart that a rasteriser keeps on a device; says nothing about their content.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ViewId(pub u64);
+
+impl ViewId {
+    fn next() -> Self {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        ViewId(COUNT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+impl PartialEq for ViewId {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// A view of a scene, ready to be drawn with any colours. Not to be changed: rasterisers may keep copies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreparedView {
+    /// The camera.
+    pub camera: Camera,
+    /// Rows of the scene's Gaussians that may be seen, ascending. With cached weights, those that are.
+    pub visible: Vec<u32>,
+    /// Their splats, in the same order.
+    pub splats: Vec<Splat2d>,
+    /// Unit vectors from the camera to them.
+    pub directions: Vec<[f32; 3]>,
+    /// Splats of each tile.
+    pub tiles: TileLists,
+    pub(crate) weights: Option<SparseWeights>,
+    pub(crate) id: ViewId,
+}
+
+impl PreparedView {
+    /// Memory that the view holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        let per_visible = size_of::<u32>() + size_of::<Splat2d>() + size_of::<[f32; 3]>();
+        self.visible.len() * per_visible
+            + self.tiles.bytes()
+            + self.weights.as_ref().map_or(0, SparseWeights::bytes)
+    }
+
+    /// Number of cached weights, if they are cached.
+    pub fn weight_count(&self) -> Option<usize> {
+        self.weights.as_ref().map(SparseWeights::len)
+    }
+
+    /// Numbers of a picture of this view: `height * width * 3`.
+    pub fn picture_len(&self) -> usize {
+        3 * self.camera.width as usize * self.camera.height as usize
+    }
+
+    pub(crate) fn check(&self, what: &'static str, len: usize, expected: usize) -> Result<()> {
+        if len == expected {
+            return Ok(());
+        }
+        Err(Error::BadOption {
+            field: what,
+            reason: format!("{len} numbers where the view needs {expected}"),
+        })
+    }
+}
+
+/// Projects, culls and sorts the Gaussians for `camera`; the result does not depend on the number of threads.
+///
+/// # Errors
+/// [`Error::BadOption`] when the camera's size or focal length is out of range, or the view has too many
+/// (Gaussian, tile) pairs for 32-bit lists.
+pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Result<PreparedView> {
+    check_camera(camera)?;
+    let projector = Projector::new(camera);
+    let n = gaussians.len();
+    let chunks: Vec<Vec<(u32, (Splat2d, TileRect))>> = (0..n.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let rows = chunk * CHUNK..n.min((chunk + 1) * CHUNK);
+            rows.filter_map(|row| Some((row as u32, projector.project(gaussians, row)?)))
+                .collect()
+        })
+        .collect();
+    let count = chunks.iter().map(Vec::len).sum();
+    let mut visible = Vec::with_capacity(count);
+    let mut projected = Vec::with_capacity(count);
+    for (row, one) in chunks.into_iter().flatten() {
+        visible.push(row);
+        projected.push(one);
+    }
+    let (columns, rows) = (camera.width.div_ceil(TILE), camera.height.div_ceil(TILE));
+    let mut tiles = TileLists::new(columns, rows, &projected)?;
+    let mut splats: Vec<Splat2d> = projected.into_iter().map(|(splat, _)| splat).collect();
+    let mut weights = None;
+    if cache == WeightCache::Weights {
+        let (kept, keep) = SparseWeights::new(camera, &tiles, &splats)?;
+        let mut used = vec![false; splats.len()];
+        for (slot, splat) in tiles.splats.iter().enumerate() {
+            used[*splat as usize] |= keep[slot];
+        }
+        let mut left = 0;
+        let mut renumber = vec![u32::MAX; splats.len()];
+        for (i, number) in renumber.iter_mut().enumerate() {
+            if used[i] {
+                *number = left as u32;
+                visible[left] = visible[i];
+                splats[left] = splats[i];
+                left += 1;
+            }
+        }
+        visible.truncate(left);
+        splats.truncate(left);
+        tiles = tiles.pruned(&keep, &renumber);
+        weights = Some(kept);
+    }
+    let tiles = tiles.with_slots(visible.len());
+    let directions = visible
+        .par_iter()
+        .with_min_len(CHUNK)
+        .map(|row| projector.direction(gaussians, *row as usize))
+        .collect();
+    Ok(PreparedView {
+        camera: camera.clone(),
+        visible,
+        splats,
+        directions,
+        tiles,
+        weights,
+        id: ViewId::next(),
+    })
+}
+
+fn check_camera(camera: &Camera) -> Result<()> {
+    let bad = |reason: String| {
+        Err(Error::BadOption {
+            field: "camera",
+            reason,
+        })
+    };
+    for (name, side) in [("width", camera.width), ("height", camera.height)] {
+        if side == 0 || side > MAX_SIDE {
+            return bad(format!(
+                "{name} is {side}, it must be 1 to {MAX_SIDE} pixels"
+            ));
+        }
+    }
+    for (name, focal) in [("fx", camera.fx), ("fy", camera.fy)] {
+        if !(focal > 0.0 && focal <= 1e7) {
+            return bad(format!(
+                "{name} is {focal}, it must be above 0 and at most 1e7 pixels"
+            ));
+        }
+    }
+    let pose = camera
+        .rotation
+        .iter()
+        .flatten()
+        .chain(&camera.translation)
+        .chain([&camera.cx, &camera.cy]);
+    if pose.into_iter().any(|v| !v.is_finite()) {
+        return bad("pose or principal point has a number that is not finite".into());
+    }
+    Ok(())
+}

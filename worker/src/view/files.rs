@@ -1,0 +1,384 @@
+//! Camera files: `cameras.json` of the 3DGS reference implementation and `transforms.json` of NeRF.
+//!
+//! Both store camera-to-world poses. `cameras.json` is an array whose entries have `position` and `rotation` (rows;
+//! camera axes x right, y down, z forward are its columns), `width`, `height`, `fx`, `fy`. `transforms.json` is an
+//! object with `frames`, each a `transform_matrix` whose camera axes are those of OpenGL (x right, y up, z backward),
+//! and intrinsics for all frames or one: `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`.
+use super::camera::Camera;
+use super::vector::{cross, dot};
+use crate::error::{Error, Result};
+use crate::scene::write_whole;
+use serde_json::{Map, Value, json};
+use std::io::Read;
+use std::path::Path;
+
+/// Longest camera file, bytes.
+const MAX_FILE: u64 = 64 << 20;
+/// Widest and highest picture, pixels.
+const MAX_SIDE: f64 = 16384.0;
+/// Side of a picture of the NeRF synthetic set, whose files do not state it.
+const BLENDER_SIDE: f64 = 800.0;
+
+/// Reads cameras of either kind, told apart by their contents.
+///
+/// Principal points that are not stated are the centre; sizes that a `transforms.json` does not state are 800 by 800,
+/// those of the NeRF synthetic set.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::BadCameras`] naming the camera and the field: not JSON, over 64 MiB, neither kind, no
+/// camera in it, a field missing or not a finite number, a side outside 1 to 16384, a focal length not above zero, a
+/// rotation that is none (unequal or skewed axes, a mirror).
+pub fn read_cameras(path: &Path) -> Result<Vec<Camera>> {
+    let bad = |reason: String| Error::BadCameras {
+        path: path.into(),
+        reason,
+    };
+    let mut text = Vec::new();
+    let file = std::fs::File::open(path).map_err(Error::io(path))?;
+    file.take(MAX_FILE + 1)
+        .read_to_end(&mut text)
+        .map_err(Error::io(path))?;
+    if text.len() as u64 > MAX_FILE {
+        return Err(bad(format!("longer than the limit of {MAX_FILE} bytes")));
+    }
+    parse(&text).map_err(bad)
+}
+
+/// Writes cameras as `transforms.json` where the file's name has `transforms` in it, else as `cameras.json`.
+///
+/// Principal points off the centre are stated as `cx` and `cy`, which other readers of `cameras.json` ignore.
+///
+/// # Errors
+/// [`Error::Io`]; the file appears whole or not at all.
+pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<()> {
+    let nerf = path
+        .file_name()
+        .is_some_and(|n| n.to_string_lossy().contains("transforms"));
+    let value = if nerf {
+        json!({ "frames": cameras.iter().enumerate().map(frame).collect::<Vec<_>>() })
+    } else {
+        cameras.iter().enumerate().map(entry).collect()
+    };
+    write_whole(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, &value)?;
+        out.write_all(b"\n")
+    })
+}
+
+fn parse(text: &[u8]) -> Result<Vec<Camera>, String> {
+    let value: Value = serde_json::from_slice(text).map_err(|e| format!("not JSON: {e}"))?;
+    let (entries, shared) = match &value {
+        Value::Array(entries) => (entries, None),
+        Value::Object(fields) => match fields.get("frames") {
+            Some(Value::Array(frames)) => (frames, Some(fields)),
+            _ => {
+                return Err(
+                    "neither cameras.json (an array) nor transforms.json (with \"frames\")".into(),
+                );
+            }
+        },
+        _ => return Err("neither cameras.json (an array) nor transforms.json (an object)".into()),
+    };
+    if entries.is_empty() {
+        return Err("has no cameras".into());
+    }
+    let camera = |(i, entry): (usize, &Value)| {
+        let own = entry.as_object().ok_or_else(|| "not an object".to_string());
+        own.and_then(|own| match shared {
+            None => from_entry(own),
+            Some(shared) => from_frame(own, shared),
+        })
+        .map_err(|reason| format!("camera {i}: {reason}"))
+    };
+    entries.iter().enumerate().map(camera).collect()
+}
+
+fn from_entry(own: &Map<String, Value>) -> Result<Camera, String> {
+    let need = |name: &str| number(own, name)?.ok_or_else(|| format!("{name} is missing"));
+    let position: [f64; 3] = numbers(own.get("position"), "position")?;
+    let rows: [[f64; 3]; 3] = matrix(own.get("rotation"), "rotation")?;
+    let axes = std::array::from_fn(|k| [rows[0][k], rows[1][k], rows[2][k]]);
+    let (width, height) = (need("width")?, need("height")?);
+    let principal = [number(own, "cx")?, number(own, "cy")?];
+    build(
+        axes,
+        position,
+        [need("fx")?, need("fy")?],
+        principal,
+        [width, height],
+    )
+}
+
+fn from_frame(own: &Map<String, Value>, shared: &Map<String, Value>) -> Result<Camera, String> {
+    let find = |name: &str| Ok::<_, String>(number(own, name)?.or(number(shared, name)?));
+    let rows: [[f64; 4]; 4] = matrix(own.get("transform_matrix"), "transform_matrix")?;
+    // OpenGL's y is up and its z backward.
+    let axes =
+        [(0, 1.0), (1, -1.0), (2, -1.0)].map(|(k, sign)| [0, 1, 2].map(|r| sign * rows[r][k]));
+    let position = [rows[0][3], rows[1][3], rows[2][3]];
+    let width = find("w")?.unwrap_or(BLENDER_SIDE);
+    let height = find("h")?.unwrap_or(BLENDER_SIDE);
+    let from_angle =
+        |angle: Option<f64>, side: f64| angle.map(|angle| 0.5 * side / (0.5 * angle).tan());
+    let fx = find("fl_x")?
+        .or(from_angle(find("camera_angle_x")?, width))
+        .ok_or("neither fl_x nor camera_angle_x is given")?;
+    let fy = find("fl_y")?
+        .or(from_angle(find("camera_angle_y")?, height))
+        .unwrap_or(fx);
+    build(
+        axes,
+        position,
+        [fx, fy],
+        [find("cx")?, find("cy")?],
+        [width, height],
+    )
+}
+
+/// Checks and assembles: `axes` are the camera's x, y and z in the world.
+fn build(
+    axes: [[f64; 3]; 3],
+    position: [f64; 3],
+    focal: [f64; 2],
+    principal: [Option<f64>; 2],
+    size: [f64; 2],
+) -> Result<Camera, String> {
+    let rotation = axes.map(|axis| axis.map(|x| x as f32));
+    let [x, y, z] = rotation;
+    let skew = [
+        dot(x, x) - 1.0,
+        dot(y, y) - 1.0,
+        dot(z, z) - 1.0,
+        dot(x, y),
+        dot(y, z),
+        dot(x, z),
+    ];
+    if !skew.iter().all(|s| s.abs() < 1e-2) || dot(cross(x, y), z) < 0.0 {
+        return Err(
+            "its rotation is not one: axes must have length 1, right angles and no mirror".into(),
+        );
+    }
+    for (name, side) in [("width", size[0]), ("height", size[1])] {
+        if !(1.0..=MAX_SIDE).contains(&side) || side.fract() != 0.0 {
+            return Err(format!(
+                "{name} is {side}, must be a whole number from 1 to {MAX_SIDE}"
+            ));
+        }
+    }
+    for (name, focal) in [("x", focal[0]), ("y", focal[1])] {
+        if !(focal > 1e-6 && focal < 1e9) {
+            return Err(format!(
+                "the focal length in {name} is {focal} pixels, must be above 0"
+            ));
+        }
+    }
+    let position = position.map(|p| p as f32);
+    let translation = rotation.map(|axis| -dot(axis, position));
+    if translation.iter().any(|t| !t.is_finite()) {
+        return Err(format!("its position {position:?} is out of range"));
+    }
+    Ok(Camera {
+        width: size[0] as u32,
+        height: size[1] as u32,
+        fx: focal[0] as f32,
+        fy: focal[1] as f32,
+        cx: principal[0].unwrap_or(0.5 * size[0]) as f32,
+        cy: principal[1].unwrap_or(0.5 * size[1]) as f32,
+        rotation,
+        translation,
+    })
+}
+
+fn number(fields: &Map<String, Value>, name: &str) -> Result<Option<f64>, String> {
+    match fields.get(name) {
+        None => Ok(None),
+        Some(value) => match value.as_f64() {
+            Some(number) => Ok(Some(number)),
+            None => Err(format!("{name} is {value}, not a number")),
+        },
+    }
+}
+
+fn numbers<const N: usize>(value: Option<&Value>, name: &str) -> Result<[f64; N], String> {
+    let list = value.and_then(Value::as_array).and_then(|list| {
+        list.iter()
+            .map(Value::as_f64)
+            .collect::<Option<Vec<f64>>>()?
+            .try_into()
+            .ok()
+    });
+    list.ok_or_else(|| format!("{name} is missing or not {N} numbers"))
+}
+
+fn matrix<const N: usize>(value: Option<&Value>, name: &str) -> Result<[[f64; N]; N], String> {
+    let bad = || format!("{name} is missing or not {N} rows of {N} numbers");
+    let rows = value.and_then(Value::as_array).ok_or_else(bad)?;
+    let rows: Option<Vec<[f64; N]>> = rows
+        .iter()
+        .map(|row| numbers(Some(row), name).ok())
+        .collect();
+    rows.and_then(|rows| rows.try_into().ok()).ok_or_else(bad)
+}
+
+/// An entry of `cameras.json`.
+fn entry((i, camera): (usize, &Camera)) -> Value {
+    let rotation = transposed(camera.rotation);
+    let mut entry = json!({
+        "id": i,
+        "img_name": format!("{i:05}"),
+        "width": camera.width,
+        "height": camera.height,
+        "position": camera.centre(),
+        "rotation": rotation,
+        "fy": camera.fy,
+        "fx": camera.fx,
+    });
+    let centred = [0.5 * camera.width as f32, 0.5 * camera.height as f32];
+    if [camera.cx, camera.cy] != centred {
+        entry["cx"] = json!(camera.cx);
+        entry["cy"] = json!(camera.cy);
+    }
+    entry
+}
+
+/// A frame of `transforms.json`.
+fn frame((i, camera): (usize, &Camera)) -> Value {
+    let centre = camera.centre();
+    let rows = transposed(camera.rotation);
+    let row = |r: usize| [rows[r][0], -rows[r][1], -rows[r][2], centre[r]];
+    json!({
+        "file_path": format!("{i:05}"),
+        "w": camera.width,
+        "h": camera.height,
+        "fl_x": camera.fx,
+        "fl_y": camera.fy,
+        "cx": camera.cx,
+        "cy": camera.cy,
+        "camera_angle_x": 2.0 * (0.5 * camera.width as f32 / camera.fx).atan(),
+        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
+    })
+}
+
+fn transposed(m: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[c][r]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cameras() -> Vec<Camera> {
+        let mut off_centre =
+            Camera::look_at([3.0, -1.0, 0.5], [0.0; 3], [0.0, 0.0, 1.0], 0.7, 640, 480);
+        off_centre.cx += 11.0;
+        off_centre.fy *= 1.5;
+        vec![
+            Camera::look_at([0.0, 1.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 0.9, 99, 100),
+            off_centre,
+        ]
+    }
+
+    fn close(a: &Camera, b: &Camera) -> bool {
+        let flat = |c: &Camera| {
+            let pose = c.rotation.into_iter().flatten().chain(c.translation);
+            pose.chain([c.fx, c.fy, c.cx, c.cy, c.width as f32, c.height as f32])
+                .collect::<Vec<_>>()
+        };
+        flat(a)
+            .iter()
+            .zip(flat(b))
+            .all(|(x, y)| (x - y).abs() < 1e-4 * (1.0 + y.abs()))
+    }
+
+    #[test]
+    fn both_kinds_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["cameras.json", "transforms.json"] {
+            let path = folder.path().join(name);
+            write_cameras(&path, &cameras()).unwrap();
+            let read = read_cameras(&path).unwrap();
+            assert_eq!(read.len(), 2);
+            assert!(
+                read.iter().zip(&cameras()).all(|(a, b)| close(a, b)),
+                "{name}: {read:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_blender_camera_looks_down_its_negative_z() {
+        // The identity pose of OpenGL looks along -z with y up; 4 back from the origin.
+        let text = br#"{"camera_angle_x": 0.6911112, "frames": [{"file_path": "./train/r_0",
+            "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
+        let camera = parse(text).unwrap().remove(0);
+        let p = camera.to_camera([1.0, 2.0, 0.0]);
+        assert_eq!(p, [1.0, -2.0, 4.0]);
+        assert_eq!((camera.width, camera.height), (800, 800));
+        // Known from the NeRF synthetic set.
+        assert!((camera.fx - 1111.11).abs() < 0.1, "{}", camera.fx);
+    }
+
+    #[test]
+    fn a_reference_camera_keeps_its_axes() {
+        // camera x = world y, y = world z, z = world x: the columns of the stored rotation.
+        let text =
+            br#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],
+            "rotation": [[0,0,1],[1,0,0],[0,1,0]], "fy": 30, "fx": 40}]"#;
+        let camera = parse(text).unwrap().remove(0);
+        assert_eq!(camera.centre(), [1.0, 2.0, 3.0]);
+        assert_eq!(camera.to_camera([6.0, 2.5, 4.0]), [0.5, 1.0, 5.0]);
+        assert_eq!(
+            (camera.fx, camera.fy, camera.cx, camera.cy),
+            (40.0, 30.0, 5.0, 10.0)
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let good = r#"[{"width": 10, "height": 20, "position": [1, 2, 3],
+            "rotation": [[0,0,1],[1,0,0],[0,1,0]], "fy": 30, "fx": 40}]"#;
+        assert!(parse(good.as_bytes()).is_ok());
+        let cases = [
+            ("\"width\": 10,", "", "camera 0: width is missing"),
+            ("10", "1e9", "must be a whole number from 1 to 16384"),
+            (
+                "\"fx\": 40",
+                "\"fx\": \"wide\"",
+                "fx is \"wide\", not a number",
+            ),
+            ("\"fx\": 40", "\"fx\": -1", "focal length in x is -1"),
+            (
+                "[1, 2, 3]",
+                "[1, 2]",
+                "position is missing or not 3 numbers",
+            ),
+            ("[0,1,0]", "[0,-1,0]", "rotation"),
+            ("[0,1,0]", "[0,2,0]", "rotation"),
+            ("[1, 2, 3]", "[1, 2, 1e300]", "out of range"),
+            ("[{", "{", "not JSON"),
+        ];
+        for (from, to, expected) in cases {
+            let reason = parse(good.replacen(from, to, 1).as_bytes()).unwrap_err();
+            assert!(
+                reason.contains(expected),
+                "{reason} does not have {expected}"
+            );
+        }
+        for (text, expected) in [
+            ("[]", "no cameras"),
+            ("{}", "neither"),
+            ("3", "neither"),
+            ("[1]", "camera 0"),
+        ] {
+            let reason = parse(text.as_bytes()).unwrap_err();
+            assert!(reason.contains(expected), "{reason}");
+        }
+        let frame =
+            r#"{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
+        assert!(
+            parse(frame.as_bytes())
+                .unwrap_err()
+                .contains("neither fl_x nor camera_angle_x")
+        );
+    }
+}

@@ -1,0 +1,11 @@
+//! Views: cameras from the scene itself or from a file.
+mod camera;
+mod extent;
+mod files;
+mod sampler;
+pub(crate) mod vector;
+
+pub use camera::Camera;
+pub use extent::Extent;
+pub use files::{read_cameras, write_cameras};
+pub use sampler::{Split, ViewSampler};

@@ -1,0 +1,260 @@
+//! The binary: commands, exit codes, JSON and messages.
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use guardsplat_worker::clip::Precision;
+use serde_json::Value;
+
+use super::{TINY, cpu, files, model};
+
+/// A folder with a tiny CLIP in it.
+struct Bench(tempfile::TempDir);
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let clip = folder.path().join("clip");
+        std::fs::create_dir(&clip).unwrap();
+        std::fs::write(clip.join("config.json"), TINY).unwrap();
+        let (_, model) = model(&cpu());
+        model
+            .save(&clip.join("model.safetensors"), Precision::F32)
+            .unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_guardsplat-worker"))
+            .args(line.split(' '))
+            .current_dir(self.0.path())
+            .env("GUARDSPLAT_CLIP", self.path("clip"))
+            .env("GUARDSPLAT_HOME", self.path("home"))
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap()
+    }
+
+    /// Standard output of a command that must exit with `code`.
+    fn exits(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// What a command says that must fail.
+    fn fails(&self, line: &str) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(stderr.starts_with("error: "), "{line}: {stderr}");
+        stderr
+    }
+
+    fn json(&self, line: &str, code: i32) -> Value {
+        serde_json::from_str(&self.exits(line, code)).unwrap()
+    }
+}
+
+fn write(path: &Path, text: &str) {
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn from_a_sample_to_a_verdict() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
+    let key = bench.json(
+        "key create --bits 32 --seed 7 -o k.key --device cpu --json",
+        0,
+    );
+    assert_eq!(
+        (&key["bits"], &key["clip"]),
+        (&32.into(), &"guardsplat".into())
+    );
+
+    write(
+        &bench.path("few.json"),
+        r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
+            "verify": {"views": 6, "message_views": 5}}"#,
+    );
+    let line = "embed in.ply out.ply --key k.key --message 0123abcd --preset draft --device cpu --size 32 \
+                --settings few.json --json";
+    // Two steps are too few: the target is missed and nothing is there.
+    let missed = bench.json(line, 3);
+    assert_eq!(missed["written"], false);
+    assert!(!bench.path("out.ply").exists());
+    let report = bench.json(&format!("{line} --force --report pictures"), 3);
+    for field in [
+        "bit_accuracy",
+        "bit_accuracy_worst_view",
+        "psnr_db",
+        "ssim",
+        "seconds",
+    ] {
+        assert!(report[field].is_number(), "{field}: {report}");
+    }
+    assert_eq!(report["steps"], 2);
+    assert_eq!(report["view_steps"], 4);
+    assert!(report["lpips"].is_null());
+    assert_eq!(report["identical"], false);
+    assert_eq!(
+        (&report["device"], &report["clip"]),
+        (&"cpu".into(), &"guardsplat".into())
+    );
+    assert_eq!(report["message"].as_str().unwrap().len(), 8);
+    assert!(report["message_recovered"].is_boolean());
+    assert_eq!(files(&bench.path("pictures")), ["comparison.png"]);
+
+    bench.exits("render out.ply views --views 3 --size 40 --seed 1", 0);
+    assert_eq!(
+        files(&bench.path("views")),
+        [
+            "cameras.json",
+            "view_000.png",
+            "view_001.png",
+            "view_002.png"
+        ]
+    );
+    bench.exits(
+        "render out.ply again --cameras views/cameras.json --views 2 --background black --format exr",
+        0,
+    );
+    assert_eq!(
+        files(&bench.path("again")),
+        ["cameras.json", "view_000.exr", "view_001.exr"]
+    );
+
+    // What pictures read is what they read again, so it matches; its complement does not.
+    let read = bench.json("verify views --key k.key --device cpu --json", 3);
+    assert_eq!(
+        (&read["verdict"], &read["views"]),
+        (&"inconclusive".into(), &3.into())
+    );
+    assert!(read["p_value"].is_null() && read["reason"].is_string());
+    let found = read["message"].as_str().unwrap().to_owned();
+    let matching = format!("verify views --key k.key --device cpu --json --message {found}");
+    let verdict = bench.json(&matching, 0);
+    assert_eq!(verdict["verdict"], "match");
+    assert_eq!(
+        (&verdict["matched_bits"], &verdict["bits"]),
+        (&32.into(), &32.into())
+    );
+    assert!(verdict["p_value"].as_f64().unwrap() <= verdict["threshold"].as_f64().unwrap());
+    let other = u32::from_str_radix(&found, 16).unwrap() ^ u32::MAX;
+    let line = format!("verify views/view_000.png out.ply --key k.key --message {other:08x}");
+    assert!(bench.fails(&line).contains("on its own"));
+    let line = format!(
+        "verify out.ply --key k.key --device cpu --views 3 --size 40 --seed 1 --message {other:08x}"
+    );
+    assert!(bench.exits(&line, 2).starts_with("no match: 0 of 32 bits"));
+}
+
+#[test]
+fn bad_input_is_told_clearly_and_leaves_nothing() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 50 --sh-degree 0", 0);
+    bench.exits("key create --bits 8 --seed 7 -o k.key --device cpu", 0);
+    write(&bench.path("text.ply"), "this is no scene\n");
+    let before = files(bench.0.path());
+    for (line, needle) in [
+        (
+            "embed text.ply out.ply --key k.key --message 5c --device cpu",
+            "text.ply",
+        ),
+        (
+            "embed none.ply out.ply --key k.key --message 5c --device cpu",
+            "none.ply",
+        ),
+        (
+            "embed in.ply no/out.ply --key k.key --message 5c --device cpu",
+            "no/out.ply",
+        ),
+        (
+            "embed in.ply in.ply --key k.key --message 5c --device cpu",
+            "is the input",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5c5c --device cpu",
+            "longer than the key's 8 bits",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5g --device cpu",
+            "'g'",
+        ),
+        (
+            "embed in.ply out.ply --key text.ply --message 5c --device cpu",
+            "key text.ply",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5c --device cuda",
+            "auto, wgpu or cpu",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5c --preset fast",
+            "draft, standard or paper",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5c --device cpu --size 4",
+            "size: 4 is outside 16",
+        ),
+        (
+            "embed in.ply out.ply --key k.key --message 5c --device cpu --clip other",
+            "model other",
+        ),
+        (
+            "key create --bits 0 -o new.key --device cpu",
+            "0 is outside 1 to 75",
+        ),
+        (
+            "key create --bits 76 -o new.key --device cpu",
+            "76 is outside 1 to 75",
+        ),
+        ("verify none.png --key k.key --device cpu", "none.png"),
+        (
+            "verify in.ply --key k.key --message 5c5c --device cpu",
+            "longer",
+        ),
+        ("render text.ply views --views 1 --device cpu", "text.ply"),
+        (
+            "render in.ply views --cameras text.ply --device cpu",
+            "text.ply",
+        ),
+        ("sample new.ply --gaussians 0", "--gaussians"),
+        ("sample new.ply --sh-degree 5", "--sh-degree"),
+        ("models verify other", "models add"),
+        ("mark in.ply", "unrecognized subcommand"),
+    ] {
+        let told = bench.fails(line);
+        assert!(told.contains(needle), "{line}: {told}");
+        assert_eq!(files(bench.0.path()), before, "{line}");
+    }
+    // Another CLIP under the same name.
+    std::fs::remove_file(bench.path("clip/model.safetensors")).unwrap();
+    let (config, _) = model(&cpu());
+    use guardsplat_worker::clip::{ClipModel, Parts};
+    ClipModel::init(&config, Parts::Both, &cpu().device, 6)
+        .save(&bench.path("clip/model.safetensors"), Precision::F32)
+        .unwrap();
+    let told = bench.fails("verify in.ply --key k.key --message 5c --device cpu");
+    assert!(told.contains("key k.key: it belongs to the CLIP"), "{told}");
+}
+
+#[test]
+fn eight_bits_can_never_be_conclusive_and_models_are_listed() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 50 --sh-degree 0", 0);
+    bench.exits("key create --bits 8 --seed 7 -o k.key --device cpu", 0);
+    let told = bench.exits(
+        "verify in.ply --key k.key --message 5c --device cpu --views 2 --size 32",
+        3,
+    );
+    assert!(told.contains("can never reach"), "{told}");
+    assert!(bench.exits("models list", 0).contains("none were added"));
+    assert_eq!(bench.exits("models list --json", 0).trim(), "[]");
+    assert!(bench.exits("--help", 0).contains("Exit codes"));
+}
