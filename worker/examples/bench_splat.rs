@@ -2,9 +2,7 @@
 //! `cargo run --release --example bench_splat -- SCENE.ply SIZE [VIEWS] [wgpu]`.
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::scene::{Gaussians, Scene};
-use guardsplat_worker::splat::{
-    CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh,
-};
+use guardsplat_worker::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
 use guardsplat_worker::view::Camera;
 use std::time::Instant;
 

@@ -72,11 +72,17 @@ fn open_wgpu() -> Result<Compute> {
         if adapters().is_empty() {
             return Err("no Vulkan driver was found; install one (Debian: mesa-vulkan-drivers) or choose cpu".into());
         }
-        let options = Device::wgpu_options().device_kind(DeviceKind::DefaultDevice).graphics_api(WgpuBackend::Vulkan);
+        let options = Device::wgpu_options()
+            .device_kind(DeviceKind::DefaultDevice)
+            .graphics_api(WgpuBackend::Vulkan);
         let (device, setup) = options.init_with_setup().map_err(|e| e.to_string())?;
         let info = setup.adapter.get_info();
         let name = format!("wgpu: {} ({})", info.name, info.driver_info);
-        Ok(Compute { device, name, is_gpu: is_gpu(&info) })
+        Ok(Compute {
+            device,
+            name,
+            is_gpu: is_gpu(&info),
+        })
     });
     opened.clone().map_err(|reason| Error::Device {
         device: "wgpu".into(),
@@ -90,10 +96,7 @@ fn has_gpu() -> bool {
 
 fn is_gpu(adapter: &wgpu::AdapterInfo) -> bool {
     use wgpu::DeviceType::{DiscreteGpu, IntegratedGpu, VirtualGpu};
-    matches!(
-        adapter.device_type,
-        DiscreteGpu | IntegratedGpu | VirtualGpu
-    )
+    matches!(adapter.device_type, DiscreteGpu | IntegratedGpu | VirtualGpu)
 }
 
 /// Every Vulkan adapter; asking opens none of them.
@@ -116,12 +119,7 @@ mod tests {
     fn the_cpu_is_always_there() {
         let compute = open(DeviceChoice::Cpu).unwrap();
         assert_eq!((compute.name.as_str(), compute.is_gpu), ("cpu", false));
-        assert_eq!(
-            Tensor::<1>::ones([4], &compute.device)
-                .sum()
-                .into_scalar::<f32>(),
-            4.0
-        );
+        assert_eq!(Tensor::<1>::ones([4], &compute.device).sum().into_scalar::<f32>(), 4.0);
     }
 
     #[test]
@@ -135,26 +133,15 @@ mod tests {
             Ok(first) => {
                 assert!(first.name.starts_with("wgpu: "), "{}", first.name);
                 assert_eq!(open(DeviceChoice::Wgpu).unwrap().device, first.device);
-                assert_eq!(
-                    Tensor::<1>::ones([4], &first.device)
-                        .sum()
-                        .into_scalar::<f32>(),
-                    4.0
-                );
+                assert_eq!(Tensor::<1>::ones([4], &first.device).sum().into_scalar::<f32>(), 4.0);
             }
-            Err(error) => assert!(
-                adapters().is_empty() && error.to_string().contains("Vulkan"),
-                "{error}"
-            ),
+            Err(error) => assert!(adapters().is_empty() && error.to_string().contains("Vulkan"), "{error}"),
         }
     }
 
     #[test]
     fn unknown_devices_are_named() {
         let error = "cuda".parse::<DeviceChoice>().unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "device: \"cuda\" is not a device, must be auto, wgpu or cpu"
-        );
+        assert_eq!(error, "device: \"cuda\" is not a device, must be auto, wgpu or cpu");
     }
 }

@@ -13,6 +13,7 @@ pub mod scene;
 pub mod splat;
 #[doc(hidden)]
 pub mod testing;
+pub mod train;
 pub mod view;
 
 pub use error::{Error, Result};

@@ -14,7 +14,11 @@ pub struct Picture {
 impl Picture {
     /// The picture as an 8-bit file holds it: clamped to [0, 1] and rounded to 1/255.
     pub fn to_8_bit(&self) -> Picture {
-        let pixels = self.pixels.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() / 255.0).collect();
+        let pixels = self
+            .pixels
+            .iter()
+            .map(|v| (v.clamp(0.0, 1.0) * 255.0).round() / 255.0)
+            .collect();
         Picture { pixels, ..*self }
     }
 }

@@ -13,14 +13,25 @@ pub fn model_path(name: &str) -> Option<PathBuf> {
 
 fn shared(variable: &str, folder: &str, name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os(variable).map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(folder),
+        || {
+            PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+                .join("../../shared")
+                .join(folder)
+        },
         PathBuf::from,
     );
     let path = folder.join(name);
     if path.exists() {
         return Some(path);
     }
-    assert!(std::env::var_os("CI").is_none(), "{} is missing; set {variable}", path.display());
-    eprintln!("skipped: {} is missing; set {variable} to run this test", path.display());
+    assert!(
+        std::env::var_os("CI").is_none(),
+        "{} is missing; set {variable}",
+        path.display()
+    );
+    eprintln!(
+        "skipped: {} is missing; set {variable} to run this test",
+        path.display()
+    );
     None
 }

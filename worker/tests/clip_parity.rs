@@ -115,15 +115,11 @@ fn compare(what: &str, found: Tensor<2>, expected: &[Vec<f64>]) {
         assert_eq!(raw.len(), expected.len());
         relative = relative.max(length(&minus(raw, expected)) / length(expected));
         let unit: Vec<f64> = expected.iter().map(|v| v / length(expected)).collect();
-        largest = minus(normalized, &unit)
-            .iter()
-            .fold(largest, |m, d| m.max(d.abs()));
+        largest = minus(normalized, &unit).iter().fold(largest, |m, d| m.max(d.abs()));
     }
     let (d, e) = (minus(&raw[0], &raw[1]), minus(&expected[0], &expected[1]));
     let contrast = length(&minus(&d, &e)) / length(&e);
-    println!(
-        "{what}: relative {relative:.1e}, normalised {largest:.1e}, between inputs {contrast:.1e}"
-    );
+    println!("{what}: relative {relative:.1e}, normalised {largest:.1e}, between inputs {contrast:.1e}");
     assert!(
         relative < TOLERANCE && largest < TOLERANCE && contrast < TOLERANCE,
         "{what} differs"
@@ -132,10 +128,7 @@ fn compare(what: &str, found: Tensor<2>, expected: &[Vec<f64>]) {
 
 fn tokens(expected: &Expected) -> Tensor<2, Int> {
     let shape = [expected.tokens.len(), expected.tokens[0].len()];
-    Tensor::from_data(
-        TensorData::new(expected.tokens.concat(), shape),
-        &Device::flex(),
-    )
+    Tensor::from_data(TensorData::new(expected.tokens.concat(), shape), &Device::flex())
 }
 
 fn compare_both(what: &str, model: &ClipModel, size: usize, expected: &Expected) {
@@ -182,23 +175,14 @@ fn towers_load_alone() {
     assert!(text.model().visual.is_none());
     compare(
         "text alone",
-        text.model()
-            .text
-            .as_ref()
-            .unwrap()
-            .forward(tokens(&expected)),
+        text.model().text.as_ref().unwrap().forward(tokens(&expected)),
         &expected.text_features,
     );
 }
 
 #[test]
 fn sequences_may_be_cut_after_the_end_token() {
-    let clip = Clip::load(
-        &fixtures().join("small_hf_legacy_end"),
-        &Device::flex(),
-        Parts::Text,
-    )
-    .unwrap();
+    let clip = Clip::load(&fixtures().join("small_hf_legacy_end"), &Device::flex(), Parts::Text).unwrap();
     let first = tokens(&expected("small_hf_legacy_end/expected.json")).narrow(0, 0, 1);
     let whole = rows(clip.text_features(first.clone()));
     let cut = rows(clip.text_features(first.clone().slice([0..1, 0..5])));
@@ -268,11 +252,7 @@ fn saved_models_load_again() {
     let path = saved.path().join("model.safetensors");
     // The fixture's matrices are f16 already, so nothing is lost.
     clip.model().save(&path, Precision::F16).unwrap();
-    std::fs::write(
-        saved.path().join("config.json"),
-        clip.config.to_open_clip().unwrap(),
-    )
-    .unwrap();
+    std::fs::write(saved.path().join("config.json"), clip.config.to_open_clip().unwrap()).unwrap();
     let [ours, theirs] = [&path, &dir.join("model.safetensors")].map(|path| {
         let mut tensors = TensorFile::open(path).unwrap().tensors();
         tensors.sort();
@@ -281,10 +261,5 @@ fn saved_models_load_again() {
     assert_eq!(ours, theirs);
     assert_eq!(ClipConfig::read(saved.path()).unwrap(), clip.config);
     let again = Clip::load(saved.path(), &Device::flex(), Parts::Both).unwrap();
-    compare_both(
-        "saved",
-        again.model(),
-        64,
-        &expected("small_openclip_rn/expected.json"),
-    );
+    compare_both("saved", again.model(), 64, &expected("small_openclip_rn/expected.json"));
 }

@@ -10,9 +10,7 @@ use guardsplat_worker::embed::{
     Augmentation, Job, Outcome, Preset, Progress, Settings, create_key, embed, natural, optimise,
 };
 use guardsplat_worker::extract::{Engine, read_pictures, read_scene};
-use guardsplat_worker::message::{
-    ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions,
-};
+use guardsplat_worker::message::{ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions};
 use guardsplat_worker::sample::sample;
 use guardsplat_worker::scene::{Gaussians, Scene};
 use guardsplat_worker::testing::scene_path;
@@ -51,24 +49,13 @@ fn new_key(compute: &Compute, seed: u64) -> Result<Key> {
             ..TrainingOptions::default()
         },
     };
-    let fit = FitOptions {
-        remove: 2,
-        keep: None,
-    };
+    let fit = FitOptions { remove: 2, keep: None };
     let identity = ClipIdentity {
         name: "tiny".into(),
         hash: "00".repeat(32),
     };
     let pictures = natural::pictures(compute, 32)?.step_by(5);
-    create_key(
-        &options,
-        fit,
-        &clip(compute),
-        identity,
-        compute,
-        pictures,
-        |_| {},
-    )
+    create_key(&options, fit, &clip(compute), identity, compute, pictures, |_| {})
 }
 
 fn key() -> &'static Key {
@@ -126,13 +113,7 @@ fn scene_file() -> (tempfile::TempDir, std::path::PathBuf) {
     (folder, path)
 }
 
-fn run(
-    engine: &Engine,
-    input: &Path,
-    output: &Path,
-    settings: &Settings,
-    force: bool,
-) -> Result<Outcome> {
+fn run(engine: &Engine, input: &Path, output: &Path, settings: &Settings, force: bool) -> Result<Outcome> {
     let job = Job {
         input,
         output,
@@ -145,9 +126,7 @@ fn run(
 
 fn files(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries
-        .map(|e| e.unwrap().file_name().into_string().unwrap())
-        .collect();
+    let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     names
 }
@@ -177,12 +156,7 @@ fn the_loss_falls_on_training_views() {
     })
     .unwrap();
     assert_eq!((losses.len(), done.view_steps), (60, 240));
-    assert!(
-        losses[59] < 0.8 * losses[0],
-        "from {} to {}",
-        losses[0],
-        losses[59]
-    );
+    assert!(losses[59] < 0.8 * losses[0], "from {} to {}", losses[0], losses[59]);
     assert!(accuracies[59] > accuracies[0], "{accuracies:?}");
 }
 
@@ -192,10 +166,7 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     let at = |name: &str| folder.path().join(name);
     let outcome = run(&engine, &input, &at("a.ply"), &settings(), false).unwrap();
     run(&engine, &input, &at("b.ply"), &settings(), false).unwrap();
-    let other = Settings {
-        seed: 4,
-        ..settings()
-    };
+    let other = Settings { seed: 4, ..settings() };
     run(&engine, &input, &at("c.ply"), &other, false).unwrap();
     let bytes = |name: &str| std::fs::read(at(name)).unwrap();
     assert!(bytes("a.ply") == bytes("b.ply"));
@@ -214,10 +185,7 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     let camera = sampler.camera(Split::HeldOut, 0, 32);
     let first = engine.picture(&scene, &camera, [1.0; 3]).unwrap();
     assert_eq!(found.pairs[0].1, first);
-    assert_eq!(
-        read_pictures(&engine, &[first]).unwrap().views[0],
-        reading.views[0]
-    );
+    assert_eq!(read_pictures(&engine, &[first]).unwrap().views[0], reading.views[0]);
     assert!(found.quality.psnr.psnr_db.unwrap() > 20.0);
 }
 
@@ -251,13 +219,7 @@ fn scenes_without_view_dependence_and_without_anything_to_see() {
     let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
     assert!(done.offsets.iter().all(|o| *o == 0.0));
     // Nothing at all.
-    let empty = optimise(
-        &engine,
-        &Gaussians::default(),
-        &message(),
-        &settings(),
-        &mut |_| {},
-    );
+    let empty = optimise(&engine, &Gaussians::default(), &message(), &settings(), &mut |_| {});
     assert!(empty.is_err());
 }
 
@@ -275,16 +237,8 @@ fn weights_that_are_no_numbers_stop_the_run_with_step_and_term() {
     let (config, model) = model(&compute);
     let clip = Clip::from_model(config, "00".repeat(32), model.map(&mut Poison));
     let engine = Engine::new(compute, clip, key(), None).unwrap();
-    let error = run(
-        &engine,
-        &input,
-        &folder.path().join("out.ply"),
-        &settings(),
-        true,
-    )
-    .unwrap_err();
-    let found =
-        matches!(&error, Error::NotFinite { step: 1, term: "message", value } if value.is_nan());
+    let error = run(&engine, &input, &folder.path().join("out.ply"), &settings(), true).unwrap_err();
+    let found = matches!(&error, Error::NotFinite { step: 1, term: "message", value } if value.is_nan());
     assert!(found, "{error}");
     assert_eq!(files(folder.path()), ["in.ply"]);
 }
@@ -325,10 +279,7 @@ fn a_held_out_margin_that_holds_ends_the_run() {
         ..settings()
     };
     let mut told = Vec::new();
-    let done = optimise(&engine, &scene, &message(), &settings, &mut |p| {
-        told.push(p)
-    })
-    .unwrap();
+    let done = optimise(&engine, &scene, &message(), &settings, &mut |p| told.push(p)).unwrap();
     // Checks at 2, 4 and 6 hold; 6 is the first past the least number of steps.
     assert_eq!((done.steps, done.view_steps), (6, 24));
     assert_eq!(told.last(), Some(&Progress::Stopped { step: 6 }));
@@ -345,10 +296,7 @@ fn what_does_not_fit_together_is_refused() {
         result.unwrap_err().to_string()
     };
     assert!(refused(&long, &settings()).contains("16 bits, but the key has 8"));
-    let none = Settings {
-        steps: 0,
-        ..settings()
-    };
+    let none = Settings { steps: 0, ..settings() };
     assert!(refused(&message(), &none).starts_with("steps: 0 is outside 1"));
     let compute = cpu();
     let other = TINY.replace("\"embed_dim\": 16", "\"embed_dim\": 12");
@@ -356,11 +304,7 @@ fn what_does_not_fit_together_is_refused() {
     let model = ClipModel::init(&config, Parts::Image, &compute.device, 5);
     let clip = Clip::from_model(config, "11".repeat(32), model);
     let error = Engine::new(compute, clip, key(), None).err().unwrap();
-    assert!(
-        error
-            .to_string()
-            .contains("12 dimensions, the key reads 16")
-    );
+    assert!(error.to_string().contains("12 dimensions, the key reads 16"));
 }
 
 #[test]
@@ -386,11 +330,7 @@ fn a_whole_embedding_runs_on_wgpu() {
     let engine = Engine::new(compute, clip, key(), None).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut settings = settings();
-    (
-        settings.steps,
-        settings.views_per_step,
-        settings.verify.views,
-    ) = (3, 2, 2);
+    (settings.steps, settings.views_per_step, settings.verify.views) = (3, 2, 2);
     let at = |name: &str| folder.path().join(name);
     let outcome = run(&engine, &input, &at("a.ply"), &settings, false).unwrap();
     assert!(outcome.written && outcome.changed > 1000);

@@ -87,13 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let settings = settings(arguments)?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;
-    let engine = load::engine(
-        &arguments.key,
-        &key,
-        arguments.clip.as_deref(),
-        arguments.device,
-        true,
-    )?;
+    let engine = load::engine(&arguments.key, &key, arguments.clip.as_deref(), arguments.device, true)?;
     if settings.lambda.lpips > 0.0 && engine.lpips.is_none() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
     }
@@ -155,14 +149,14 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
             check.margin
         )),
         Progress::Stopped { step } => {
-            display.say(&format!(
-                "enough after {step} steps: the held-out margin holds"
-            ));
+            display.say(&format!("enough after {step} steps: the held-out margin holds"));
         }
         Progress::Writing => display.finish(),
-        Progress::Verifying { done, total } => verifying
-            .get_or_insert_with(|| Display::new("verifying"))
-            .set(done, total, String::new),
+        Progress::Verifying { done, total } => {
+            verifying
+                .get_or_insert_with(|| Display::new("verifying"))
+                .set(done, total, String::new)
+        }
     }
 }
 
@@ -171,13 +165,7 @@ fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     write_picture(&folder.join(SHEET), &contact_sheet(&verification.pairs)?)
 }
 
-fn tell(
-    arguments: &Arguments,
-    device: &str,
-    key: &Key,
-    outcome: &Outcome,
-    start: Instant,
-) -> Result<()> {
+fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {
     let found = &outcome.verification;
     let report = Report {
         bit_accuracy: found.comparison.bit_accuracy,

@@ -37,7 +37,7 @@ pub struct Create {
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
-    /// Directions of strongest natural variation to ignore; half of all at most, unless given
+    /// Directions of strongest natural variation to ignore; unless given 64, at most an eighth of all
     #[arg(long, hide_short_help = true)]
     remove: Option<usize>,
     /// Dimensions to keep of the rest; all unless given
@@ -69,9 +69,7 @@ pub fn run(command: Command) -> Result<Exit> {
     let (clip, identity) = load::clip(arguments.clip.as_deref(), &compute, Parts::Both)?;
     let default = FitOptions::default();
     let projection = FitOptions {
-        remove: arguments
-            .remove
-            .unwrap_or(default.remove.min(clip.dim() / 2)),
+        remove: arguments.remove.unwrap_or(default.remove.min(clip.dim() / 8)),
         keep: arguments.keep,
     };
     let options = KeyOptions {

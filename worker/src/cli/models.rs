@@ -1,8 +1,17 @@
-//! `models list`, `models add`, `models verify`.
-use clap::Subcommand;
-use guardsplat_worker::Result;
+//! `models list`, `models add`, `models verify`, `models train`.
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, Subcommand};
+use guardsplat_worker::clip::{Precision, TensorFile};
+use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::train::{Retrieval, TrainOptions, TrainProgress, train_clip};
+use guardsplat_worker::{Error, Result};
+use serde::Serialize;
+
 use guardsplat_worker::models::{Entry, LPIPS, Models};
 
+use super::display::Display;
 use super::{Exit, print_json, print_line};
 
 #[derive(Subcommand)]
@@ -24,6 +33,8 @@ pub enum Command {
         #[arg(long, value_name = "HEX")]
         sha256: String,
     },
+    /// Trains the project's own small CLIP again, from pictures and captions that it generates
+    Train(Train),
     /// Hashes models again and compares
     Verify {
         /// Which one; all unless given
@@ -31,7 +42,100 @@ pub enum Command {
     },
 }
 
+#[derive(Args)]
+pub struct Train {
+    /// The folder to write config.json and model.safetensors to
+    #[arg(value_name = "DIR")]
+    output: PathBuf,
+    /// Decides everything that is random
+    #[arg(long, default_value_t = TrainOptions::default().seed)]
+    seed: u64,
+    /// Drawings whose natural variation is measured
+    #[arg(long, default_value_t = TrainOptions::default().drawings)]
+    drawings: usize,
+    /// Steps of contrastive training
+    #[arg(long, default_value_t = TrainOptions::default().steps)]
+    steps: usize,
+    /// Pairs a step
+    #[arg(long, default_value_t = TrainOptions::default().batch)]
+    batch: usize,
+    /// Where to compute: auto, wgpu or cpu
+    #[arg(long, default_value = "auto")]
+    device: DeviceChoice,
+}
+
+/// What a training leaves behind beside the weights.
+#[derive(Serialize)]
+struct Trained<'a> {
+    seed: u64,
+    drawings: usize,
+    steps: usize,
+    batch: usize,
+    steering: Vec<f64>,
+    retrieval: Retrieval,
+    sha256: String,
+    device: &'a str,
+    seconds: f64,
+}
+
+fn train(arguments: &Train) -> Result<Exit> {
+    let start = Instant::now();
+    let compute = open(arguments.device)?;
+    let options = TrainOptions {
+        seed: arguments.seed,
+        drawings: arguments.drawings,
+        steps: arguments.steps,
+        batch: arguments.batch,
+    };
+    let mut display = Display::new("drawings");
+    let mut stage = 0;
+    let mut show = |number: usize, title: &'static str, done: usize, total: usize, loss: Option<f32>| {
+        if stage != number {
+            stage = number;
+            display = Display::new(title);
+        }
+        display.set(done, total, || {
+            loss.map_or_else(String::new, |l| format!("loss {l:.3}"))
+        });
+    };
+    let trained = train_clip(&options, &compute, |progress| match progress {
+        TrainProgress::Natural(done, total) => show(0, "drawings", done, total, None),
+        TrainProgress::Steering(done, total) => show(1, "gradients", done, total, None),
+        TrainProgress::Contrastive(done, total, loss) => show(2, "captions", done, total, Some(loss)),
+    })?;
+    drop(display);
+    let write = |name: &str, text: String| {
+        let path = arguments.output.join(name);
+        std::fs::write(&path, text + "\n").map_err(Error::io(path))
+    };
+    std::fs::create_dir_all(&arguments.output).map_err(Error::io(&arguments.output))?;
+    let weights: &Path = &arguments.output.join("model.safetensors");
+    trained.model.save(weights, Precision::F16)?;
+    write("config.json", trained.config.to_open_clip()?)?;
+    let report = Trained {
+        seed: options.seed,
+        drawings: options.drawings,
+        steps: options.steps,
+        batch: options.batch,
+        steering: trained.steering,
+        retrieval: trained.retrieval,
+        sha256: TensorFile::open(weights)?.sha256()?,
+        device: &compute.name,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    let json = serde_json::to_string_pretty(&report).map_err(|e| Error::BadModel {
+        name: weights.display().to_string(),
+        reason: e.to_string(),
+    })?;
+    write("training.json", json.clone())?;
+    print_line(&json);
+    Ok(Exit::Done)
+}
+
 pub fn run(command: Command) -> Result<Exit> {
+    if let Command::Train(arguments) = &command {
+        return train(arguments);
+    }
     let models = Models::open()?;
     match command {
         Command::List { json: true } => print_json(&models.list()?)?,
@@ -42,14 +146,10 @@ pub fn run(command: Command) -> Result<Exit> {
                 print_line("none were added; the shipped CLIP needs no adding");
             }
         }
-        Command::Add {
-            name,
-            source,
-            sha256,
-        } => print_line(&format!(
-            "added {}",
-            line(&models.add(&name, &source, &sha256)?)
-        )),
+        Command::Add { name, source, sha256 } => {
+            print_line(&format!("added {}", line(&models.add(&name, &source, &sha256)?)))
+        }
+        Command::Train(_) => {} // needs no models; returned above
         Command::Verify { name: Some(name) } => {
             print_line(&format!("intact: {}", line(&models.verify(&name)?)));
         }

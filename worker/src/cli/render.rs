@@ -72,9 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             let sampler = ViewSampler::new(&scene, arguments.seed)?;
             let size = arguments.size.unwrap_or(DEFAULT_SIZE);
             let views = 0..u64::from(arguments.views.unwrap_or(1));
-            views
-                .map(|index| sampler.camera(Split::HeldOut, index, size))
-                .collect()
+            views.map(|index| sampler.camera(Split::HeldOut, index, size)).collect()
         }
     };
     let rasterizer = rasterizer(&open(arguments.device)?)?;
@@ -89,10 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         let view = prepare(&scene, camera, WeightCache::None)?;
         let colours = sh::colours(&scene.sh, None, &view);
         let picture = rasterizer.render(&view, &colours, arguments.background.rgb())?;
-        write_picture(
-            &folder.join(format!("view_{index:03}.{extension}")),
-            &picture,
-        )?;
+        write_picture(&folder.join(format!("view_{index:03}.{extension}")), &picture)?;
         display.set(index + 1, cameras.len(), String::new);
     }
     write_cameras(&folder.join(CAMERAS), &cameras)?;
@@ -111,12 +106,7 @@ fn resize(camera: &mut Camera, size: u32) {
     let side = |pixels: u32| ((pixels as f32 * scale).round() as u32).max(1);
     camera.width = side(camera.width);
     camera.height = side(camera.height);
-    for length in [
-        &mut camera.fx,
-        &mut camera.fy,
-        &mut camera.cx,
-        &mut camera.cy,
-    ] {
+    for length in [&mut camera.fx, &mut camera.fy, &mut camera.cx, &mut camera.cy] {
         *length *= scale;
     }
 }
@@ -127,16 +117,7 @@ mod tests {
 
     #[test]
     fn resized_cameras_see_the_same() {
-        let look = |width, height| {
-            Camera::look_at(
-                [0.0, 0.0, -3.0],
-                [0.0; 3],
-                [0.0, -1.0, 0.0],
-                0.8,
-                width,
-                height,
-            )
-        };
+        let look = |width, height| Camera::look_at([0.0, 0.0, -3.0], [0.0; 3], [0.0, -1.0, 0.0], 0.8, width, height);
         let mut camera = look(800, 600);
         resize(&mut camera, 400);
         assert_eq!((camera.width, camera.height), (400, 300));

@@ -78,22 +78,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let start = Instant::now();
     let source = find_source(&arguments.paths)?;
     let key = Key::read(&arguments.key)?;
-    let message = arguments
-        .message
-        .as_deref()
-        .map(|text| key.message(text))
-        .transpose()?;
-    let engine = load::engine(
-        &arguments.key,
-        &key,
-        arguments.clip.as_deref(),
-        arguments.device,
-        false,
-    )?;
+    let message = arguments.message.as_deref().map(|text| key.message(text)).transpose()?;
+    let engine = load::engine(&arguments.key, &key, arguments.clip.as_deref(), arguments.device, false)?;
     let reading = read(arguments, &engine, &source)?;
-    let comparison = message
-        .map(|message| reading.compare(&message))
-        .transpose()?;
+    let comparison = message.map(|message| reading.compare(&message)).transpose()?;
     let decision = comparison.as_ref().map(|c| &c.decision);
     let report = Report {
         verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),

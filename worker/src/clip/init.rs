@@ -53,9 +53,7 @@ impl Init {
             // exp of this is 1 / 0.07
             "logit_scale" => Start::Constant(2.659_26),
             // A residual block starts as the identity.
-            "weight" if name.starts_with("visual.layer") && name.ends_with("bn3.weight") => {
-                Start::Constant(0.0)
-            }
+            "weight" if name.starts_with("visual.layer") && name.ends_with("bn3.weight") => Start::Constant(0.0),
             "weight" if self.walk.is_norm() => Start::Constant(1.0),
             "weight" if name == "token_embedding.weight" => Start::Normal(0.02),
             "positional_embedding" if name == "positional_embedding" => Start::Normal(0.01),

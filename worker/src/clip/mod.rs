@@ -1,4 +1,4 @@
-//! CLIP in burn: both kinds of image tower, the text tower, and weights from published checkpoints.
+//! CLIP in burn: both published kinds of image tower and one of our own, the text tower, and weights from published checkpoints.
 //!
 //! [`Clip`] is a loaded, frozen model whose features are differentiable in the pictures. [`ClipModel`] is the
 //! trainable module inside, for the project's own small CLIP.
@@ -10,6 +10,7 @@ mod names;
 mod params;
 mod preprocess;
 mod resnet;
+mod statistics;
 mod tensor_file;
 mod text;
 mod transformer;
@@ -20,6 +21,7 @@ pub use config::ClipConfig;
 pub use model::{ClipModel, ImageTower, Parts, normalize};
 pub use preprocess::{preprocess, resize};
 pub use resnet::ResNet;
+pub use statistics::StatisticsTower;
 pub use tensor_file::{TensorFile, TensorSource};
 pub use text::TextTransformer;
 pub use transformer::Transformer;
@@ -104,11 +106,7 @@ impl Clip {
             .visual
             .as_ref()
             .expect("loaded with Parts::Image or Parts::Both");
-        let input = preprocess(
-            pictures,
-            self.config.vision.image_size,
-            &self.config.normalization,
-        );
+        let input = preprocess(pictures, self.config.vision.image_size, &self.config.normalization);
         normalize(tower.forward(input))
     }
 
@@ -135,8 +133,7 @@ pub(crate) fn weights_path(dir: &Path) -> Result<PathBuf> {
         .find(|path| path.is_file())
         .ok_or_else(|| Error::BadModel {
             name: dir.display().to_string(),
-            reason: "has no model.safetensors (one file; sharded and pickled weights are not read)"
-                .into(),
+            reason: "has no model.safetensors (one file; sharded and pickled weights are not read)".into(),
         })
 }
 

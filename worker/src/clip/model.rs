@@ -2,6 +2,7 @@
 use super::config::{ClipConfig, VisionTower};
 use super::params::param;
 use super::resnet::ResNet;
+use super::statistics::StatisticsTower;
 use super::text::TextTransformer;
 use super::vit::VisionTransformer;
 use burn::module::{Module, Param};
@@ -29,7 +30,7 @@ pub struct ClipModel {
     pub logit_scale: Param<Tensor<1>>,
 }
 
-/// The image tower, of either kind.
+/// The image tower, of whichever kind.
 #[allow(clippy::large_enum_variant)] // a model has one
 #[derive(Module, Debug)]
 pub enum ImageTower {
@@ -37,14 +38,15 @@ pub enum ImageTower {
     Transformer(VisionTransformer),
     /// Modified ResNet.
     ResNet(ResNet),
+    /// Local statistics.
+    Statistics(StatisticsTower),
 }
 
 impl ClipModel {
     /// Lays out the model; its parameters take no memory until they are loaded or initialised.
     pub fn new(config: &ClipConfig, parts: Parts, device: &Device) -> Self {
         let visual = (parts != Parts::Text).then(|| ImageTower::new(config, device));
-        let text = (parts != Parts::Image)
-            .then(|| TextTransformer::new(&config.text, config.embed_dim, device));
+        let text = (parts != Parts::Image).then(|| TextTransformer::new(&config.text, config.embed_dim, device));
         Self {
             visual,
             text,
@@ -57,11 +59,14 @@ impl ImageTower {
     fn new(config: &ClipConfig, device: &Device) -> Self {
         let (vision, embed_dim) = (&config.vision, config.embed_dim);
         match &vision.tower {
-            VisionTower::Transformer { patch_size, blocks } => Self::Transformer(
-                VisionTransformer::new(vision, *patch_size, blocks, embed_dim, device),
-            ),
+            VisionTower::Transformer { patch_size, blocks } => {
+                Self::Transformer(VisionTransformer::new(vision, *patch_size, blocks, embed_dim, device))
+            }
             VisionTower::ResNet { layers, heads } => {
                 Self::ResNet(ResNet::new(vision, *layers, *heads, embed_dim, device))
+            }
+            VisionTower::Statistics { scales, kernel } => {
+                Self::Statistics(StatisticsTower::new(vision, scales, *kernel, embed_dim, device))
             }
         }
     }
@@ -72,6 +77,7 @@ impl ImageTower {
         match self {
             Self::Transformer(tower) => tower.forward(pictures),
             Self::ResNet(tower) => tower.forward(pictures),
+            Self::Statistics(tower) => tower.forward(&pictures),
         }
     }
 }

@@ -100,9 +100,7 @@ pub(super) fn hugging_face(name: &str) -> Stored {
     }
     match (model, rest) {
         ("vision_model", "class_embedding") => one(format!("{model}.embeddings.class_embedding")),
-        ("vision_model", "conv1.weight") => {
-            one(format!("{model}.embeddings.patch_embedding.weight"))
-        }
+        ("vision_model", "conv1.weight") => one(format!("{model}.embeddings.patch_embedding.weight")),
         ("vision_model", "proj") => projection("visual_projection.weight"),
         (_, "text_projection") => projection("text_projection.weight"),
         (_, "positional_embedding") => one(format!("{model}.embeddings.position_embedding.weight")),
@@ -126,9 +124,7 @@ pub(super) fn is_hugging_face<'a>(mut names: impl Iterator<Item = &'a str>) -> b
 
 /// Whether the stored tensor, in either form, belongs to the image tower (else to the text tower or both).
 pub(super) fn is_visual(stored: &str) -> bool {
-    stored.starts_with("visual.")
-        || stored.starts_with("vision_model.")
-        || stored == "visual_projection.weight"
+    stored.starts_with("visual.") || stored.starts_with("vision_model.") || stored == "visual_projection.weight"
 }
 
 /// Tensors that checkpoints carry and nobody needs: position numbers, masks, counters, sizes.

@@ -5,8 +5,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 /// Resizes `[b, 3, h, w]` to `[b, 3, size, size]` (the aspect is squashed) and normalises the channels.
 pub fn preprocess(pictures: Tensor<4>, size: usize, normalization: &Normalization) -> Tensor<4> {
     let device = pictures.device();
-    let channels =
-        |values: [f32; 3]| Tensor::<1>::from_floats(values, &device).reshape([1, 3, 1, 1]);
+    let channels = |values: [f32; 3]| Tensor::<1>::from_floats(values, &device).reshape([1, 3, 1, 1]);
     let resized = resize(pictures, size, size);
     (resized - channels(normalization.mean)) / channels(normalization.std)
 }
@@ -63,10 +62,7 @@ mod tests {
     fn weights_of_every_output_sum_to_one() {
         for (from, to) in [(800, 224), (224, 224), (5, 224), (1, 7), (7, 1), (225, 224)] {
             let sums = weights(from, to, &Device::flex()).sum_dim(1).into_data();
-            assert!(
-                sums.iter::<f32>().all(|s| (s - 1.0).abs() < 1e-5),
-                "{from} to {to}"
-            );
+            assert!(sums.iter::<f32>().all(|s| (s - 1.0).abs() < 1e-5), "{from} to {to}");
         }
     }
 
@@ -87,10 +83,6 @@ mod tests {
             std: [0.25; 3],
         };
         let x = Tensor::<4>::ones([1, 3, 8, 8], &Device::flex());
-        assert!(
-            values(preprocess(x, 8, &normalization))
-                .iter()
-                .all(|v| *v == 2.0)
-        );
+        assert!(values(preprocess(x, 8, &normalization)).iter().all(|v| *v == 2.0));
     }
 }

@@ -58,13 +58,7 @@ struct AttentionPool {
 
 impl ResNet {
     /// Lays out the tower; `embed_dim` is the width of its features.
-    pub fn new(
-        vision: &VisionConfig,
-        layers: [usize; 4],
-        heads: usize,
-        embed_dim: usize,
-        device: &Device,
-    ) -> Self {
+    pub fn new(vision: &VisionConfig, layers: [usize; 4], heads: usize, embed_dim: usize, device: &Device) -> Self {
         let width = vision.width;
         let norm = |channels| BatchNormConfig::new(channels).init(device);
         let mut channels = width;
@@ -89,13 +83,7 @@ impl ResNet {
             layer2: stage(1),
             layer3: stage(2),
             layer4: stage(3),
-            attnpool: AttentionPool::new(
-                vision.image_size / 32,
-                width * 32,
-                heads,
-                embed_dim,
-                device,
-            ),
+            attnpool: AttentionPool::new(vision.image_size / 32, width * 32, heads, embed_dim, device),
         }
     }
 
@@ -133,9 +121,7 @@ impl Bottleneck {
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let y = relu(self.bn1.forward(self.conv1.forward(x.clone())));
         let y = relu(self.bn2.forward(self.conv2.forward(y)));
-        let y = self
-            .bn3
-            .forward(self.conv3.forward(average_pool(y, self.stride)));
+        let y = self.bn3.forward(self.conv3.forward(average_pool(y, self.stride)));
         let shortcut = match &self.downsample {
             Some((conv, norm)) => norm.forward(conv.forward(average_pool(x, self.stride))),
             None => x,
@@ -162,13 +148,9 @@ impl AttentionPool {
         let [batch, width, h, w] = x.dims();
         let positions = x.reshape([batch, width, h * w]).swap_dims(1, 2);
         let mean = positions.clone().mean_dim(1);
-        let tokens =
-            Tensor::cat(vec![mean, positions], 1) + self.positional_embedding.val().unsqueeze();
+        let tokens = Tensor::cat(vec![mean, positions], 1) + self.positional_embedding.val().unsqueeze();
         let query = self.q_proj.forward(tokens.clone().slice([0..batch, 0..1]));
-        let (keys, values) = (
-            self.k_proj.forward(tokens.clone()),
-            self.v_proj.forward(tokens),
-        );
+        let (keys, values) = (self.k_proj.forward(tokens.clone()), self.v_proj.forward(tokens));
         let pooled = attention(query, keys, values, self.heads, None);
         self.c_proj.forward(pooled.reshape([batch, width]))
     }

@@ -63,9 +63,7 @@ impl TensorFile {
         };
         let length = bytes.seek(SeekFrom::End(0)).map_err(io)?;
         if length < 8 {
-            return Err(bad(format!(
-                "is {length} bytes, too short for a safetensors file"
-            )));
+            return Err(bad(format!("is {length} bytes, too short for a safetensors file")));
         }
         bytes.rewind().map_err(io)?;
         let mut word = [0; 8];
@@ -79,8 +77,7 @@ impl TensorFile {
         let mut text = vec![0; header as usize];
         bytes.read_exact(&mut text).map_err(io)?;
         // The deserialiser checks that offsets are gapless and agree with shapes and types.
-        let metadata: Metadata =
-            serde_json::from_slice(&text).map_err(|e| bad(format!("safetensors header: {e}")))?;
+        let metadata: Metadata = serde_json::from_slice(&text).map_err(|e| bad(format!("safetensors header: {e}")))?;
         let (expected, found) = (metadata.data_len() as u64, length - 8 - header);
         if expected != found {
             return Err(bad(format!(
@@ -155,20 +152,9 @@ impl TensorSource for TensorFile {
         read.map_err(io)?;
         let pairs = raw.as_chunks::<2>().0;
         let values: Vec<f32> = match info.dtype {
-            Dtype::F16 => pairs
-                .iter()
-                .map(|b| half::f16::from_le_bytes(*b).to_f32())
-                .collect(),
-            Dtype::BF16 => pairs
-                .iter()
-                .map(|b| half::bf16::from_le_bytes(*b).to_f32())
-                .collect(),
-            _ => raw
-                .as_chunks::<4>()
-                .0
-                .iter()
-                .map(|b| f32::from_le_bytes(*b))
-                .collect(),
+            Dtype::F16 => pairs.iter().map(|b| half::f16::from_le_bytes(*b).to_f32()).collect(),
+            Dtype::BF16 => pairs.iter().map(|b| half::bf16::from_le_bytes(*b).to_f32()).collect(),
+            _ => raw.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
         };
         match values.iter().position(|v| !v.is_finite()) {
             Some(i) => Err(bad(format!("tensor {tensor} has {} at {i}", values[i]))),

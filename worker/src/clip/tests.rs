@@ -12,12 +12,7 @@ const TRANSFORMER: &str = r#"{"embed_dim": 8, "vision_cfg": {"image_size": 32, "
     "head_width": 8}, "text_cfg": {"context_length": 6, "vocab_size": 20, "width": 8, "heads": 2, "layers": 1}}"#;
 
 fn model(json: &str, device: &Device) -> ClipModel {
-    ClipModel::init(
-        &ClipConfig::parse("test", json).unwrap(),
-        Parts::Both,
-        device,
-        7,
-    )
+    ClipModel::init(&ClipConfig::parse("test", json).unwrap(), Parts::Both, device, 7)
 }
 
 fn saved(json: &str) -> TempDir {
@@ -95,10 +90,7 @@ fn another_architecture_is_refused_in_one_line() {
     let dir = saved(RESNET);
     std::fs::write(dir.path().join("config.json"), TRANSFORMER).unwrap();
     let found = reason(&dir);
-    assert!(
-        found.contains("more tensors") && found.len() < 600,
-        "{found}"
-    );
+    assert!(found.contains("more tensors") && found.len() < 600, "{found}");
 }
 
 #[test]
@@ -113,9 +105,7 @@ fn integers_and_values_that_are_not_finite_are_refused() {
 
     let path = dir.path().join("model.safetensors");
     let (mut poisoned, scale) = (model(TRANSFORMER, &Device::flex()), [f32::NAN]);
-    poisoned.logit_scale = poisoned
-        .logit_scale
-        .map(|t| Tensor::from_floats(scale, &t.device()));
+    poisoned.logit_scale = poisoned.logit_scale.map(|t| Tensor::from_floats(scale, &t.device()));
     assert!(
         poisoned
             .save(&path, Precision::F32)
@@ -167,33 +157,16 @@ fn half_precision_loses_little_and_both_reload() {
     let half = load(dir.path()).unwrap();
     assert_ne!(whole.hash, half.hash);
     let pictures = noise([2, 3, 40, 20], &Device::flex());
-    let (a, b) = (
-        whole.image_features(pictures.clone()),
-        half.image_features(pictures),
-    );
+    let (a, b) = (whole.image_features(pictures.clone()), half.image_features(pictures));
     let cosine = values((a.clone() * b).sum_dim(1));
-    assert!(
-        cosine.iter().all(|c| (0.999..1.001).contains(c)),
-        "{cosine:?}"
-    );
-    assert!(
-        values(a.square().sum_dim(1))
-            .iter()
-            .all(|l| (l - 1.0).abs() < 1e-5)
-    );
+    assert!(cosine.iter().all(|c| (0.999..1.001).contains(c)), "{cosine:?}");
+    assert!(values(a.square().sum_dim(1)).iter().all(|l| (l - 1.0).abs() < 1e-5));
 }
 
 #[test]
 fn the_same_seed_gives_the_same_weights() {
     let pictures = noise([1, 3, 32, 32], &Device::flex());
-    let [a, b] = [0, 1].map(|_| {
-        values(
-            model(RESNET, &Device::flex())
-                .visual
-                .unwrap()
-                .forward(pictures.clone()),
-        )
-    });
+    let [a, b] = [0, 1].map(|_| values(model(RESNET, &Device::flex()).visual.unwrap().forward(pictures.clone())));
     assert_eq!(a, b);
     let config = ClipConfig::parse("test", RESNET).unwrap();
     let other = ClipModel::init(&config, Parts::Image, &Device::flex(), 8);
@@ -214,8 +187,7 @@ fn a_loaded_model_is_frozen_and_differentiable_in_its_input() {
         let gradient = x.grad(&score(x.clone()).backward()).unwrap().into_data();
         let gradient: Tensor<4> = Tensor::from_data(gradient, &Device::flex());
         // Along a fixed direction: single pixels would drown in rounding.
-        let direction =
-            noise([1, 3, 48, 48], &Device::flex()).sub_scalar(0.3) * gradient.clone().sign();
+        let direction = noise([1, 3, 48, 48], &Device::flex()).sub_scalar(0.3) * gradient.clone().sign();
         let step = 1e-3;
         let at = |s: f64| values(score(plain.clone() + direction.clone().mul_scalar(s)))[0] as f64;
         let numeric = (at(step) - at(-step)) / (2.0 * step);
@@ -227,10 +199,7 @@ fn a_loaded_model_is_frozen_and_differentiable_in_its_input() {
 
         let trained = Clip::load(dir.path(), &device, Parts::Both).unwrap();
         let gradients = trained.image_features(x.clone()).sum().backward();
-        assert_eq!(
-            GradientsParams::from_grads(gradients, trained.model()).len(),
-            0
-        );
+        assert_eq!(GradientsParams::from_grads(gradients, trained.model()).len(), 0);
     }
 }
 
@@ -238,11 +207,7 @@ fn a_loaded_model_is_frozen_and_differentiable_in_its_input() {
 fn training_uses_and_follows_the_statistics_of_the_batch() {
     let device = Device::flex().autodiff();
     let model = model(RESNET, &device);
-    let pictures = Tensor::<4>::random(
-        [8, 3, 32, 32],
-        Distribution::Normal(3.0, 2.0),
-        &Device::flex(),
-    );
+    let pictures = Tensor::<4>::random([8, 3, 32, 32], Distribution::Normal(3.0, 2.0), &Device::flex());
     let tracked = Tensor::from_data(pictures.to_data(), &device);
     let tower = |m: &ClipModel, x: Tensor<4>| m.visual.as_ref().unwrap().forward(x);
 
@@ -267,12 +232,7 @@ fn training_uses_and_follows_the_statistics_of_the_batch() {
     );
     // A frozen model leaves them alone, on the same device.
     let frozen = model.clone().freeze();
-    let gap = |a: Vec<f32>, b: &[f32]| {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f32::max)
-    };
+    let gap = |a: Vec<f32>, b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(gap(values(tower(&frozen, tracked.clone())), &after) < 1e-4);
 
     let loss = tower(&model, tracked).square().mean();

@@ -40,6 +40,11 @@ impl TextTransformer {
         }
     }
 
+    /// The embedding of every token, `[vocab_size, width]`.
+    pub fn token_embedding(&self) -> Tensor<2> {
+        self.token_embedding.weight.val()
+    }
+
     /// Features `[batch, embed_dim]` of token ids `[batch, n]`, each below `vocab_size`, `n` at most `context_length`.
     ///
     /// Nothing after the end token changes a feature, so sequences may be cut after the last end token.
@@ -54,9 +59,7 @@ impl TextTransformer {
             .select(0, tokens.reshape([batch * length]))
             .reshape([batch, length, width]);
         let positions = self.positional_embedding.val().narrow(0, 0, length);
-        let x = self
-            .transformer
-            .forward(embedded + positions.unsqueeze(), true);
+        let x = self.transformer.forward(embedded + positions.unsqueeze(), true);
         let rows = ends + counting(batch, &x.device()).mul_scalar(length as i64);
         let x = x.reshape([batch * length, width]).select(0, rows);
         self.ln_final.forward(x).matmul(self.text_projection.val())
@@ -72,9 +75,7 @@ fn end_positions(tokens: Tensor<2, Int>, end: EndToken) -> Tensor<1, Int> {
     };
     // Backends differ in which of equal values is the largest, so earlier positions are made larger.
     let device = score.device();
-    let earlier = counting(length, &device)
-        .mul_scalar(-1)
-        .add_scalar(length as i64 - 1);
+    let earlier = counting(length, &device).mul_scalar(-1).add_scalar(length as i64 - 1);
     let score = score.cast(IntDType::I32).mul_scalar(length as i64) + earlier.unsqueeze();
     score.argmax(1).reshape([batch]).cast(IntDType::I32)
 }

@@ -43,9 +43,7 @@ impl Transformer {
     /// Lays out the blocks for tokens of `width`.
     pub fn new(width: usize, config: &BlockConfig, device: &Device) -> Self {
         Self {
-            resblocks: (0..config.layers)
-                .map(|_| Block::new(width, config, device))
-                .collect(),
+            resblocks: (0..config.layers).map(|_| Block::new(width, config, device)).collect(),
         }
     }
 
@@ -92,11 +90,7 @@ impl Attention {
         let [q, k, v] = [0, 1, 2].map(|i| {
             let columns = i * width..(i + 1) * width;
             let bias = bias.clone().slice([columns.clone()]);
-            linear(
-                x.clone(),
-                weight.clone().slice([0..width, columns]),
-                Some(bias),
-            )
+            linear(x.clone(), weight.clone().slice([0..width, columns]), Some(bias))
         });
         self.out_proj.forward(attention(q, k, v, self.heads, mask))
     }
@@ -104,18 +98,11 @@ impl Attention {
 
 /// Multi-head scaled dot-product attention: queries `[b, n, w]`, keys and values `[b, m, w]`, `mask` (added to the
 /// scores) `[1, 1, n, m]`; gives `[b, n, w]` with the heads side by side.
-pub(super) fn attention(
-    q: Tensor<3>,
-    k: Tensor<3>,
-    v: Tensor<3>,
-    heads: usize,
-    mask: Option<&Tensor<4>>,
-) -> Tensor<3> {
+pub(super) fn attention(q: Tensor<3>, k: Tensor<3>, v: Tensor<3>, heads: usize, mask: Option<&Tensor<4>>) -> Tensor<3> {
     let [batch, queries, width] = q.dims();
     let split = |t: Tensor<3>| {
         let tokens = t.dims()[1];
-        t.reshape([batch, tokens, heads, width / heads])
-            .swap_dims(1, 2)
+        t.reshape([batch, tokens, heads, width / heads]).swap_dims(1, 2)
     };
     let scale = 1.0 / ((width / heads) as f64).sqrt();
     let scores = split(q.mul_scalar(scale)).matmul(split(k).swap_dims(2, 3));
@@ -151,7 +138,5 @@ pub(super) fn layer_norm(width: usize, config: &BlockConfig, device: &Device) ->
 
 /// Zero where a key may be seen, hugely negative (not infinite, which shaders need not support) where it may not.
 fn causal_mask(tokens: usize, device: &Device) -> Tensor<4> {
-    Tensor::<2>::full([tokens, tokens], -1e9, device)
-        .triu(1)
-        .unsqueeze()
+    Tensor::<2>::full([tokens, tokens], -1e9, device).triu(1).unsqueeze()
 }

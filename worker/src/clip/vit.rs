@@ -58,8 +58,7 @@ impl VisionTransformer {
             .val()
             .reshape([1, 1, width])
             .expand([batch, 1, width]);
-        let tokens =
-            Tensor::cat(vec![class, patches], 1) + self.positional_embedding.val().unsqueeze();
+        let tokens = Tensor::cat(vec![class, patches], 1) + self.positional_embedding.val().unsqueeze();
         let tokens = self.transformer.forward(self.ln_pre.forward(tokens), false);
         let class = tokens.slice([0..batch, 0..1]).reshape([batch, width]);
         self.ln_post.forward(class).matmul(self.proj.val())
@@ -79,9 +78,7 @@ impl PatchEmbedding {
             .reshape([batch, rows * columns, channels * patch * patch]);
         linear(
             patches,
-            weight
-                .reshape([width, channels * patch * patch])
-                .transpose(),
+            weight.reshape([width, channels * patch * patch]).transpose(),
             None,
         )
     }

@@ -90,10 +90,7 @@ impl Plan {
                     text || name == "logit_scale"
                 })
         };
-        let unused = tensors
-            .into_iter()
-            .filter(|(name, _)| wanted(name))
-            .collect();
+        let unused = tensors.into_iter().filter(|(name, _)| wanted(name)).collect();
         Self {
             walk: Walk::default(),
             layout,
@@ -153,9 +150,8 @@ impl ModuleVisitor for Plan {
                 Some(found) if found.is_empty() && expected == [1] => {}
                 Some(found) if found == expected => {}
                 Some(found) => {
-                    self.problems.push(format!(
-                        "tensor {name} has shape {found:?}, expected {expected:?}"
-                    ));
+                    self.problems
+                        .push(format!("tensor {name} has shape {found:?}, expected {expected:?}"));
                 }
             }
         }

@@ -89,10 +89,7 @@ impl Penalty {
             0 => 0.0, // no Gaussians, or no coefficients beyond the constant one
             count => f64::from(weight) / count as f64,
         };
-        [
-            over(self.dc, 3 * rows),
-            over(self.rest, (stride - 3) * rows),
-        ]
+        [over(self.dc, 3 * rows), over(self.rest, (stride - 3) * rows)]
     }
 }
 
@@ -120,22 +117,14 @@ impl Adam {
 
     /// One step on the rows that are `seen`; rates are multiplied by `rate`. The penalty's gradient is added to
     /// `gradient`, which is all zero afterwards in these rows. Rows not seen keep their offsets, which are 0.
-    pub fn step(
-        &mut self,
-        rate: f32,
-        penalty: Penalty,
-        seen: &[bool],
-        offsets: &mut [f32],
-        gradient: &mut [f32],
-    ) {
+    pub fn step(&mut self, rate: f32, penalty: Penalty, seen: &[bool], offsets: &mut [f32], gradient: &mut [f32]) {
         self.steps = self.steps.saturating_add(1);
         let (o, stride) = (self.options, self.stride);
         let [dc, rest] = penalty.scales(seen.len(), stride).map(|s| 2.0 * s as f32);
         let correction = |beta: f32| 1.0 - f64::from(beta).powi(self.steps);
         let root = correction(o.beta2).sqrt() as f32;
         let scale = f64::from(rate) / correction(o.beta1);
-        let [rate_dc, rate_rest] =
-            [o.rate_dc, o.rate_rest].map(|rate| (f64::from(rate) * scale) as f32);
+        let [rate_dc, rate_rest] = [o.rate_dc, o.rate_rest].map(|rate| (f64::from(rate) * scale) as f32);
         let size = CHUNK * stride;
         (
             seen.par_chunks(CHUNK),
@@ -149,11 +138,7 @@ impl Adam {
                 for row in (0..seen.len()).filter(|row| seen[*row]) {
                     for k in 0..stride {
                         let at = row * stride + k;
-                        let (rate, pull) = if k < 3 {
-                            (rate_dc, dc)
-                        } else {
-                            (rate_rest, rest)
-                        };
+                        let (rate, pull) = if k < 3 { (rate_dc, dc) } else { (rate_rest, rest) };
                         let g = gradient[at] + pull * offsets[at];
                         gradient[at] = 0.0;
                         mean[at] = o.beta1 * mean[at] + (1.0 - o.beta1) * g;
@@ -191,11 +176,7 @@ mod tests {
         assert!((offsets[0] + 0.1).abs() < 1e-6 && (offsets[3] + 0.01).abs() < 1e-7);
         step(-2.0, &mut offsets);
         let second = 0.1 * (0.11 / 0.19) / (0.004_999_f32 / 0.001_999).sqrt();
-        assert!(
-            (offsets[0] - (-0.1 + second)).abs() < 1e-6,
-            "{}",
-            offsets[0]
-        );
+        assert!((offsets[0] - (-0.1 + second)).abs() < 1e-6, "{}", offsets[0]);
         assert!((offsets[3] - 0.1 * (-0.1 + second)).abs() < 1e-7);
         assert_eq!(offsets[1], 0.0);
     }

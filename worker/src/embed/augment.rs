@@ -32,12 +32,7 @@ impl Default for Augmentation {
 
 impl Augmentation {
     pub(super) fn check(&self) -> Result<()> {
-        within(
-            "augmentation.brightness",
-            f64::from(self.brightness),
-            0.0,
-            0.9,
-        )?;
+        within("augmentation.brightness", f64::from(self.brightness), 0.0, 0.9)?;
         within("augmentation.scale", f64::from(self.scale), 0.0, 0.9)?;
         within("augmentation.shift", f64::from(self.shift), 0.0, 0.5)
     }
@@ -53,22 +48,16 @@ impl Augmentation {
         let mut x = pictures;
         if self.scale > 0.0 || self.shift > 0.0 {
             let matrices = |side: usize, axis: usize| {
-                let values = draws.iter().flat_map(|d| {
-                    resample(side, 1.0 + self.scale * d[1], self.shift * d[2 + axis])
-                });
+                let values = draws
+                    .iter()
+                    .flat_map(|d| resample(side, 1.0 + self.scale * d[1], self.shift * d[2 + axis]));
                 let values: Vec<f32> = values.collect();
                 Tensor::<3>::from_data(TensorData::new(values, [b, side, side]), &device)
             };
             // Along x for all rows of a picture at once, then the same along y on the transposed picture.
-            x = x
-                .reshape([b, c * h, w])
-                .matmul(matrices(w, 0))
-                .reshape([b, c, h, w]);
+            x = x.reshape([b, c * h, w]).matmul(matrices(w, 0)).reshape([b, c, h, w]);
             let turned = x.swap_dims(2, 3).reshape([b, c * w, h]);
-            x = turned
-                .matmul(matrices(h, 1))
-                .reshape([b, c, w, h])
-                .swap_dims(2, 3);
+            x = turned.matmul(matrices(h, 1)).reshape([b, c, w, h]).swap_dims(2, 3);
         }
         if self.brightness > 0.0 {
             let factors: Vec<f32> = draws.iter().map(|d| 1.0 + self.brightness * d[0]).collect();
@@ -104,9 +93,7 @@ mod tests {
     use super::*;
 
     fn ramp(b: usize, h: usize, w: usize) -> Tensor<4> {
-        let values: Vec<f32> = (0..b * 3 * h * w)
-            .map(|i| (i % w) as f32 / w as f32)
-            .collect();
+        let values: Vec<f32> = (0..b * 3 * h * w).map(|i| (i % w) as f32 / w as f32).collect();
         Tensor::from_data(TensorData::new(values, [b, 3, h, w]), &Device::flex())
     }
 
@@ -136,8 +123,7 @@ mod tests {
             scale: 0.0,
             shift: 0.0,
         };
-        let run =
-            |a: &Augmentation, seed| host(a.apply(x.clone(), &mut ChaCha8Rng::seed_from_u64(seed)));
+        let run = |a: &Augmentation, seed| host(a.apply(x.clone(), &mut ChaCha8Rng::seed_from_u64(seed)));
         assert_eq!(run(&none, 1), host(x.clone()));
         let some = Augmentation::default();
         assert_eq!(run(&some, 1), run(&some, 1));
@@ -154,8 +140,6 @@ mod tests {
             1,
         );
         let ratio = bright[1] / host(x.clone())[1];
-        assert!(
-            (bright[2] / host(x.clone())[2] - ratio).abs() < 1e-5 && (ratio - 1.0).abs() > 0.01
-        );
+        assert!((bright[2] / host(x.clone())[2] - ratio).abs() < 1e-5 && (ratio - 1.0).abs() > 0.01);
     }
 }

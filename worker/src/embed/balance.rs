@@ -80,8 +80,7 @@ impl Balancer {
         // The first steps have nearly identical pictures; a cap keeps them from ruling the mean.
         let now = [psnr_db.min(b.target_psnr_db + 10.0), bit_accuracy];
         let before = self.running.unwrap_or(now);
-        let running: [f64; 2] =
-            std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
+        let running: [f64; 2] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
         self.running = Some(running);
         if running[0] < b.target_psnr_db {
             self.factor *= b.rate;

@@ -36,11 +36,7 @@ impl HeldOut {
             view.reference = view.reference.to_8_bit();
             Ok(view)
         })?;
-        Ok(Self {
-            stop,
-            views,
-            passed: 0,
-        })
+        Ok(Self { stop, views, passed: 0 })
     }
 
     /// Whether this step is one to look after.
@@ -75,9 +71,8 @@ impl HeldOut {
             margin: reading.margin(message),
         };
         let stop = &self.stop;
-        let holds = check.bit_accuracy >= stop.bit_accuracy
-            && check.margin >= stop.margin
-            && check.psnr_db >= stop.psnr_db;
+        let holds =
+            check.bit_accuracy >= stop.bit_accuracy && check.margin >= stop.margin && check.psnr_db >= stop.psnr_db;
         self.passed = if holds { self.passed + 1 } else { 0 };
         let enough = self.passed >= stop.patience && step >= stop.min_steps;
         Ok((check, enough))

@@ -79,8 +79,7 @@ impl<'a> Loss<'a> {
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, device);
         let message = bce_from_logits(logits.clone(), Tensor::from_inner(targets));
-        let total =
-            reconstruction * (lambda.reconstruction * factor) + message.clone() * lambda.message;
+        let total = reconstruction * (lambda.reconstruction * factor) + message.clone() * lambda.message;
 
         // One transfer for all terms.
         let mut parts = vec![l1, ssim, message];
@@ -101,11 +100,7 @@ impl<'a> Loss<'a> {
             reason: "the loss has no gradient to the pictures".into(),
         })?;
         let gradients = unbatch(gradient)?;
-        let sum: f32 = gradients
-            .iter()
-            .flat_map(|g| &g.pixels)
-            .map(|g| g.abs())
-            .sum();
+        let sum: f32 = gradients.iter().flat_map(|g| &g.pixels).map(|g| g.abs()).sum();
         finite(step, "gradient", sum)?;
         let logits = self.engine.to_host(logits.inner())?;
         let right = logits

@@ -10,8 +10,7 @@ use crate::error::{Error, Result};
 use crate::message::key::Secret;
 use crate::message::tokens::hmac_sha256;
 use crate::message::{
-    CONTEXT, ClipIdentity, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit,
-    train, training,
+    CONTEXT, ClipIdentity, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit, train, training,
 };
 use crate::picture::Picture;
 
@@ -53,36 +52,22 @@ pub fn create_key(
         None => Secret::random()?,
     };
     let table = TokenTable::new(secret.expose(), options.bits)?;
-    let mut encode =
-        |sequences: &[[i64; CONTEXT]]| text_features(clip, compute, options.bits, sequences);
+    let mut encode = |sequences: &[[i64; CONTEXT]]| text_features(clip, compute, options.bits, sequences);
 
     let images = natural::features(clip, compute, pictures, |done| {
         progress(NewKey::Pictures(done, natural::count()));
     })?;
-    let projection = fit_projection(
-        &secret,
-        &table,
-        &images,
-        clip.dim(),
-        projection,
-        &mut encode,
-    )?;
+    let projection = fit_projection(&secret, &table, &images, clip.dim(), projection, &mut encode)?;
 
     // The training's seed follows from the secret, so that one seed decides the whole file.
-    let [a, b, c, d, e, f, g, h, ..] =
-        hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
+    let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
     let training = training::TrainingOptions {
         seed: u64::from_le_bytes([a, b, c, d, e, f, g, h]),
         ..options.training.clone()
     };
-    let trained = train(
-        &table,
-        &projection,
-        encode,
-        &training,
-        &compute.device,
-        |p| progress(NewKey::Decoder(p)),
-    )?;
+    let trained = train(&table, &projection, encode, &training, &compute.device, |p| {
+        progress(NewKey::Decoder(p))
+    })?;
     Ok(Key {
         secret,
         seed: options.seed,
@@ -102,10 +87,7 @@ fn fit_projection(
     options: FitOptions,
     encode: &mut impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
 ) -> Result<Projection> {
-    let mut rng = ChaCha20Rng::from_seed(hmac_sha256(
-        secret.expose(),
-        &[b"guardsplat projection messages v1"],
-    ));
+    let mut rng = ChaCha20Rng::from_seed(hmac_sha256(secret.expose(), &[b"guardsplat projection messages v1"]));
     let sequences = (0..FITTED_MESSAGES)
         .map(|_| table.sequence(&Message::random(table.bits(), &mut rng)?))
         .collect::<Result<Vec<_>>>()?;
@@ -117,18 +99,9 @@ fn fit_projection(
 }
 
 /// Features of token sequences. What follows the end token has no influence and is cut off.
-fn text_features(
-    clip: &Clip,
-    compute: &Compute,
-    bits: usize,
-    sequences: &[[i64; CONTEXT]],
-) -> Result<Vec<f32>> {
+fn text_features(clip: &Clip, compute: &Compute, bits: usize, sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
     let length = bits + 2;
-    let tokens: Vec<i64> = sequences
-        .iter()
-        .flat_map(|s| &s[..length])
-        .copied()
-        .collect();
+    let tokens: Vec<i64> = sequences.iter().flat_map(|s| &s[..length]).copied().collect();
     let tokens = TensorData::new(tokens, [sequences.len(), length]);
     let tokens = Tensor::<2, Int>::from_data(tokens, &compute.device);
     let features = clip.text_features(tokens).try_into_vec_as::<f32>();
@@ -141,10 +114,7 @@ fn text_features(
 fn check_text_tower(clip: &Clip, identity: &ClipIdentity, bits: usize) -> Result<()> {
     let text = &clip.config.text;
     let reason = if text.vocab_size < 49408 {
-        format!(
-            "its vocabulary has {} tokens, keys use 49408",
-            text.vocab_size
-        )
+        format!("its vocabulary has {} tokens, keys use 49408", text.vocab_size)
     } else if text.context_length < bits + 2 {
         format!(
             "its texts have {} tokens, {bits} bits need {}",

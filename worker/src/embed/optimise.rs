@@ -161,13 +161,8 @@ impl<'a> Run<'a> {
         figures.terms.offset = penalty.value(&self.offsets, stride) as f32;
         finite(step, "offset", figures.terms.offset)?;
         let rate = self.rate(step);
-        self.adam.step(
-            rate,
-            penalty,
-            &self.seen,
-            &mut self.offsets,
-            &mut self.gradient,
-        );
+        self.adam
+            .step(rate, penalty, &self.seen, &mut self.offsets, &mut self.gradient);
         self.balancer.update(figures.psnr_db, figures.bit_accuracy);
         timing.lap(Stage::Adam);
         Ok(figures)
@@ -175,20 +170,12 @@ impl<'a> Run<'a> {
 
     /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
     /// `self.gradient`.
-    fn differentiate(
-        &mut self,
-        step: usize,
-        views: &[Arc<PooledView>],
-        timing: &mut Timing,
-    ) -> Result<Step> {
+    fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut Timing) -> Result<Step> {
         let (engine, scene) = (self.engine, self.gaussians);
         let offsets = &self.offsets;
-        let colours = engine.each(views, |v| {
-            Ok(sh::colours(&scene.sh, Some(offsets), &v.view))
-        })?;
+        let colours = engine.each(views, |v| Ok(sh::colours(&scene.sh, Some(offsets), &v.view)))?;
         timing.lap(Stage::Colours);
-        let drawn: Vec<(&PooledView, &Vec<f32>)> =
-            views.iter().map(AsRef::as_ref).zip(&colours).collect();
+        let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
         let pictures = engine.each(&drawn, |(v, colours)| {
             engine.rasterizer.render(&v.view, colours, v.background)
         })?;
@@ -198,17 +185,11 @@ impl<'a> Run<'a> {
         let pictures: Vec<&Picture> = pictures.iter().collect();
         let balance = self.balancer.factor();
         let rng = &mut self.augmentation;
-        let found = self
-            .loss
-            .evaluate(step, &pictures, &references, balance, rng)?;
+        let found = self.loss.evaluate(step, &pictures, &references, balance, rng)?;
         let psnr_db = mean_psnr(&references, &pictures);
         timing.lap(Stage::Loss);
 
-        let drawn: Vec<(&PooledView, &Picture)> = views
-            .iter()
-            .map(AsRef::as_ref)
-            .zip(&found.gradients)
-            .collect();
+        let drawn: Vec<(&PooledView, &Picture)> = views.iter().map(AsRef::as_ref).zip(&found.gradients).collect();
         let gradients = engine.each(&drawn, |(v, gradient)| {
             engine.rasterizer.backward(&v.view, &gradient.pixels)
         })?;
@@ -315,10 +296,7 @@ mod tests {
                 run.gradient.fill(0.0);
                 // The same augmentation every time.
                 run.augmentation = ChaCha8Rng::seed_from_u64(4);
-                let t = run
-                    .differentiate(1, &views, &mut Timing::new())
-                    .unwrap()
-                    .terms;
+                let t = run.differentiate(1, &views, &mut Timing::new()).unwrap().terms;
                 let l = &settings.lambda;
                 let reconstruction = l.l1 * t.l1 + l.ssim * t.ssim;
                 let loss = l.message * t.message + l.reconstruction * reconstruction;
@@ -334,10 +312,7 @@ mod tests {
             let step = 0.02;
             let slope = (moved(step) - moved(-step)) / (2.0 * f64::from(step));
             let ratio = slope / f64::from(length);
-            assert!(
-                (ratio - 1.0).abs() < 0.02,
-                "{message_weight} {weight}: {ratio}"
-            );
+            assert!((ratio - 1.0).abs() < 0.02, "{message_weight} {weight}: {ratio}");
         }
     }
 }

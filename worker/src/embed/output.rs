@@ -49,50 +49,29 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Whatever reading, optimising, verifying and writing may fail with; the output is then as it was before.
-pub fn embed(
-    engine: &Engine,
-    job: &Job<'_>,
-    progress: &mut dyn FnMut(Progress),
-) -> Result<Outcome> {
+pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     job.settings.check()?;
     let scene = Scene::read(job.input)?;
     let aside = reserve(job, &scene)?;
-    let optimised = optimise(
-        engine,
-        &scene.gaussians,
-        job.message,
-        job.settings,
-        progress,
-    )?;
+    let optimised = optimise(engine, &scene.gaussians, job.message, job.settings, progress)?;
 
     progress(Progress::Writing);
     let colours = optimised.colours(&scene.gaussians.sh);
     // The new file is complete before it replaces the reserved one, so free that one's space first.
     std::fs::write(&aside, []).map_err(Error::io(job.output))?;
-    scene
-        .write(&aside, &colours)
-        .map_err(|e| named(e, job.output))?;
+    scene.write(&aside, &colours).map_err(|e| named(e, job.output))?;
     drop(colours);
-    let marked = Scene::read(&aside)
-        .map_err(|e| named(e, job.output))?
-        .gaussians;
+    let marked = Scene::read(&aside).map_err(|e| named(e, job.output))?.gaussians;
     check_geometry(job.output, &scene, &marked)?;
 
     let total = job.settings.verify.views;
-    let verification = verify(
-        engine,
-        &scene.gaussians,
-        &marked,
-        job.message,
-        job.settings,
-        |done| progress(Progress::Verifying { done, total }),
-    )?;
+    let verification = verify(engine, &scene.gaussians, &marked, job.message, job.settings, |done| {
+        progress(Progress::Verifying { done, total })
+    })?;
     let missed = verification.missed(&job.settings.target);
     let written = missed.is_empty() || job.force;
     if written {
-        aside
-            .persist(job.output)
-            .map_err(|e| Error::io(job.output)(e.error))?;
+        aside.persist(job.output).map_err(|e| Error::io(job.output)(e.error))?;
     }
     let stride = scene.gaussians.sh.per_gaussian();
     let rows = optimised.offsets.chunks_exact(stride);
@@ -110,11 +89,7 @@ pub fn embed(
 /// A file beside the output that holds as much as the output will. A folder that is missing, read-only or full is
 /// thereby known before the work, not after it. It is deleted when dropped.
 fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
-    let refuse = |reason: &str| {
-        Err(Error::io(job.output)(std::io::Error::other(
-            reason.to_owned(),
-        )))
-    };
+    let refuse = |reason: &str| Err(Error::io(job.output)(std::io::Error::other(reason.to_owned())));
     match std::fs::metadata(job.output) {
         Ok(there) if !there.is_file() => return refuse("exists and is not a regular file"),
         Ok(_) if same_file(job.input, job.output) => {
@@ -169,8 +144,7 @@ fn check_geometry(output: &Path, scene: &Scene, marked: &crate::scene::Gaussians
     }
     Err(Error::BadScene {
         path: output.into(),
-        reason: "the file reads back with other geometry than was written; the disk may be failing"
-            .into(),
+        reason: "the file reads back with other geometry than was written; the disk may be failing".into(),
     })
 }
 

@@ -25,12 +25,7 @@ pub(super) struct PooledView {
 }
 
 impl PooledView {
-    pub fn new(
-        engine: &Engine,
-        gaussians: &Gaussians,
-        camera: &Camera,
-        background: [f32; 3],
-    ) -> Result<Self> {
+    pub fn new(engine: &Engine, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Self> {
         let cache = engine.weight_cache(camera.width);
         let view = prepare(gaussians, camera, cache)?;
         let reference = engine.draw(gaussians, None, &view, background)?;
@@ -70,11 +65,7 @@ impl Pool {
 
     /// The views of the next step; the first `fresh` of them are new. There are more fresh ones than the settings say
     /// while the pool does not hold enough others.
-    pub fn batch(
-        &mut self,
-        engine: &Engine,
-        gaussians: &Gaussians,
-    ) -> Result<(Vec<Arc<PooledView>>, usize)> {
+    pub fn batch(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<(Vec<Arc<PooledView>>, usize)> {
         let s = &self.settings;
         let old = (s.views_per_step - s.fresh_per_step).min(self.kept.len());
         let fresh = s.views_per_step - old;

@@ -248,8 +248,7 @@ impl Settings {
             field: "settings",
             reason: e.to_string(),
         };
-        let changes: serde_json::Map<String, serde_json::Value> =
-            serde_json::from_str(json).map_err(bad)?;
+        let changes: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json).map_err(bad)?;
         let mut all = serde_json::to_value(self).map_err(bad)?;
         merge(&mut all, serde_json::Value::Object(changes));
         let settings: Settings = serde_json::from_value(all).map_err(bad)?;
@@ -262,8 +261,7 @@ impl Settings {
     /// # Errors
     /// [`Error::BadOption`] naming the setting and its limits.
     pub fn check(&self) -> Result<()> {
-        let count =
-            |field, value: usize, most: usize| within(field, value as f64, 1.0, most as f64);
+        let count = |field, value: usize, most: usize| within(field, value as f64, 1.0, most as f64);
         count("steps", self.steps, 10_000_000)?;
         count("views_per_step", self.views_per_step, 1024)?;
         within(
@@ -274,12 +272,7 @@ impl Settings {
         )?;
         count("pool_views", self.pool_views, 1_000_000)?;
         within("size", f64::from(self.size), 16.0, 4096.0)?;
-        within(
-            "black_backgrounds",
-            f64::from(self.black_backgrounds),
-            0.0,
-            1.0,
-        )?;
+        within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         let l = &self.lambda;
         for (field, value) in [
             ("lambda.reconstruction", l.reconstruction),
@@ -303,11 +296,7 @@ impl Settings {
             count("early_stop.patience", stop.patience, usize::MAX)?;
         }
         count("verify.views", self.verify.views, 1000)?;
-        count(
-            "verify.message_views",
-            self.verify.message_views,
-            self.verify.views,
-        )?;
+        count("verify.message_views", self.verify.message_views, self.verify.views)?;
         if let Some(size) = self.verify.size {
             within("size", f64::from(size), 16.0, 4096.0)?;
         }
@@ -344,8 +333,7 @@ mod tests {
 
     #[test]
     fn presets_are_valid_and_grow() {
-        let [draft, standard, paper] =
-            [Preset::Draft, Preset::Standard, Preset::Paper].map(Preset::settings);
+        let [draft, standard, paper] = [Preset::Draft, Preset::Standard, Preset::Paper].map(Preset::settings);
         for settings in [draft, standard, paper] {
             settings.check().unwrap();
         }

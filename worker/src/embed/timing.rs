@@ -49,18 +49,8 @@ impl Timing {
         if self.steps < every {
             return;
         }
-        let [
-            prepare,
-            colours,
-            render,
-            loss,
-            backward,
-            sh_backward,
-            adam,
-            check,
-        ] = self
-            .ms
-            .map(|ms| (ms / self.steps as f64 * 100.0).round() / 100.0);
+        let [prepare, colours, render, loss, backward, sh_backward, adam, check] =
+            self.ms.map(|ms| (ms / self.steps as f64 * 100.0).round() / 100.0);
         tracing::debug!(
             step,
             prepare,

@@ -49,8 +49,7 @@ pub fn verify(
     let mut logits = Vec::with_capacity(settings.verify.views);
     for index in 0..settings.verify.views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let [before, after] =
-            [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
+        let [before, after] = [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
         let after = after?;
         logits.extend(engine.read_logits(std::slice::from_ref(&after))?);
         pairs.push((before?, after));
@@ -77,10 +76,7 @@ impl Verification {
         let mut missed = Vec::new();
         let accuracy = self.comparison.bit_accuracy;
         if accuracy < target.bit_accuracy {
-            missed.push(format!(
-                "bit accuracy {accuracy:.4} is below {}",
-                target.bit_accuracy
-            ));
+            missed.push(format!("bit accuracy {accuracy:.4} is below {}", target.bit_accuracy));
         }
         if let Some(psnr) = self.quality.psnr.psnr_db
             && psnr < target.psnr_db

@@ -9,9 +9,7 @@ use crate::message::{Key, Reader};
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch};
 use crate::scene::Gaussians;
-use crate::splat::{
-    CpuRasterizer, GpuRasterizer, PreparedView, Rasterizer, WeightCache, prepare, sh,
-};
+use crate::splat::{CpuRasterizer, GpuRasterizer, PreparedView, Rasterizer, WeightCache, prepare, sh};
 use crate::view::Camera;
 
 /// Pictures given to CLIP at once when no gradient is needed.
@@ -93,11 +91,7 @@ impl Engine {
             for chunk in same.chunks(READ_BATCH) {
                 let chunk: Vec<&Picture> = chunk.iter().collect();
                 let logits = self.logits(batch(&chunk, &self.compute.device)?);
-                rows.extend(
-                    self.to_host(logits)?
-                        .chunks_exact(self.bits)
-                        .map(<[f32]>::to_vec),
-                );
+                rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
             }
         }
         Ok(rows)
@@ -127,18 +121,10 @@ impl Engine {
     ///
     /// # Errors
     /// Those of [`prepare`] and of the renderer.
-    pub fn picture(
-        &self,
-        gaussians: &Gaussians,
-        camera: &Camera,
-        background: [f32; 3],
-    ) -> Result<Picture> {
+    pub fn picture(&self, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
         let view = prepare(gaussians, camera, WeightCache::None)?;
         let colours = sh::colours(&gaussians.sh, None, &view);
-        Ok(self
-            .rasterizer
-            .render(&view, &colours, background)?
-            .to_8_bit())
+        Ok(self.rasterizer.render(&view, &colours, background)?.to_8_bit())
     }
 
     /// `work` on each item, in order. On the CPU items run side by side; a GPU has one queue, and waiting for it on
@@ -146,11 +132,7 @@ impl Engine {
     ///
     /// # Errors
     /// The first of `work`.
-    pub fn each<I: Sync, O: Send>(
-        &self,
-        items: &[I],
-        work: impl Fn(&I) -> Result<O> + Send + Sync,
-    ) -> Result<Vec<O>> {
+    pub fn each<I: Sync, O: Send>(&self, items: &[I], work: impl Fn(&I) -> Result<O> + Send + Sync) -> Result<Vec<O>> {
         if on_cpu(&self.compute) {
             items.par_iter().map(work).collect()
         } else {

@@ -46,18 +46,12 @@ pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
             }
             pictures[before..].sort();
         } else if is_scene(path) {
-            return Err(bad(
-                path,
-                "a scene is read on its own: give one scene, or pictures",
-            ));
+            return Err(bad(path, "a scene is read on its own: give one scene, or pictures"));
         } else if is_picture(path) {
             pictures.push(path.clone());
             check_count(pictures.len())?;
         } else {
-            return Err(bad(
-                path,
-                "neither a scene (ply) nor a picture (png, jpg, webp, exr)",
-            ));
+            return Err(bad(path, "neither a scene (ply) nor a picture (png, jpg, webp, exr)"));
         }
     }
     if pictures.is_empty() {
@@ -70,8 +64,7 @@ pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
 }
 
 fn is_scene(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"))
 }
 
 fn is_picture(path: &Path) -> bool {

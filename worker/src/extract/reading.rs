@@ -28,12 +28,7 @@ impl Reading {
     /// # Errors
     /// No views, views of different lengths, or logits that are not finite.
     pub fn new(views: Vec<Vec<f32>>) -> Result<Self> {
-        let bad = |reason: String| {
-            Err(Error::BadOption {
-                field: "views",
-                reason,
-            })
-        };
+        let bad = |reason: String| Err(Error::BadOption { field: "views", reason });
         let Some(bits) = views.first().map(Vec::len).filter(|bits| *bits > 0) else {
             return bad("there is nothing to read".into());
         };
@@ -74,11 +69,7 @@ impl Reading {
         if message.len() != self.summed.len() {
             return Err(Error::BadOption {
                 field: "message",
-                reason: format!(
-                    "{} bits, but the key has {}",
-                    message.len(),
-                    self.summed.len()
-                ),
+                reason: format!("{} bits, but the key has {}", message.len(), self.summed.len()),
             });
         }
         let accuracies = self
@@ -105,9 +96,7 @@ impl Reading {
     pub fn agreement(&self) -> f64 {
         let agreeing = |view: &Vec<f32>| {
             let pairs = view.iter().zip(&self.summed);
-            pairs
-                .filter(|(v, sum)| (**v > 0.0) == (**sum > 0.0))
-                .count()
+            pairs.filter(|(v, sum)| (**v > 0.0) == (**sum > 0.0)).count()
         };
         let count = self.views.len() * self.summed.len();
         self.views.iter().map(agreeing).sum::<usize>() as f64 / count as f64
@@ -156,11 +145,7 @@ mod tests {
         assert_eq!(found.decision.verdict, Verdict::Inconclusive);
         assert!((found.bit_accuracy - (1.0 + 0.5 + 0.5) / 3.0).abs() < 1e-12);
         assert_eq!(found.bit_accuracy_worst_view, 0.5);
-        assert!(
-            reading()
-                .compare(&Message::parse("aa", 8).unwrap())
-                .is_err()
-        );
+        assert!(reading().compare(&Message::parse("aa", 8).unwrap()).is_err());
     }
 
     #[test]

@@ -69,9 +69,7 @@ impl Message {
         }
         let spare = bits.len() - length;
         if bits[..spare].contains(&true) {
-            return Err(bad(format!(
-                "the value needs more than the key's {length} bits"
-            )));
+            return Err(bad(format!("the value needs more than the key's {length} bits")));
         }
         Ok(Self {
             bits: bits.split_off(spare),
@@ -104,11 +102,7 @@ impl Message {
 
     /// Number of equal bits. Bits that only one of the two has count as different.
     pub fn matches(&self, other: &Message) -> usize {
-        self.bits
-            .iter()
-            .zip(&other.bits)
-            .filter(|(a, b)| a == b)
-            .count()
+        self.bits.iter().zip(&other.bits).filter(|(a, b)| a == b).count()
     }
 
     /// [`Message::matches`] as a fraction of the longer message's bits.
@@ -127,9 +121,7 @@ impl fmt::Display for Message {
         let first = self.bits.len() % 4;
         let head = (first > 0).then(|| &self.bits[..first]);
         for digit in head.into_iter().chain(self.bits[first..].chunks(4)) {
-            let value = digit
-                .iter()
-                .fold(0_u8, |value, &bit| value << 1 | u8::from(bit));
+            let value = digit.iter().fold(0_u8, |value, &bit| value << 1 | u8::from(bit));
             write!(f, "{value:x}")?;
         }
         Ok(())
@@ -182,10 +174,7 @@ mod tests {
 
     #[test]
     fn accuracy_counts_equal_bits() {
-        let (a, b) = (
-            Message::parse("f0", 8).unwrap(),
-            Message::parse("f3", 8).unwrap(),
-        );
+        let (a, b) = (Message::parse("f0", 8).unwrap(), Message::parse("f3", 8).unwrap());
         assert_eq!(a.matches(&b), 6);
         assert_eq!(a.accuracy(&b), 0.75);
         assert_eq!(a.accuracy(&Message::parse("f", 4).unwrap()), 0.5);

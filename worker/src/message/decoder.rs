@@ -46,11 +46,7 @@ impl DecoderWeights {
             }
         };
         Self {
-            layers: [
-                layer(inputs, HIDDEN),
-                layer(HIDDEN, HIDDEN),
-                layer(HIDDEN, bits),
-            ],
+            layers: [layer(inputs, HIDDEN), layer(HIDDEN, HIDDEN), layer(HIDDEN, bits)],
         }
     }
 
@@ -67,25 +63,13 @@ impl DecoderWeights {
     /// Checks that sizes fit together and that every number is finite.
     pub fn check(&self) -> Result<(), String> {
         for (i, layer) in self.layers.iter().enumerate() {
-            if layer.weight.len() != layer.inputs * layer.outputs
-                || layer.bias.len() != layer.outputs
-            {
-                return Err(format!(
-                    "decoder layer {i} is not {} x {}",
-                    layer.inputs, layer.outputs
-                ));
+            if layer.weight.len() != layer.inputs * layer.outputs || layer.bias.len() != layer.outputs {
+                return Err(format!("decoder layer {i} is not {} x {}", layer.inputs, layer.outputs));
             }
             if i > 0 && self.layers[i - 1].outputs != layer.inputs {
-                return Err(format!(
-                    "decoder layer {i} does not fit the layer before it"
-                ));
+                return Err(format!("decoder layer {i} does not fit the layer before it"));
             }
-            if let Some(v) = layer
-                .weight
-                .iter()
-                .chain(&layer.bias)
-                .find(|v| !v.is_finite())
-            {
+            if let Some(v) = layer.weight.iter().chain(&layer.bias).find(|v| !v.is_finite()) {
                 return Err(format!("decoder layer {i} holds {v}"));
             }
         }
@@ -109,24 +93,15 @@ pub struct Decoder {
 impl Decoder {
     /// Puts weights on a device; with an autodiff device they can be trained.
     pub fn new(weights: &DecoderWeights, device: &Device) -> Self {
-        let [first, second, third] = weights
-            .layers
-            .each_ref()
-            .map(|layer| to_linear(layer, device));
-        Self {
-            first,
-            second,
-            third,
-        }
+        let [first, second, third] = weights.layers.each_ref().map(|layer| to_linear(layer, device));
+        Self { first, second, third }
     }
 
     /// Copies the weights back to the host.
     pub fn weights(&self) -> Result<DecoderWeights> {
         let layers = [&self.first, &self.second, &self.third];
         let [a, b, c] = layers.map(from_linear);
-        Ok(DecoderWeights {
-            layers: [a?, b?, c?],
-        })
+        Ok(DecoderWeights { layers: [a?, b?, c?] })
     }
 
     /// Logits `[b, bits]` of projected features `[b, inputs]`.
@@ -203,9 +178,7 @@ mod tests {
 
     #[test]
     fn cross_entropy_is_stable_and_its_gradient_right() {
-        for x in [
-            -1e4_f32, -88.0, -20.5, -3.0, -1e-3, 0.0, 0.7, 15.0, 20.5, 100.0, 1e4,
-        ] {
+        for x in [-1e4_f32, -88.0, -20.5, -3.0, -1e-3, 0.0, 0.7, 15.0, 20.5, 100.0, 1e4] {
             for y in [0.0, 1.0] {
                 let (loss, gradient) = loss_and_gradient(x, y);
                 let z = f64::from(x);
@@ -215,10 +188,7 @@ mod tests {
                     (f64::from(loss) - expected).abs() <= 1e-6 * (1.0 + expected),
                     "{x} {y}: {loss}"
                 );
-                assert!(
-                    (f64::from(gradient) - slope).abs() <= 1e-6,
-                    "{x} {y}: {gradient}"
-                );
+                assert!((f64::from(gradient) - slope).abs() <= 1e-6, "{x} {y}: {gradient}");
             }
         }
     }
@@ -228,10 +198,7 @@ mod tests {
         let weights = DecoderWeights::seeded(20, 7, 1);
         weights.check().unwrap();
         assert_eq!((weights.inputs(), weights.bits()), (20, 7));
-        assert_eq!(
-            Decoder::new(&weights, &Device::flex()).weights().unwrap(),
-            weights
-        );
+        assert_eq!(Decoder::new(&weights, &Device::flex()).weights().unwrap(), weights);
         assert_eq!(DecoderWeights::seeded(20, 7, 1), weights);
         assert_ne!(DecoderWeights::seeded(20, 7, 2), weights);
     }
@@ -273,10 +240,7 @@ mod tests {
             .try_to_vec_as::<f32>()
             .unwrap();
         for (logit, expected) in logits.iter().zip(values) {
-            assert!(
-                (f64::from(*logit) - expected).abs() < 1e-5,
-                "{logit} {expected}"
-            );
+            assert!((f64::from(*logit) - expected).abs() < 1e-5, "{logit} {expected}");
         }
     }
 
@@ -297,11 +261,6 @@ mod tests {
         weights.layers[1].bias[0] = f32::INFINITY;
         assert!(weights.check().unwrap_err().contains("layer 1 holds inf"));
         weights.layers[0].outputs = 5;
-        assert!(
-            weights
-                .check()
-                .unwrap_err()
-                .contains("layer 0 is not 8 x 5")
-        );
+        assert!(weights.check().unwrap_err().contains("layer 0 is not 8 x 5"));
     }
 }

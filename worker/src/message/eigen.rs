@@ -2,7 +2,7 @@
 //! shifts (Golub & Van Loan, Matrix Computations, sections 8.3.1 and 8.3.3). A few seconds at n = 1024.
 
 /// Eigenvalues in descending order and the unit eigenvectors as rows.
-pub(super) struct Eigen {
+pub(crate) struct Eigen {
     pub values: Vec<f64>,
     /// `n * n`, row i belongs to `values[i]`.
     pub vectors: Vec<f64>,
@@ -11,7 +11,7 @@ pub(super) struct Eigen {
 /// Decomposes a symmetric `n` x `n` matrix; `None` when it holds values that are not finite.
 ///
 /// The sign of an eigenvector is fixed (its largest entry is positive), so that equal input gives equal output.
-pub(super) fn symmetric(matrix: Vec<f64>, n: usize) -> Option<Eigen> {
+pub(crate) fn symmetric(matrix: Vec<f64>, n: usize) -> Option<Eigen> {
     debug_assert_eq!(matrix.len(), n * n);
     if matrix.iter().any(|v| !v.is_finite()) {
         return None;
@@ -58,9 +58,7 @@ fn tridiagonal(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
             .map(|row| dot(&row[first..], &v))
             .collect();
         let vw = dot(&v, &w);
-        w.iter_mut()
-            .zip(&v)
-            .for_each(|(w, v)| *w = 2.0 * (*w - vw * v));
+        w.iter_mut().zip(&v).for_each(|(w, v)| *w = 2.0 * (*w - vw * v));
         for (i, row) in a[first * n..].chunks_exact_mut(n).enumerate() {
             let (vi, wi) = (v[i], w[i]);
             row[first..]
@@ -75,15 +73,11 @@ fn tridiagonal(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
             sum.iter_mut().zip(row).for_each(|(s, x)| *s += v * x);
         }
         for (row, &v) in q[first * n..].chunks_exact_mut(n).zip(&v) {
-            row.iter_mut()
-                .zip(&sum)
-                .for_each(|(x, s)| *x -= 2.0 * v * s);
+            row.iter_mut().zip(&sum).for_each(|(x, s)| *x -= 2.0 * v * s);
         }
     }
     let diagonal = (0..n).map(|i| a[i * n + i]).collect();
-    let off = (0..n)
-        .map(|i| if i + 1 < n { a[i * n + i + 1] } else { 0.0 })
-        .collect();
+    let off = (0..n).map(|i| if i + 1 < n { a[i * n + i + 1] } else { 0.0 }).collect();
     (diagonal, off, q)
 }
 
@@ -96,9 +90,7 @@ fn ql(d: &mut [f64], e: &mut [f64], q: &mut [f64]) -> Option<()> {
     for l in 0..n {
         let mut tries = 0;
         loop {
-            let m = (l..n - 1)
-                .find(|&m| e[m].abs() <= negligible)
-                .unwrap_or(n - 1);
+            let m = (l..n - 1).find(|&m| e[m].abs() <= negligible).unwrap_or(n - 1);
             if m == l {
                 break;
             }
@@ -142,7 +134,7 @@ fn ql(d: &mut [f64], e: &mut [f64], q: &mut [f64]) -> Option<()> {
 }
 
 /// Inner product.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -158,9 +150,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut a = vec![0.0; n * n];
         for _ in 0..samples {
-            let x: Vec<f64> = (0..n)
-                .map(|i| (rng.random::<f64>() - 0.5) / (1 + i) as f64)
-                .collect();
+            let x: Vec<f64> = (0..n).map(|i| (rng.random::<f64>() - 0.5) / (1 + i) as f64).collect();
             (0..n * n).for_each(|k| a[k] += x[k / n] * x[k % n]);
         }
         a
@@ -175,10 +165,7 @@ mod tests {
                 assert!((dot(row, v) - eigen.values[i] * x).abs() < 1e-12 * scale);
             }
             for (j, u) in eigen.vectors.chunks_exact(n).enumerate() {
-                assert!(
-                    (dot(u, v) - f64::from(u8::from(i == j))).abs() < 1e-12,
-                    "{i} {j}"
-                );
+                assert!((dot(u, v) - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
             }
         }
     }

@@ -19,10 +19,7 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self {
-            remove: 64,
-            keep: None,
-        }
+        Self { remove: 64, keep: None }
     }
 }
 
@@ -54,10 +51,7 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
     if samples <= options.remove + 1 {
         return bad(
             "remove",
-            format!(
-                "{samples} pictures do not show {} directions",
-                options.remove
-            ),
+            format!("{samples} pictures do not show {} directions", options.remove),
         );
     }
 
@@ -67,18 +61,9 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
         let turn = decompose(congruence(&basis, &text, width), rest)?;
         basis = product(&turn[..rank * rest], &basis, rest, width);
     }
-    let (image, text) = (
-        congruence(&basis, &image, width),
-        congruence(&basis, &text, width),
-    );
-    let (image_scale, text_scale) = (
-        unit_spread("image", &image, rank)?,
-        unit_spread("text", &text, rank)?,
-    );
-    let scaled: Vec<f64> = image
-        .iter()
-        .map(|c| c * image_scale * image_scale)
-        .collect();
+    let (image, text) = (congruence(&basis, &image, width), congruence(&basis, &text, width));
+    let (image_scale, text_scale) = (unit_spread("image", &image, rank)?, unit_spread("text", &text, rank)?);
+    let scaled: Vec<f64> = image.iter().map(|c| c * image_scale * image_scale).collect();
     Ok(Projection {
         width,
         rank,
@@ -92,18 +77,10 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
 
 /// Mean and covariance (`width` x `width`) of feature rows.
 fn covariance(what: &'static str, rows: &[f32], width: usize) -> Result<(Vec<f64>, Vec<f64>)> {
-    let bad = |reason| {
-        Err(Error::BadOption {
-            field: what,
-            reason,
-        })
-    };
+    let bad = |reason| Err(Error::BadOption { field: what, reason });
     let n = rows.len() / width;
     if n < 2 || n * width != rows.len() {
-        return bad(format!(
-            "{} numbers are not two or more rows of {width}",
-            rows.len()
-        ));
+        return bad(format!("{} numbers are not two or more rows of {width}", rows.len()));
     }
     if let Some(at) = rows.iter().position(|v| !v.is_finite()) {
         return bad(format!("row {} holds {}", at / width, rows[at]));
@@ -183,13 +160,7 @@ fn unit_spread(what: &str, covariance: &[f64], n: usize) -> Result<f64> {
 /// `scale * B^T` as f32: columns are the basis vectors.
 fn transposed(basis: &[f64], width: usize, scale: f64) -> Vec<f32> {
     (0..width)
-        .flat_map(|i| {
-            basis
-                .iter()
-                .skip(i)
-                .step_by(width)
-                .map(move |v| (scale * v) as f32)
-        })
+        .flat_map(|i| basis.iter().skip(i).step_by(width).map(move |v| (scale * v) as f32))
         .collect()
 }
 
@@ -200,11 +171,7 @@ fn cholesky(mut c: Vec<f64>, n: usize) -> Vec<f32> {
         let (done, below) = c.split_at_mut((j + 1) * n);
         let row = &mut done[j * n..];
         let pivot = row[j] - dot(&row[..j], &row[..j]);
-        row[j] = if pivot > negligible {
-            pivot.sqrt()
-        } else {
-            0.0
-        };
+        row[j] = if pivot > negligible { pivot.sqrt() } else { 0.0 };
         row[j + 1..].fill(0.0);
         for other in below.chunks_exact_mut(n) {
             let value = other[j] - dot(&other[..j], &row[..j]);
@@ -233,12 +200,7 @@ mod tests {
 
     fn features() -> (Vec<f32>, Vec<f32>) {
         // Pictures vary most in dimensions 0 and 1, texts least in 2.
-        let images = rows(
-            400,
-            1,
-            0.3,
-            |i| if i < 2 { 5.0 } else { 0.2 + 0.02 * i as f32 },
-        );
+        let images = rows(400, 1, 0.3, |i| if i < 2 { 5.0 } else { 0.2 + 0.02 * i as f32 });
         let texts = rows(300, 2, -0.4, |i| if i == 2 { 0.001 } else { 0.05 });
         (images, texts)
     }
@@ -254,16 +216,7 @@ mod tests {
     #[test]
     fn strong_natural_directions_vanish_and_spreads_agree() {
         let (images, texts) = features();
-        let p = fit(
-            &images,
-            &texts,
-            WIDTH,
-            FitOptions {
-                remove: 2,
-                keep: None,
-            },
-        )
-        .unwrap();
+        let p = fit(&images, &texts, WIDTH, FitOptions { remove: 2, keep: None }).unwrap();
         p.check().unwrap();
         assert_eq!((p.width, p.rank), (WIDTH, 10));
         for matrix in [&p.matrix_image, &p.matrix_text] {
@@ -313,16 +266,7 @@ mod tests {
     fn fewer_pictures_than_dimensions_are_enough() {
         let (_, texts) = features();
         let images = rows(6, 4, 0.0, |_| 1.0);
-        let p = fit(
-            &images,
-            &texts,
-            WIDTH,
-            FitOptions {
-                remove: 2,
-                keep: None,
-            },
-        )
-        .unwrap();
+        let p = fit(&images, &texts, WIDTH, FitOptions { remove: 2, keep: None }).unwrap();
         p.check().unwrap();
     }
 

@@ -49,21 +49,16 @@ impl Secret {
     /// A secret from the operating system's random numbers.
     pub fn random() -> Result<Self> {
         let mut bytes = [0; 32];
-        SysRng
-            .try_fill_bytes(&mut bytes)
-            .map_err(|e| Error::BadOption {
-                field: "seed",
-                reason: format!("the operating system has no random numbers ({e}); give a seed"),
-            })?;
+        SysRng.try_fill_bytes(&mut bytes).map_err(|e| Error::BadOption {
+            field: "seed",
+            reason: format!("the operating system has no random numbers ({e}); give a seed"),
+        })?;
         Ok(Self(bytes))
     }
 
     /// The secret of a seed: as easy to guess as the seed.
     pub fn from_seed(seed: u64) -> Self {
-        Self(hmac_sha256(
-            b"guardsplat key secret v1",
-            &[&seed.to_le_bytes()],
-        ))
+        Self(hmac_sha256(b"guardsplat key secret v1", &[&seed.to_le_bytes()]))
     }
 
     /// The bytes, for who may have them.
@@ -120,8 +115,7 @@ impl Key {
         };
         let table = TokenTable::new(secret.expose(), options.bits)?;
         // The training's seed follows from the secret, so that one seed decides the whole file.
-        let [a, b, c, d, e, f, g, h, ..] =
-            hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
+        let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
         let seed = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
         let training = TrainingOptions {
             seed,
@@ -226,15 +220,7 @@ mod tests {
             seed,
             training,
         };
-        Key::create(
-            &options,
-            clip,
-            Projection::identity(8),
-            encode,
-            &Device::flex(),
-            |_| {},
-        )
-        .unwrap()
+        Key::create(&options, clip, Projection::identity(8), encode, &Device::flex(), |_| {}).unwrap()
     }
 
     #[test]
@@ -256,22 +242,15 @@ mod tests {
             hash: "cd".repeat(32),
         };
         let text = key.require_clip(path, &other).unwrap_err().to_string();
-        let expected =
-            r#"belongs to the CLIP "tiny" (abababababab), not to "large" (cdcdcdcdcdcd)"#;
-        assert!(
-            text.starts_with("key mine.key: ") && text.ends_with(expected),
-            "{text}"
-        );
+        let expected = r#"belongs to the CLIP "tiny" (abababababab), not to "large" (cdcdcdcdcdcd)"#;
+        assert!(text.starts_with("key mine.key: ") && text.ends_with(expected), "{text}");
     }
 
     #[test]
     fn secrets_are_not_printed_and_messages_have_the_keys_length() {
         let key = create(Some(1));
         let printed = format!("{key:?}");
-        assert!(
-            printed.contains("Secret(..)")
-                && !printed.contains(&format!("{:?}", key.secret.expose()))
-        );
+        assert!(printed.contains("Secret(..)") && !printed.contains(&format!("{:?}", key.secret.expose())));
         assert_eq!(key.message("a5").unwrap().to_string(), "a5");
         assert!(
             key.message("a5a5")

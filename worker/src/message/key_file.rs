@@ -137,8 +137,7 @@ pub(super) fn read(path: &Path) -> Result<Key> {
 }
 
 fn deserialize(bytes: &[u8]) -> Result<Key, String> {
-    let not_a_key =
-        |e: safetensors::SafeTensorError| format!("not a key file, or a truncated one ({e})");
+    let not_a_key = |e: safetensors::SafeTensorError| format!("not a key file, or a truncated one ({e})");
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(not_a_key)?;
     let json = metadata.metadata().as_ref().and_then(|m| m.get(HEADER));
     let json = json.ok_or("a safetensors file, but not a key")?;
@@ -158,13 +157,10 @@ fn deserialize(bytes: &[u8]) -> Result<Key, String> {
         return Err(format!("{} bits are outside 1 to {MAX_BITS}", header.bits));
     }
     let mut secret = [0; 32];
-    hex::decode_to_slice(&header.secret, &mut secret)
-        .map_err(|_| "its secret is not 64 hexadecimal digits")?;
+    hex::decode_to_slice(&header.secret, &mut secret).map_err(|_| "its secret is not 64 hexadecimal digits")?;
 
     let file = SafeTensors::deserialize(bytes).map_err(not_a_key)?;
-    let matrix = file
-        .tensor("projection.matrix_image")
-        .map_err(|e| e.to_string())?;
+    let matrix = file.tensor("projection.matrix_image").map_err(|e| e.to_string())?;
     let &[width, rank] = matrix.shape() else {
         return Err("projection.matrix_image is not a matrix".into());
     };
@@ -216,9 +212,7 @@ fn deserialize(bytes: &[u8]) -> Result<Key, String> {
 }
 
 fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
-    let view = file
-        .tensor(name)
-        .map_err(|_| format!("{name} is missing"))?;
+    let view = file.tensor(name).map_err(|_| format!("{name} is missing"))?;
     if view.dtype() != Dtype::F32 || view.shape() != shape {
         return Err(format!(
             "{name} is {:?} {:?}, not F32 {shape:?}",
@@ -277,10 +271,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("k");
         key().write(&path).unwrap();
-        assert_eq!(
-            std::fs::metadata(&path).unwrap().permissions().mode() & 0o777,
-            0o600
-        );
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[test]
@@ -295,10 +286,7 @@ mod tests {
     #[test]
     fn truncation_anywhere_is_found() {
         let bytes = serialize(&key()).unwrap();
-        for length in (0..bytes.len())
-            .step_by(997)
-            .chain([0, 7, 8, 9, bytes.len() - 1])
-        {
+        for length in (0..bytes.len()).step_by(997).chain([0, 7, 8, 9, bytes.len() - 1]) {
             assert!(deserialize(&bytes[..length]).is_err(), "{length}");
         }
     }
@@ -308,11 +296,7 @@ mod tests {
         let mut bytes = serialize(&key()).unwrap();
         let last = bytes.len() - 4;
         bytes[last] ^= 1;
-        assert!(
-            deserialize(&bytes)
-                .unwrap_err()
-                .contains("does not match its id")
-        );
+        assert!(deserialize(&bytes).unwrap_err().contains("does not match its id"));
     }
 
     #[test]
@@ -331,9 +315,7 @@ mod tests {
         assert!(with(b"bits\\\":32", b"bits\\\":99").contains("99 bits are outside 1 to 75"));
         assert!(with(b"bits\\\":32", b"bits\\\":31").contains("decoder.2.weight is F32 [256, 32]"));
         assert!(with(b"guardsplat_key", b"guardsplat_kex").contains("not a key"));
-        assert!(
-            with(b"projection.noise", b"projection.moise").contains("projection.noise is missing")
-        );
+        assert!(with(b"projection.noise", b"projection.moise").contains("projection.noise is missing"));
         assert!(
             deserialize(b"ply\nformat ascii 1.0\n")
                 .unwrap_err()

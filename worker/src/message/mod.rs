@@ -1,7 +1,7 @@
 //! The keyed message: its bits, its tokens, the decoder that reads it from CLIP features, and how sure a reading is.
 pub mod bits;
 pub mod decoder;
-mod eigen;
+pub(crate) mod eigen;
 pub mod fit;
 pub mod key;
 mod key_file;

@@ -101,9 +101,7 @@ fn project(features: &[f32], mean: &[f32], matrix: &[f32], rank: usize) -> Vec<f
         let mut sum = vec![0.0_f32; rank];
         for ((x, m), weights) in row.iter().zip(mean).zip(matrix.chunks_exact(rank)) {
             let centred = x - m;
-            sum.iter_mut()
-                .zip(weights)
-                .for_each(|(s, w)| *s += centred * w);
+            sum.iter_mut().zip(weights).for_each(|(s, w)| *s += centred * w);
         }
         projected.append(&mut sum);
     }
@@ -153,15 +151,9 @@ mod tests {
         let device = Device::flex();
         let tensor = Tensor::<2>::from_data(TensorData::new(x.to_vec(), [2, 3]), &device);
         let image = projection.image_map(&device).apply(tensor.clone());
-        assert_eq!(
-            image.try_to_vec_as::<f32>().unwrap(),
-            projection.project_image(&x)
-        );
+        assert_eq!(image.try_to_vec_as::<f32>().unwrap(), projection.project_image(&x));
         let text = projection.text_map(&device).apply(tensor);
-        assert_eq!(
-            text.try_to_vec_as::<f32>().unwrap(),
-            projection.project_text(&x)
-        );
+        assert_eq!(text.try_to_vec_as::<f32>().unwrap(), projection.project_text(&x));
     }
 
     #[test]
@@ -177,18 +169,10 @@ mod tests {
     fn damage_is_named() {
         let mut p = Projection::identity(4);
         p.noise[3] = f32::NAN;
-        assert!(
-            p.check()
-                .unwrap_err()
-                .contains("projection.noise holds NaN at 3")
-        );
+        assert!(p.check().unwrap_err().contains("projection.noise holds NaN at 3"));
         let mut p = Projection::identity(4);
         p.mean_text.pop();
-        assert!(
-            p.check()
-                .unwrap_err()
-                .contains("projection.mean_text has 3 values")
-        );
+        assert!(p.check().unwrap_err().contains("projection.mean_text has 3 values"));
         let p = Projection {
             rank: 5,
             ..Projection::identity(4)

@@ -43,20 +43,12 @@ mod tests {
     #[test]
     fn gradients_reach_the_features_through_frozen_weights() {
         let device = Device::flex().autodiff();
-        let reader = Reader::new(
-            &Projection::identity(6),
-            &DecoderWeights::seeded(6, 3, 1),
-            &device,
-        );
+        let reader = Reader::new(&Projection::identity(6), &DecoderWeights::seeded(6, 3, 1), &device);
         let at = |x: &[f32]| Tensor::<2>::from_data(TensorData::new(x.to_vec(), [1, 6]), &device);
         let x = [0.3, -0.2, 0.5, 0.1, -0.4, 0.6];
         let features = at(&x).require_grad();
         let gradients = reader.image_logits(features.clone()).sum().backward();
-        let gradient = features
-            .grad(&gradients)
-            .unwrap()
-            .try_to_vec_as::<f32>()
-            .unwrap();
+        let gradient = features.grad(&gradients).unwrap().try_to_vec_as::<f32>().unwrap();
         for i in 0..6 {
             let sum_at = |step: f32| {
                 let mut moved = x;
@@ -64,11 +56,7 @@ mod tests {
                 reader.image_logits(at(&moved)).sum().into_scalar::<f32>()
             };
             let slope = (sum_at(1e-2) - sum_at(-1e-2)) / 2e-2;
-            assert!(
-                (slope - gradient[i]).abs() < 1e-3,
-                "{i}: {slope} {}",
-                gradient[i]
-            );
+            assert!((slope - gradient[i]).abs() < 1e-3, "{i}: {slope} {}", gradient[i]);
         }
     }
 
@@ -80,16 +68,7 @@ mod tests {
         let reader = Reader::new(&projection, &DecoderWeights::seeded(4, 2, 1), &device);
         let zeros = || Tensor::<2>::zeros([1, 4], &device);
         let image = reader.image_logits(zeros()).try_to_vec_as::<f32>().unwrap();
-        assert_eq!(
-            reader
-                .text_logits(zeros() + 1.0)
-                .try_to_vec_as::<f32>()
-                .unwrap(),
-            image
-        );
-        assert_ne!(
-            reader.text_logits(zeros()).try_to_vec_as::<f32>().unwrap(),
-            image
-        );
+        assert_eq!(reader.text_logits(zeros() + 1.0).try_to_vec_as::<f32>().unwrap(), image);
+        assert_ne!(reader.text_logits(zeros()).try_to_vec_as::<f32>().unwrap(), image);
     }
 }

@@ -123,8 +123,7 @@ impl Samples {
             }
         }
         let targets = pick(&self.targets, self.bits);
-        let tensor =
-            |values, width| Tensor::from_data(TensorData::new(values, [rows.len(), width]), device);
+        let tensor = |values, width| Tensor::from_data(TensorData::new(values, [rows.len(), width]), device);
         (tensor(features, self.rank), tensor(targets, self.bits))
     }
 
@@ -181,16 +180,9 @@ mod tests {
         let pool = noise_pool(&projection, 0.5, &mut rng, &Device::flex()).unwrap();
         let mean = |f: fn(&[f32]) -> f32| pool.chunks(2).map(f).sum::<f32>() / NOISE_POOL as f32;
         assert!(mean(|x| x[0]).abs() < 0.06 && mean(|x| x[1]).abs() < 0.06);
-        let found = [
-            mean(|x| x[0] * x[0]),
-            mean(|x| x[0] * x[1]),
-            mean(|x| x[1] * x[1]),
-        ];
+        let found = [mean(|x| x[0] * x[0]), mean(|x| x[0] * x[1]), mean(|x| x[1] * x[1])];
         for (found, expected) in found.into_iter().zip([1.0, 0.5, 0.3125]) {
-            assert!(
-                (found - expected).abs() < 0.06 * expected,
-                "{found} {expected}"
-            );
+            assert!((found - expected).abs() < 0.06 * expected, "{found} {expected}");
         }
         assert!(
             noise_pool(&projection, 0.0, &mut rng, &Device::flex())

@@ -79,10 +79,7 @@ pub fn decide(bits: u32, matched: u32, hypotheses: u32) -> Decision {
     let needed_bits = minimum_matches(bits, threshold / f64::from(hypotheses));
     let p = p_value(bits, matched).map_or(1.0, |p| (p * f64::from(hypotheses)).min(1.0));
     let (verdict, reason) = match needed_bits {
-        None => (
-            Verdict::Inconclusive,
-            Some(cannot_decide(bits, hypotheses, threshold)),
-        ),
+        None => (Verdict::Inconclusive, Some(cannot_decide(bits, hypotheses, threshold))),
         Some(needed) if matched >= needed => (Verdict::Match, None),
         Some(_) => (Verdict::NoMatch, None),
     };
@@ -159,10 +156,7 @@ mod tests {
     #[test]
     fn hypotheses_multiply_the_p_value() {
         let many = decide(32, 30, 10);
-        assert_eq!(
-            (many.verdict, many.needed_bits),
-            (Verdict::NoMatch, Some(31))
-        );
+        assert_eq!((many.verdict, many.needed_bits), (Verdict::NoMatch, Some(31)));
         assert!((many.p_value - 10.0 * p_value(32, 30).unwrap()).abs() < 1e-18);
         assert_eq!(decide(32, 0, 10).p_value, 1.0);
         assert_eq!(decide(32, 32, u32::MAX).verdict, Verdict::Inconclusive);
@@ -175,12 +169,7 @@ mod tests {
             assert_eq!(short.verdict, Verdict::Inconclusive);
             assert!(short.reason.unwrap().contains("can never reach p <= 1e-6"));
         }
-        assert!(
-            decide(200, 200, 1)
-                .reason
-                .unwrap()
-                .contains("more than the 128")
-        );
+        assert!(decide(200, 200, 1).reason.unwrap().contains("more than the 128"));
     }
 
     #[test]

@@ -44,10 +44,7 @@ impl TokenTable {
             ids.swap(i, j);
         }
         Ok(Self {
-            table: ids[..2 * bits]
-                .chunks_exact(2)
-                .map(|pair| [pair[0], pair[1]])
-                .collect(),
+            table: ids[..2 * bits].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect(),
         })
     }
 
@@ -66,10 +63,7 @@ impl TokenTable {
         }
         let mut sequence = [0; CONTEXT];
         sequence[0] = START;
-        for (slot, (pair, &bit)) in sequence[1..]
-            .iter_mut()
-            .zip(self.table.iter().zip(message.bits()))
-        {
+        for (slot, (pair, &bit)) in sequence[1..].iter_mut().zip(self.table.iter().zip(message.bits())) {
             *slot = i64::from(pair[usize::from(bit)]);
         }
         sequence[1 + self.bits()] = END;
@@ -110,12 +104,7 @@ mod tests {
         let short = TokenTable::new(&[1; 32], 8).unwrap();
         assert_eq!(long.table[..8], short.table[..]);
         let other = TokenTable::new(&[2; 32], 75).unwrap();
-        let shared = long
-            .table
-            .iter()
-            .zip(&other.table)
-            .filter(|(a, b)| a == b)
-            .count();
+        let shared = long.table.iter().zip(&other.table).filter(|(a, b)| a == b).count();
         assert_eq!(shared, 0);
         assert!(TokenTable::new(&[1; 32], 0).is_err() && TokenTable::new(&[1; 32], 76).is_err());
     }
@@ -140,9 +129,6 @@ mod tests {
         let mut rng = ChaCha20Rng::seed_from_u64(5);
         let mut counts = [0_u32; 7];
         (0..70_000).for_each(|_| counts[below(&mut rng, 7) as usize] += 1);
-        assert!(
-            counts.iter().all(|c| (9_600..10_400).contains(c)),
-            "{counts:?}"
-        );
+        assert!(counts.iter().all(|c| (9_600..10_400).contains(c)), "{counts:?}");
     }
 }

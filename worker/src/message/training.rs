@@ -96,10 +96,7 @@ pub fn train(
     let mut sample = |messages: &[Message]| -> Result<Samples> {
         let mut features = Vec::with_capacity(messages.len() * projection.rank);
         for chunk in messages.chunks(ENCODE_BATCH) {
-            let sequences = chunk
-                .iter()
-                .map(|m| table.sequence(m))
-                .collect::<Result<Vec<_>>>()?;
+            let sequences = chunk.iter().map(|m| table.sequence(m)).collect::<Result<Vec<_>>>()?;
             let raw = encode(&sequences)?;
             check_features(&raw, chunk.len() * projection.width)?;
             features.extend(projection.project_text(&raw));
@@ -141,9 +138,7 @@ pub fn train(
                 progress(Progress::Training(step, steps));
             }
             let gradients = GradientsParams::from_grads(loss.backward(), &decoder);
-            let rate = options.learning_rate
-                * 0.5
-                * (1.0 + (std::f64::consts::PI * step as f64 / steps as f64).cos());
+            let rate = options.learning_rate * 0.5 * (1.0 + (std::f64::consts::PI * step as f64 / steps as f64).cos());
             decoder = optimizer.step(rate, decoder, gradients);
             step += 1;
         }
@@ -228,8 +223,7 @@ mod tests {
             let mut row = [0.5_f32; WIDTH];
             for (position, &token) in sequence.iter().enumerate().filter(|(_, t)| **t > 0) {
                 let mut rng = ChaCha20Rng::seed_from_u64(token as u64 * 100 + position as u64);
-                row.iter_mut()
-                    .for_each(|x| *x += 0.2 * (unit(&mut rng) - 0.5));
+                row.iter_mut().for_each(|x| *x += 0.2 * (unit(&mut rng) - 0.5));
             }
             let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt();
             features.extend(row.iter().map(|x| x / norm));
@@ -253,11 +247,7 @@ mod tests {
             *mean = features.iter().skip(i).step_by(WIDTH).sum::<f32>() / 200.0;
         }
         projection.matrix_text.iter_mut().for_each(|v| *v *= 20.0);
-        projection
-            .noise
-            .iter_mut()
-            .step_by(WIDTH + 1)
-            .for_each(|v| *v = noise);
+        projection.noise.iter_mut().step_by(WIDTH + 1).for_each(|v| *v = noise);
         projection
     }
 
@@ -277,24 +267,12 @@ mod tests {
         let projection = projection(&table, 0.1);
         let run = |seed| {
             let options = TrainingOptions { seed, ..options() };
-            train(
-                &table,
-                &projection,
-                tower,
-                &options,
-                &Device::flex(),
-                |_| {},
-            )
-            .unwrap()
+            train(&table, &projection, tower, &options, &Device::flex(), |_| {}).unwrap()
         };
         let first = run(3);
         assert_eq!(first.steps, 160);
         assert!(first.accuracy_seen > 0.99, "{first:?}");
-        assert!(
-            first.accuracy_unseen.unwrap() > 0.98,
-            "{:?}",
-            first.accuracy_unseen
-        );
+        assert!(first.accuracy_unseen.unwrap() > 0.98, "{:?}", first.accuracy_unseen);
         assert!(
             first.accuracy_unseen_noisy.unwrap() > 0.95,
             "{:?}",
@@ -355,10 +333,7 @@ mod tests {
         };
         assert!(run(|_| Ok(vec![0.0; 3]), &options()).contains("3 numbers"));
         assert!(run(|s| Ok(vec![f32::NAN; s.len() * WIDTH]), &options()).contains("NaN"));
-        let no_batch = TrainingOptions {
-            batch: 0,
-            ..options()
-        };
+        let no_batch = TrainingOptions { batch: 0, ..options() };
         assert!(run(tower, &no_batch).contains("at least 1"));
         let bad_noise = TrainingOptions {
             noise: f32::NAN,

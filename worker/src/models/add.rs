@@ -24,10 +24,7 @@ impl Models {
         }
         let place = self.folder.join(name);
         if place.exists() {
-            return Err(bad(
-                name,
-                format!("is there already; delete {} first", place.display()),
-            ));
+            return Err(bad(name, format!("is there already; delete {} first", place.display())));
         }
         std::fs::create_dir_all(&self.folder).map_err(Error::io(&self.folder))?;
         let staged = tempfile::Builder::new()
@@ -39,9 +36,7 @@ impl Models {
         let mut files = BTreeMap::new();
         let mut fetch = |from: &Source, file: &str, most: u64| -> Result<bool> {
             let found = from.fetch(name, &staged.path().join(file), most)?;
-            Ok(found
-                .map(|entry| files.insert(file.to_owned(), entry))
-                .is_some())
+            Ok(found.map(|entry| files.insert(file.to_owned(), entry)).is_some())
         };
         // The small files first: a missing one is then found before gigabytes are fetched.
         if name != LPIPS {
@@ -49,16 +44,10 @@ impl Models {
             if !fetch(&config, CONFIG, MAX_CONFIG_BYTES)? {
                 return Err(bad(
                     name,
-                    format!(
-                        "{config} does not exist; the configuration must be beside the weights"
-                    ),
+                    format!("{config} does not exist; the configuration must be beside the weights"),
                 ));
             }
-            fetch(
-                &weights.beside(PREPROCESSOR),
-                PREPROCESSOR,
-                MAX_CONFIG_BYTES,
-            )?;
+            fetch(&weights.beside(PREPROCESSOR), PREPROCESSOR, MAX_CONFIG_BYTES)?;
             ClipConfig::read(staged.path())?;
         }
         if !fetch(&weights, WEIGHTS, MAX_WEIGHTS_BYTES)? {
@@ -66,10 +55,7 @@ impl Models {
         }
         let found = &files[WEIGHTS].sha256;
         if *found != expected {
-            return Err(bad(
-                name,
-                format!("{weights} has hash {found}, expected {expected}"),
-            ));
+            return Err(bad(name, format!("{weights} has hash {found}, expected {expected}")));
         }
         let file = TensorFile::open(&staged.path().join(WEIGHTS))?;
         if name != LPIPS {

@@ -21,10 +21,7 @@ impl Source {
             return Ok(Self::Url(source.to_owned()));
         }
         if source.contains("://") {
-            return Err(bad(
-                name,
-                format!("{source} is neither a path nor an https URL"),
-            ));
+            return Err(bad(name, format!("{source} is neither a path nor an https URL")));
         }
         let path = PathBuf::from(source);
         if path.is_dir() {
@@ -46,10 +43,7 @@ impl Source {
         };
         match self {
             Self::File(path) => {
-                let weights = path
-                    .file_name()
-                    .and_then(|n| n.to_str())
-                    .unwrap_or_default();
+                let weights = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
                 Self::File(path.with_file_name(named(weights)))
             }
             Self::Url(url) => {
@@ -77,11 +71,7 @@ impl Source {
                     .new_agent();
                 match agent.get(url).call() {
                     Ok(response) => {
-                        let body = response
-                            .into_body()
-                            .into_with_config()
-                            .limit(u64::MAX)
-                            .reader();
+                        let body = response.into_body().into_with_config().limit(u64::MAX).reader();
                         copy(name, body, to, most).map(Some)
                     }
                     Err(ureq::Error::StatusCode(404)) => Ok(None),

@@ -50,11 +50,7 @@ impl Models {
     /// # Errors
     /// [`Error::BadOption`] when none of the variables nor `HOME` is set.
     pub fn open() -> Result<Self> {
-        let variable = |name: &str| {
-            std::env::var_os(name)
-                .filter(|v| !v.is_empty())
-                .map(PathBuf::from)
-        };
+        let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
         let data = variable("GUARDSPLAT_HOME")
             .or_else(|| variable("XDG_DATA_HOME").map(|d| d.join("guardsplat")))
             .or_else(|| variable("HOME").map(|d| d.join(".local/share/guardsplat")));
@@ -82,10 +78,7 @@ impl Models {
             true => Ok(dir),
             false => Err(bad(
                 name,
-                format!(
-                    "is not in {}; add it with `models add`",
-                    self.folder.display()
-                ),
+                format!("is not in {}; add it with `models add`", self.folder.display()),
             )),
         }
     }
@@ -136,18 +129,10 @@ impl Models {
         let path = self.dir(name)?.join(MANIFEST);
         let file = std::fs::File::open(&path).map_err(Error::io(&path))?;
         let reader = std::io::Read::take(file, 1 << 16);
-        let entry: Entry =
-            serde_json::from_reader(reader).map_err(|e| bad(name, format!("{MANIFEST}: {e}")))?;
+        let entry: Entry = serde_json::from_reader(reader).map_err(|e| bad(name, format!("{MANIFEST}: {e}")))?;
         let known = [WEIGHTS, CONFIG, PREPROCESSOR];
-        match entry
-            .files
-            .keys()
-            .find(|file| !known.contains(&file.as_str()))
-        {
-            Some(file) => Err(bad(
-                name,
-                format!("{MANIFEST} names an unknown file, {file:?}"),
-            )),
+        match entry.files.keys().find(|file| !known.contains(&file.as_str())) {
+            Some(file) => Err(bad(name, format!("{MANIFEST} names an unknown file, {file:?}"))),
             None => Ok(entry),
         }
     }

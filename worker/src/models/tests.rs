@@ -12,9 +12,7 @@ fn tiny() -> (TempDir, String) {
     let config = ClipConfig::parse("tiny", json).unwrap();
     std::fs::write(dir.path().join(CONFIG), json).unwrap();
     let model = ClipModel::init(&config, Parts::Both, &Device::flex(), 1);
-    model
-        .save(&dir.path().join(WEIGHTS), Precision::F32)
-        .unwrap();
+    model.save(&dir.path().join(WEIGHTS), Precision::F32).unwrap();
     let sha256 = hash(&mut std::fs::File::open(dir.path().join(WEIGHTS)).unwrap()).unwrap();
     (dir, sha256)
 }
@@ -29,21 +27,14 @@ fn a_model_is_added_listed_verified_and_loaded() {
     let models = Models::at(home.path());
     assert_eq!(models.list().unwrap(), []);
     let entry = models
-        .add(
-            "tiny",
-            source.path().to_str().unwrap(),
-            &sha256.to_uppercase(),
-        )
+        .add("tiny", source.path().to_str().unwrap(), &sha256.to_uppercase())
         .unwrap();
     assert_eq!(entry.files.keys().collect::<Vec<_>>(), [CONFIG, WEIGHTS]);
     assert_eq!(models.list().unwrap(), std::slice::from_ref(&entry));
     assert_eq!(models.verify("tiny").unwrap(), entry);
     let clip = Clip::load(&models.dir("tiny").unwrap(), &Device::flex(), Parts::Both).unwrap();
     assert_eq!(clip.hash, sha256);
-    assert!(
-        reason(models.add("tiny", source.path().to_str().unwrap(), &sha256))
-            .contains("is there already")
-    );
+    assert!(reason(models.add("tiny", source.path().to_str().unwrap(), &sha256)).contains("is there already"));
 }
 
 #[test]
@@ -51,9 +42,7 @@ fn verify_names_the_file_that_changed() {
     let ((source, sha256), home) = (tiny(), tempfile::tempdir().unwrap());
     let models = Models::at(home.path());
     let weights = source.path().join(WEIGHTS);
-    models
-        .add("tiny", weights.to_str().unwrap(), &sha256)
-        .unwrap();
+    models.add("tiny", weights.to_str().unwrap(), &sha256).unwrap();
     std::fs::write(models.dir("tiny").unwrap().join(CONFIG), "{}").unwrap();
     assert!(reason(models.verify("tiny")).contains("config.json has hash"));
     assert!(reason(models.verify("other")).contains("models add"));
@@ -69,16 +58,8 @@ fn what_fails_leaves_nothing_behind() {
     for (source, sha256, needle) in [
         (path, "0".repeat(64), "expected 0000"),
         (path, "xyz".into(), "64 hexadecimal"),
-        (
-            "http://example.org/model.safetensors",
-            sha256.clone(),
-            "https",
-        ),
-        (
-            "/does/not/exist.safetensors",
-            sha256.clone(),
-            "does not exist",
-        ),
+        ("http://example.org/model.safetensors", sha256.clone(), "https"),
+        ("/does/not/exist.safetensors", sha256.clone(), "does not exist"),
         (
             empty.path().to_str().unwrap(),
             sha256.clone(),
@@ -89,9 +70,7 @@ fn what_fails_leaves_nothing_behind() {
         assert!(found.contains(needle), "{source}: {found}");
     }
     std::fs::copy(source.path().join(WEIGHTS), &lone).unwrap();
-    assert!(
-        reason(models.add("tiny", path_of(&lone), &sha256)).contains("config.json does not exist")
-    );
+    assert!(reason(models.add("tiny", path_of(&lone), &sha256)).contains("config.json does not exist"));
     // A configuration that parses but does not fit the weights.
     let wrong = std::fs::read_to_string(source.path().join(CONFIG))
         .unwrap()
@@ -99,12 +78,7 @@ fn what_fails_leaves_nothing_behind() {
     std::fs::write(empty.path().join(CONFIG), wrong).unwrap();
     assert!(reason(models.add("tiny", path_of(&lone), &sha256)).contains("expected [6"));
     assert_eq!(models.list().unwrap(), []);
-    assert_eq!(
-        std::fs::read_dir(home.path().join("models"))
-            .unwrap()
-            .count(),
-        0
-    );
+    assert_eq!(std::fs::read_dir(home.path().join("models")).unwrap().count(), 0);
 }
 
 fn path_of(path: &Path) -> &str {
@@ -132,12 +106,7 @@ fn lpips_needs_no_configuration() {
 
 #[test]
 fn configurations_are_looked_for_beside_the_weights() {
-    let beside = |url: &str| {
-        fetch::Source::parse("x", url)
-            .unwrap()
-            .beside(CONFIG)
-            .to_string()
-    };
+    let beside = |url: &str| fetch::Source::parse("x", url).unwrap().beside(CONFIG).to_string();
     assert_eq!(
         beside("https://h/a/b/model.safetensors?download=true"),
         "https://h/a/b/config.json"
@@ -146,8 +115,5 @@ fn configurations_are_looked_for_beside_the_weights() {
         beside("https://h/a/open_clip_model.safetensors"),
         "https://h/a/open_clip_config.json"
     );
-    assert_eq!(
-        beside("/m/open_clip_model.safetensors"),
-        "/m/open_clip_config.json"
-    );
+    assert_eq!(beside("/m/open_clip_model.safetensors"), "/m/open_clip_config.json");
 }

@@ -67,10 +67,7 @@ pub fn unbatch(tensor: Tensor<4>) -> Result<Vec<Picture>> {
         height: height as u32,
         pixels: chunk.to_vec(),
     };
-    Ok(pixels
-        .chunks_exact((3 * height * width).max(1))
-        .map(picture)
-        .collect())
+    Ok(pixels.chunks_exact((3 * height * width).max(1)).map(picture).collect())
 }
 
 #[cfg(test)]
@@ -87,11 +84,7 @@ mod tests {
         let (a, b) = (picture(0), picture(100));
         let tensor = batch(&[&a, &b], &Device::flex()).unwrap();
         assert_eq!(tensor.dims(), [2, 3, 2, 3]);
-        let green = tensor
-            .clone()
-            .slice([0..1, 1..2])
-            .try_into_vec_as::<f32>()
-            .unwrap();
+        let green = tensor.clone().slice([0..1, 1..2]).try_into_vec_as::<f32>().unwrap();
         assert_eq!(green, [1.0, 4.0, 7.0, 10.0, 13.0, 16.0]);
         assert_eq!(unbatch(tensor).unwrap(), [a, b]);
     }

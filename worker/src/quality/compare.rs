@@ -44,9 +44,7 @@ pub fn contact_sheet(pairs: &[(Picture, Picture)]) -> Result<Picture> {
     let (w, h) = (first.width as usize, first.height as usize);
     let (width, height) = (3 * w + 2 * GAP, pairs.len() * (h + GAP) - GAP);
     if width * height > super::files::MAX_PIXELS as usize {
-        let reason = format!(
-            "a sheet of {width} x {height} pixels is too large; take fewer or smaller ones"
-        );
+        let reason = format!("a sheet of {width} x {height} pixels is too large; take fewer or smaller ones");
         return Err(Error::BadOption {
             field: "pictures",
             reason,
@@ -94,17 +92,10 @@ mod tests {
 
     #[test]
     fn a_sheet_shows_three_pictures_a_row() {
-        let sheet =
-            contact_sheet(&[(picture(0.1), picture(0.12)), (picture(0.8), picture(0.8))]).unwrap();
-        assert_eq!(
-            (sheet.width, sheet.height, sheet.pixels.len()),
-            (14, 10, 420)
-        );
+        let sheet = contact_sheet(&[(picture(0.1), picture(0.12)), (picture(0.8), picture(0.8))]).unwrap();
+        assert_eq!((sheet.width, sheet.height, sheet.pixels.len()), (14, 10, 420));
         let at = |x: usize, y: usize| sheet.pixels[(y * 14 + x) * 3];
-        assert_eq!(
-            (at(0, 0), at(7, 2), at(2, 0), at(0, 3)),
-            (0.1, 0.12, 0.5, 0.5)
-        );
+        assert_eq!((at(0, 0), at(7, 2), at(2, 0), at(0, 3)), (0.1, 0.12, 0.5, 0.5));
         assert!((at(13, 1) - 0.2).abs() < 1e-5);
         assert_eq!((at(0, 7), at(13, 9)), (0.8, 0.0));
     }

@@ -44,10 +44,7 @@ impl PictureFormat {
             "jpg" | "jpeg" => Ok(Self::Jpeg(JPEG_QUALITY)),
             "webp" => Ok(Self::WebP),
             "exr" => Ok(Self::Exr),
-            _ => Err(bad(
-                path,
-                "its extension is none of png, jpg, jpeg, webp, exr".into(),
-            )),
+            _ => Err(bad(path, "its extension is none of png, jpg, jpeg, webp, exr".into())),
         }
     }
 }
@@ -66,22 +63,14 @@ fn bad(path: &Path, reason: String) -> Error {
 pub fn encode_picture(picture: &Picture, format: PictureFormat) -> Result<Vec<u8>, String> {
     let (width, height) = (picture.width, picture.height);
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(format!(
-            "{width} x {height} pixels are more than {MAX_PIXELS}"
-        ));
+        return Err(format!("{width} x {height} pixels are more than {MAX_PIXELS}"));
     }
-    let does_not_fit = || {
-        format!(
-            "{} values are not {width} x {height} pixels",
-            picture.pixels.len()
-        )
-    };
+    let does_not_fit = || format!("{} values are not {width} x {height} pixels", picture.pixels.len());
     if picture.pixels.is_empty() || picture.pixels.len() != 3 * width as usize * height as usize {
         return Err(does_not_fit());
     }
     let image = if format == PictureFormat::Exr {
-        image::Rgb32FImage::from_raw(width, height, picture.pixels.clone())
-            .map(DynamicImage::ImageRgb32F)
+        image::Rgb32FImage::from_raw(width, height, picture.pixels.clone()).map(DynamicImage::ImageRgb32F)
     } else {
         // NaN becomes 0.
         let bytes = picture
@@ -95,10 +84,9 @@ pub fn encode_picture(picture: &Picture, format: PictureFormat) -> Result<Vec<u8
     let mut bytes = Cursor::new(Vec::new());
     match format {
         PictureFormat::Png => image.write_to(&mut bytes, ImageFormat::Png),
-        PictureFormat::Jpeg(quality) => image.write_with_encoder(JpegEncoder::new_with_quality(
-            &mut bytes,
-            quality.clamp(1, 100),
-        )),
+        PictureFormat::Jpeg(quality) => {
+            image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100)))
+        }
         PictureFormat::WebP => image.write_to(&mut bytes, ImageFormat::WebP),
         PictureFormat::Exr => image.write_to(&mut bytes, ImageFormat::OpenExr),
     }
@@ -124,9 +112,7 @@ pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, Str
     let mut decoder = reader.into_decoder().map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(format!(
-            "{width} x {height} pixels are more than {MAX_PIXELS}"
-        ));
+        return Err(format!("{width} x {height} pixels are more than {MAX_PIXELS}"));
     }
     let orientation = decoder.orientation().map_err(|e| e.to_string())?;
     let mut image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
@@ -136,11 +122,7 @@ pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, Str
     let pixels = if transparent {
         let over = |[r, g, b, a]: [f32; 4]| {
             let [p, q, s] = background;
-            [
-                r * a + p * (1.0 - a),
-                g * a + q * (1.0 - a),
-                b * a + s * (1.0 - a),
-            ]
+            [r * a + p * (1.0 - a), g * a + q * (1.0 - a), b * a + s * (1.0 - a)]
         };
         image
             .into_rgba32f()
@@ -166,11 +148,7 @@ pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, Str
     if pixels.is_empty() {
         return Err("it has no pixels".into());
     }
-    Ok(Picture {
-        width,
-        height,
-        pixels,
-    })
+    Ok(Picture { width, height, pixels })
 }
 
 /// Reads a picture file as [`decode_picture`] does. Fails with [`Error::BadPicture`], or [`Error::Io`].
@@ -189,8 +167,7 @@ pub fn read_picture(path: &Path, background: [f32; 3]) -> Result<Picture> {
 
 /// Writes a picture in the format of the file's extension, whole or not at all.
 pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
-    let bytes =
-        encode_picture(picture, PictureFormat::of(path)?).map_err(|reason| bad(path, reason))?;
+    let bytes = encode_picture(picture, PictureFormat::of(path)?).map_err(|reason| bad(path, reason))?;
     let parent = path
         .parent()
         .filter(|p| !p.as_os_str().is_empty())
@@ -215,8 +192,7 @@ mod tests {
     const BLACK: [f32; 3] = [0.0; 3];
 
     fn picture() -> Picture {
-        let pixels =
-            (0..20 * 12 * 3).map(|i| ((i % 60) as f32 / 59.0 + (i / 60) as f32 / 12.0) / 2.0);
+        let pixels = (0..20 * 12 * 3).map(|i| ((i % 60) as f32 / 59.0 + (i / 60) as f32 / 12.0) / 2.0);
         Picture {
             width: 20,
             height: 12,
@@ -286,8 +262,7 @@ mod tests {
         bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
         let reason = decode_picture(&bytes, BLACK).unwrap_err();
         assert!(
-            reason.contains("100000 x 100000 pixels are more than 64000000")
-                || reason.contains("limit"),
+            reason.contains("100000 x 100000 pixels are more than 64000000") || reason.contains("limit"),
             "{reason}"
         );
     }
@@ -295,11 +270,7 @@ mod tests {
     fn crc32(bytes: &[u8]) -> u32 {
         !bytes.iter().fold(!0_u32, |crc, &byte| {
             (0..8).fold(crc ^ u32::from(byte), |c, _| {
-                if c & 1 == 1 {
-                    c >> 1 ^ 0xEDB8_8320
-                } else {
-                    c >> 1
-                }
+                if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 }
             })
         })
     }
@@ -315,11 +286,7 @@ mod tests {
             let bytes = encode_picture(&picture(), format).unwrap();
             assert!(decode_picture(&bytes[..20], BLACK).is_err(), "{format:?}");
         }
-        assert!(
-            decode_picture(b"ply\nformat", BLACK)
-                .unwrap_err()
-                .contains("not a PNG")
-        );
+        assert!(decode_picture(b"ply\nformat", BLACK).unwrap_err().contains("not a PNG"));
         assert!(decode_picture(b"", BLACK).is_err());
         let mut broken = picture();
         broken.pixels[3 * 21] = f32::NAN;

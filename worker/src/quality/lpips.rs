@@ -48,15 +48,10 @@ impl Lpips {
                 Stage {
                     weight: Tensor::from_data(TensorData::new(weights.weight, dims), device),
                     bias: Tensor::from_data(TensorData::new(weights.bias, [shape.outputs]), device),
-                    head: Tensor::from_data(
-                        TensorData::new(weights.head, [1, shape.outputs, 1, 1]),
-                        device,
-                    ),
+                    head: Tensor::from_data(TensorData::new(weights.head, [1, shape.outputs, 1, 1]), device),
                 }
             });
-        let channels = |values: [f32; 3]| {
-            Tensor::from_data(TensorData::new(values.to_vec(), [1, 3, 1, 1]), device)
-        };
+        let channels = |values: [f32; 3]| Tensor::from_data(TensorData::new(values.to_vec(), [1, 3, 1, 1]), device);
         Ok(Self {
             stages: stages.collect(),
             shift: channels(SHIFT),
@@ -70,9 +65,7 @@ impl Lpips {
         if channels != 3 || h < MINIMUM_SIZE || w < MINIMUM_SIZE {
             return Err(Error::BadOption {
                 field: "pictures",
-                reason: format!(
-                    "LPIPS needs RGB of at least {MINIMUM_SIZE} x {MINIMUM_SIZE} pixels, not {w} x {h}"
-                ),
+                reason: format!("LPIPS needs RGB of at least {MINIMUM_SIZE} x {MINIMUM_SIZE} pixels, not {w} x {h}"),
             });
         }
         let mut x = (pictures * 2.0 - 1.0 - self.shift.clone()) / self.scale.clone();
@@ -82,12 +75,7 @@ impl Lpips {
                 x = max_pool2d(x, MaxPoolOptions::new([3, 3]).with_stride([2, 2]));
             }
             let options = ConvOptions::new([shape.stride; 2], [shape.padding; 2], [1, 1], 1);
-            x = relu(conv2d(
-                x,
-                stage.weight.clone(),
-                Some(stage.bias.clone()),
-                options,
-            ));
+            x = relu(conv2d(x, stage.weight.clone(), Some(stage.bias.clone()), options));
             // The root's argument is kept off zero, where its slope is infinite.
             let norm = (x.clone().square().sum_dim(1) + EPSILON * EPSILON).sqrt() + EPSILON;
             features.push(x.clone() / norm);
@@ -98,20 +86,12 @@ impl Lpips {
     /// Distance of each pair of views, `[b]`, 0 for identical ones; both must stem from this network and from batches
     /// of one shape.
     pub fn distance(&self, a: &Features, b: &Features) -> Tensor<1> {
-        let layers = self
-            .stages
-            .iter()
-            .zip(a.0.iter().zip(&b.0))
-            .map(|(stage, (a, b))| {
-                let [batch, channels, h, w] = a.dims();
-                let weighted = (a.clone() - b.clone()).square() * stage.head.clone();
-                // Sum over channels, mean over positions.
-                weighted
-                    .reshape([batch, channels * h * w])
-                    .sum_dim(1)
-                    .reshape([batch])
-                    / (h * w) as f32
-            });
+        let layers = self.stages.iter().zip(a.0.iter().zip(&b.0)).map(|(stage, (a, b))| {
+            let [batch, channels, h, w] = a.dims();
+            let weighted = (a.clone() - b.clone()).square() * stage.head.clone();
+            // Sum over channels, mean over positions.
+            weighted.reshape([batch, channels * h * w]).sum_dim(1).reshape([batch]) / (h * w) as f32
+        });
         let [batch, ..] = a.0[0].dims();
         let zero = Tensor::zeros([batch], &a.0[0].device());
         layers.fold(zero, |sum, layer| sum + layer)
@@ -140,12 +120,9 @@ mod tests {
     fn pattern(h: usize, w: usize, phase: f64, device: &Device) -> Tensor<4> {
         let value = |c: usize, y: usize, x: usize| {
             let (c, y, x) = (c as f64, y as f64, x as f64);
-            (0.5 + 0.3 * (0.3 * x + c + phase).sin()
-                + 0.2 * (0.23 * y - 0.5 * c + 2.0 * phase).cos()) as f32
+            (0.5 + 0.3 * (0.3 * x + c + phase).sin() + 0.2 * (0.23 * y - 0.5 * c + 2.0 * phase).cos()) as f32
         };
-        let values: Vec<f32> = (0..3 * h * w)
-            .map(|i| value(i / (h * w), i / w % h, i % w))
-            .collect();
+        let values: Vec<f32> = (0..3 * h * w).map(|i| value(i / (h * w), i / w % h, i % w)).collect();
         Tensor::from_data(TensorData::new(values, [1, 3, h, w]), device)
     }
 
@@ -192,10 +169,7 @@ mod tests {
                     .per_view(pattern(h, w, 0.0, &device), pattern(h, w, 0.7, &device))
                     .unwrap(),
             );
-            assert!(
-                (value - expected).abs() < 1e-5,
-                "{h} x {w}: {value} {expected}"
-            );
+            assert!((value - expected).abs() < 1e-5, "{h} x {w}: {value} {expected}");
         }
     }
 
@@ -208,11 +182,7 @@ mod tests {
             pattern(40, 35, 0.7, &device).require_grad(),
         );
         let gradients = lpips.per_view(x.clone(), y.clone()).unwrap().backward();
-        let gradient = y
-            .grad(&gradients)
-            .unwrap()
-            .try_into_vec_as::<f32>()
-            .unwrap();
+        let gradient = y.grad(&gradients).unwrap().try_into_vec_as::<f32>().unwrap();
         // PyTorch's, because the network has so many kinks that differences mislead by percents.
         let norm = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
         assert!((norm - 0.018_454_146).abs() < 1e-6, "{norm}");
@@ -231,11 +201,7 @@ mod tests {
 
         let black = Tensor::<4>::zeros([1, 3, 40, 35], &device).require_grad();
         let gradients = lpips.per_view(x, black.clone()).unwrap().backward();
-        let gradient = black
-            .grad(&gradients)
-            .unwrap()
-            .try_into_vec_as::<f32>()
-            .unwrap();
+        let gradient = black.grad(&gradients).unwrap().try_into_vec_as::<f32>().unwrap();
         assert!(gradient.iter().all(|v| v.is_finite()));
     }
 
@@ -256,11 +222,7 @@ mod tests {
         let Err(error) = lpips.features(pattern(31, 30, 0.0, &device)) else {
             panic!()
         };
-        assert!(
-            error
-                .to_string()
-                .contains("at least 31 x 31 pixels, not 30 x 31")
-        );
+        assert!(error.to_string().contains("at least 31 x 31 pixels, not 30 x 31"));
     }
 
     /// Height, width and the distance that PyTorch's functional operations give for the same weights and pattern.

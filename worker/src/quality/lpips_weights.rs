@@ -17,13 +17,7 @@ pub(super) struct Convolution {
     pub padding: usize,
 }
 
-const fn convolution(
-    inputs: usize,
-    outputs: usize,
-    kernel: usize,
-    stride: usize,
-    padding: usize,
-) -> Convolution {
+const fn convolution(inputs: usize, outputs: usize, kernel: usize, stride: usize, padding: usize) -> Convolution {
     Convolution {
         inputs,
         outputs,
@@ -70,8 +64,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<StageWeights>, String> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(format!("it is larger than {MAX_BYTES} bytes"));
     }
-    let file =
-        SafeTensors::deserialize(bytes).map_err(|e| format!("not a safetensors file ({e})"))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| format!("not a safetensors file ({e})"))?;
     let stage = |(i, c): (usize, Convolution)| {
         Ok(StageWeights {
             weight: tensor(
@@ -87,9 +80,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<StageWeights>, String> {
 }
 
 fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
-    let view = file
-        .tensor(name)
-        .map_err(|_| format!("{name} is missing"))?;
+    let view = file.tensor(name).map_err(|_| format!("{name} is missing"))?;
     if view.dtype() != Dtype::F32 || view.shape() != shape {
         return Err(format!(
             "{name} is {:?} {:?}, not F32 {shape:?}",
@@ -133,12 +124,10 @@ mod tests {
             .iter()
             .map(|(_, shape)| value.to_le_bytes().repeat(shape.iter().product()))
             .collect();
-        let views = parts.iter().zip(&data).map(|((name, shape), data)| {
-            (
-                name.as_str(),
-                TensorView::new(Dtype::F32, shape.clone(), data).unwrap(),
-            )
-        });
+        let views = parts
+            .iter()
+            .zip(&data)
+            .map(|((name, shape), data)| (name.as_str(), TensorView::new(Dtype::F32, shape.clone(), data).unwrap()));
         safetensors::serialize(views, None).unwrap()
     }
 
@@ -150,10 +139,7 @@ mod tests {
         assert!(reason(&whole[..whole.len() - 1]).contains("not a safetensors file"));
         assert!(reason(b"PK").contains("not a safetensors file"));
         assert!(reason(&file(f32::NAN, 256, "")).contains("features.conv0.weight holds NaN"));
-        assert!(
-            reason(&file(0.5, 255, ""))
-                .contains("lin4.weight is F32 [1, 255, 1, 1], not F32 [1, 256, 1, 1]")
-        );
+        assert!(reason(&file(0.5, 255, "")).contains("lin4.weight is F32 [1, 255, 1, 1], not F32 [1, 256, 1, 1]"));
         assert!(reason(&file(0.5, 256, "lin2.weight")).contains("lin2.weight is missing"));
         assert!(reason(&vec![0; MAX_BYTES as usize + 1]).contains("larger than"));
     }

@@ -24,24 +24,12 @@ pub struct Quality {
 /// Compares pairs of original and marked views, each pair of one size.
 ///
 /// Fails without pairs, when the sizes of a pair differ, and on pictures too small for LPIPS when it is given.
-pub fn measure(
-    pairs: &[(Picture, Picture)],
-    lpips: Option<&Lpips>,
-    device: &Device,
-) -> Result<Quality> {
+pub fn measure(pairs: &[(Picture, Picture)], lpips: Option<&Lpips>, device: &Device) -> Result<Quality> {
     let device = &device.clone().without_autodiff();
-    let views = pairs
-        .iter()
-        .map(|(a, b)| psnr(a, b))
-        .collect::<Result<Vec<_>>>()?;
+    let views = pairs.iter().map(|(a, b)| psnr(a, b)).collect::<Result<Vec<_>>>()?;
     let psnr = mean_psnr(&views)?;
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-    let ssim = mean(
-        pairs
-            .iter()
-            .map(|(a, b)| ssim(a, b, device))
-            .collect::<Result<_>>()?,
-    );
+    let ssim = mean(pairs.iter().map(|(a, b)| ssim(a, b, device)).collect::<Result<_>>()?);
     let distance = |lpips: &Lpips, (a, b): &(Picture, Picture)| -> Result<f64> {
         let distance = lpips
             .per_view(batch(&[a], device)?, batch(&[b], device)?)?
@@ -54,10 +42,7 @@ pub fn measure(
     let lpips = match lpips {
         None => None,
         Some(lpips) => Some(mean(
-            pairs
-                .iter()
-                .map(|pair| distance(lpips, pair))
-                .collect::<Result<_>>()?,
+            pairs.iter().map(|pair| distance(lpips, pair)).collect::<Result<_>>()?,
         )),
     };
     Ok(Quality { psnr, ssim, lpips })
@@ -72,9 +57,7 @@ mod tests {
         Picture {
             width: 32,
             height: 32,
-            pixels: (0..32 * 32 * 3)
-                .map(|i| slope * (i % 96) as f32 / 96.0)
-                .collect(),
+            pixels: (0..32 * 32 * 3).map(|i| slope * (i % 96) as f32 / 96.0).collect(),
         }
     }
 
@@ -91,13 +74,9 @@ mod tests {
     fn means_are_over_views() {
         let (a, b, c) = (gradient(0.5), gradient(0.55), gradient(0.6));
         let device = Device::flex();
-        let lpips = model_path("lpips_alex_v0.1.safetensors")
-            .map(|path| Lpips::load(&path, &device).unwrap());
+        let lpips = model_path("lpips_alex_v0.1.safetensors").map(|path| Lpips::load(&path, &device).unwrap());
         let run = |pairs: &[(Picture, Picture)]| measure(pairs, lpips.as_ref(), &device).unwrap();
-        let (first, second) = (
-            run(&[(a.clone(), b.clone())]),
-            run(&[(a.clone(), c.clone())]),
-        );
+        let (first, second) = (run(&[(a.clone(), b.clone())]), run(&[(a.clone(), c.clone())]));
         let both = run(&[(a.clone(), b), (a, c)]);
         assert!((both.ssim - (first.ssim + second.ssim) / 2.0).abs() < 1e-9);
         let db = |q: &Quality| q.psnr.psnr_db.unwrap();

@@ -107,10 +107,7 @@ mod tests {
     fn identical_pictures_are_null_in_json() {
         assert_eq!(psnr(&grey(0.5), &grey(0.5)).unwrap(), Psnr::Identical);
         let json = serde_json::to_string(&mean_psnr(&[Psnr::Identical; 2]).unwrap()).unwrap();
-        assert_eq!(
-            json,
-            r#"{"psnr_db":null,"identical":true,"identical_views":2}"#
-        );
+        assert_eq!(json, r#"{"psnr_db":null,"identical":true,"identical_views":2}"#);
     }
 
     #[test]

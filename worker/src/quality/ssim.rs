@@ -51,10 +51,7 @@ impl Ssim {
     fn blur(&self, x: Tensor<4>) -> Tensor<4> {
         let [b, c, h, w] = x.dims();
         let x = x.reshape([b * c * h, w]).matmul(self.columns.clone());
-        let x = x
-            .reshape([b, c, h, w])
-            .swap_dims(2, 3)
-            .reshape([b * c * w, h]);
+        let x = x.reshape([b, c, h, w]).swap_dims(2, 3).reshape([b * c * w, h]);
         x.matmul(self.rows.clone()).reshape([b, c, w, h])
     }
 
@@ -157,10 +154,7 @@ mod tests {
             let a = random(w, h, 1);
             let b = noisy(&a, amount, 2);
             let (value, expected) = (ssim(&a, &b, &Device::flex()).unwrap(), reference(&a, &b));
-            assert!(
-                (value - expected).abs() < 1e-5,
-                "{w} x {h}: {value} {expected}"
-            );
+            assert!((value - expected).abs() < 1e-5, "{w} x {h}: {value} {expected}");
         }
     }
 
@@ -203,10 +197,7 @@ mod tests {
             };
             let slope = (value(1e-3) - value(-1e-3)) / 2e-3;
             let got = f64::from(gradient.pixels[at]);
-            assert!(
-                (got - slope).abs() < 2e-5 + 0.01 * slope.abs(),
-                "{at}: {got} {slope}"
-            );
+            assert!((got - slope).abs() < 2e-5 + 0.01 * slope.abs(), "{at}: {got} {slope}");
         }
     }
 
@@ -217,10 +208,7 @@ mod tests {
         let metric = Ssim::new(10, 12, &device);
         let left = batch(&[&a, &b], &device).unwrap();
         let right = batch(&[&b, &c], &device).unwrap();
-        let both = metric
-            .per_view(left, right)
-            .try_into_vec_as::<f32>()
-            .unwrap();
+        let both = metric.per_view(left, right).try_into_vec_as::<f32>().unwrap();
         for (value, (x, y)) in both.iter().zip([(&a, &b), (&b, &c)]) {
             assert!((f64::from(*value) - ssim(x, y, &device).unwrap()).abs() < 1e-6);
         }

@@ -34,12 +34,7 @@ impl Highlight {
         let bases: Vec<[f32; 25]> = directions.iter().map(|d| basis(degree, *d)).collect();
         let mut rows: Vec<Vec<f64>> = (0..k)
             .map(|i| {
-                let product = |j: usize| {
-                    bases
-                        .iter()
-                        .map(|b| f64::from(b[i]) * f64::from(b[j]))
-                        .sum::<f64>()
-                };
+                let product = |j: usize| bases.iter().map(|b| f64::from(b[i]) * f64::from(b[j])).sum::<f64>();
                 (0..k)
                     .map(product)
                     .chain(bases.iter().map(|b| f64::from(b[i])))
@@ -54,9 +49,7 @@ impl Highlight {
             for (i, row) in rows.iter_mut().enumerate() {
                 let factor = row[pivot];
                 if i != pivot {
-                    row.iter_mut()
-                        .zip(&head)
-                        .for_each(|(v, h)| *v -= factor * h);
+                    row.iter_mut().zip(&head).for_each(|(v, h)| *v -= factor * h);
                 }
             }
         }
@@ -102,12 +95,7 @@ mod tests {
             let coefficients = Highlight::new(degree).fitted(Some(towards), 1.0);
             let at = |d: [f32; 3]| -> f32 {
                 let b = basis(degree, d);
-                coefficients
-                    .iter()
-                    .step_by(3)
-                    .zip(b)
-                    .map(|(c, b)| c * b)
-                    .sum()
+                coefficients.iter().step_by(3).zip(b).map(|(c, b)| c * b).sum()
             };
             let peak = at(towards.map(|x| -x));
             assert!(peak > last + 0.05, "degree {degree}: {peak} after {last}");
@@ -115,11 +103,6 @@ mod tests {
             last = peak;
         }
         assert!(last > 0.7 && last < 1.1, "{last}");
-        assert!(
-            Highlight::new(0)
-                .fitted(Some(towards), 1.0)
-                .iter()
-                .all(|c| *c == 0.0)
-        );
+        assert!(Highlight::new(0).fitted(Some(towards), 1.0).iter().all(|c| *c == 0.0));
     }
 }

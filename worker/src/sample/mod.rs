@@ -75,8 +75,7 @@ pub fn sample(gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
             // A low-discrepancy grid over the surface, loosened a little to hide its rows.
             let jitter: [f64; 2] = [random.random(), random.random()];
             let u = (i as f64 + jitter[0]) / count as f64;
-            let v = (i as f64 * 0.618_033_988_749_894_9 + 0.3 * jitter[1] / (count as f64).sqrt())
-                .fract();
+            let v = (i as f64 * 0.618_033_988_749_894_9 + 0.3 * jitter[1] / (count as f64).sqrt()).fract();
             let (position, normal) = solid.point(u, v);
             let shade = shade(texture.colour(solid.to_own_axes(position)), normal, lamp);
             let deviation = WIDTH * spacing;
@@ -135,11 +134,7 @@ mod tests {
             let g = sample(count, degree, 7).unwrap().gaussians;
             assert_eq!((g.len(), g.sh.degree), (count, degree));
             assert_eq!(g.sh.coefficients.len(), count * g.sh.per_gaussian());
-            let flat = g
-                .positions
-                .iter()
-                .flatten()
-                .chain(g.log_scales.iter().flatten());
+            let flat = g.positions.iter().flatten().chain(g.log_scales.iter().flatten());
             assert!(
                 flat.chain(g.rotations.iter().flatten())
                     .chain(&g.sh.coefficients)
@@ -171,22 +166,13 @@ mod tests {
     fn stands_upright_on_ground() {
         for seed in 0..6 {
             let extent = Extent::of(&sample(3000, 0, seed).unwrap().gaussians).unwrap();
-            assert_eq!(
-                (extent.up, extent.on_ground),
-                ([0.0, -1.0, 0.0], true),
-                "seed {seed}"
-            );
+            assert_eq!((extent.up, extent.on_ground), ([0.0, -1.0, 0.0], true), "seed {seed}");
         }
     }
 
     #[test]
     fn thin_axes_are_normals() {
-        for normal in [
-            [0.0, 0.0, 1.0],
-            [0.0, 0.0, -1.0],
-            [0.6, -0.8, 0.0],
-            [0.36, 0.48, -0.8],
-        ] {
+        for normal in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, -0.8, 0.0], [0.36, 0.48, -0.8]] {
             let [w, x, y, z] = facing(normal);
             let third = [
                 2.0 * (x * z + w * y),

@@ -65,9 +65,8 @@ impl Solid {
     /// The point and outward unit normal for `u`, `v` in [0, 1): even in the square is even on the surface.
     pub fn point(&self, u: f64, v: f64) -> ([f32; 3], [f32; 3]) {
         let (point, normal) = surface(self.shape, u, v);
-        let place = |p: [f64; 3]| -> [f32; 3] {
-            std::array::from_fn(|k| (0..3).map(|a| p[a] as f32 * self.axes[a][k]).sum())
-        };
+        let place =
+            |p: [f64; 3]| -> [f32; 3] { std::array::from_fn(|k| (0..3).map(|a| p[a] as f32 * self.axes[a][k]).sum()) };
         let normal = unit(place(normal)).unwrap_or([0.0, -1.0, 0.0]);
         let point = place(point);
         (std::array::from_fn(|k| point[k] + self.centre[k]), normal)
@@ -83,13 +82,7 @@ impl Solid {
 fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     let (sine, cosine) = (TAU * v).sin_cos();
     // A disc of area-preserving radius at height y.
-    let disc = |radius: f64, share: f64, y: f64| {
-        [
-            radius * share.sqrt() * cosine,
-            y,
-            radius * share.sqrt() * sine,
-        ]
-    };
+    let disc = |radius: f64, share: f64, y: f64| [radius * share.sqrt() * cosine, y, radius * share.sqrt() * sine];
     match shape {
         Shape::Ground { radius } => (disc(radius, u, 0.0), [0.0, -1.0, 0.0]),
         Shape::Sphere { radius } => {
@@ -152,11 +145,7 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
             } else {
                 let share = (u - base) / (1.0 - base);
                 let y = half * (2.0 * share.sqrt() - 1.0);
-                let normal = [
-                    2.0 * half / side * cosine,
-                    -radius / side,
-                    2.0 * half / side * sine,
-                ];
+                let normal = [2.0 * half / side * cosine, -radius / side, 2.0 * half / side * sine];
                 (disc(radius, share, y), normal)
             }
         }
@@ -167,9 +156,7 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
 pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
     let size: [f64; 5] = std::array::from_fn(|_| random.random_range(0.85..1.15));
     let mut shapes = [
-        Shape::Sphere {
-            radius: 0.34 * size[0],
-        },
+        Shape::Sphere { radius: 0.34 * size[0] },
         Shape::Torus {
             ring: 0.28 * size[1],
             tube: 0.12 * size[1],
@@ -210,11 +197,7 @@ pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
             Shape::Cylinder { half, .. } | Shape::Cone { half, .. } => (turned(turn), half),
         };
         let centre = [reach * angle.cos(), -height, reach * angle.sin()].map(|x| x as f32);
-        solids.push(Solid {
-            shape,
-            axes,
-            centre,
-        });
+        solids.push(Solid { shape, axes, centre });
     }
     solids
 }
@@ -279,8 +262,7 @@ mod tests {
             for solid in arrange(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed)) {
                 let mut lowest = f32::NEG_INFINITY;
                 for i in 0..2000 {
-                    let (p, normal) =
-                        solid.point(f64::from(i) / 2000.0, f64::from(i) * 0.618 % 1.0);
+                    let (p, normal) = solid.point(f64::from(i) / 2000.0, f64::from(i) * 0.618 % 1.0);
                     lowest = lowest.max(p[1]);
                     assert!(p[0].hypot(p[2]) < GROUND as f32 + 0.01);
                     assert!((dot(normal, normal) - 1.0).abs() < 1e-4);

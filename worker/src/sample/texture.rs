@@ -26,12 +26,7 @@ impl Texture {
         let pattern = if ground {
             [Pattern::Earth, Pattern::Checks, Pattern::Marble][random.random_range(0..3)]
         } else {
-            [
-                Pattern::Stripes,
-                Pattern::Checks,
-                Pattern::Dots,
-                Pattern::Marble,
-            ][random.random_range(0..4)]
+            [Pattern::Stripes, Pattern::Checks, Pattern::Dots, Pattern::Marble][random.random_range(0..4)]
         };
         let hue = random.random_range(0.0..1.0);
         let (saturation, gloss) = if ground {
@@ -43,10 +38,7 @@ impl Texture {
         let other = hue + random.random_range(0.3..0.7);
         Texture {
             pattern,
-            colours: [
-                colour(hue, saturation, 0.85),
-                colour(other, 0.7 * saturation, 0.45),
-            ],
+            colours: [colour(hue, saturation, 0.85), colour(other, 0.7 * saturation, 0.45)],
             frequency: if ground {
                 random.random_range(2.0..3.5)
             } else {
@@ -71,12 +63,7 @@ impl Texture {
             Pattern::Checks => {
                 let sign = |x: f32| (std::f32::consts::PI * x).sin();
                 // Offsets keep faces of boxes, where a coordinate is constant, off the zeros.
-                edge(
-                    8.0 * sign(q[0])
-                        * sign(q[2])
-                        * (sign(0.7 * q[1]).abs() + 0.3)
-                        * sign(0.35 * q[1] + 0.2).signum(),
-                )
+                edge(8.0 * sign(q[0]) * sign(q[2]) * (sign(0.7 * q[1]).abs() + 0.3) * sign(0.35 * q[1] + 0.2).signum())
             }
             Pattern::Dots => {
                 let from_centre = |x: f32| (x - x.floor() - 0.5).powi(2);
@@ -86,9 +73,7 @@ impl Texture {
             Pattern::Earth => (1.6 * turbulence(q) - 0.3).clamp(0.0, 1.0),
         };
         let grain = 0.9 + 0.2 * noise(q.map(|x| 6.0 * x));
-        std::array::from_fn(|c| {
-            (grain * (self.colours[0][c] * t + self.colours[1][c] * (1.0 - t))).clamp(0.0, 1.0)
-        })
+        std::array::from_fn(|c| (grain * (self.colours[0][c] * t + self.colours[1][c] * (1.0 - t))).clamp(0.0, 1.0))
     }
 }
 
@@ -122,9 +107,7 @@ fn noise(p: [f32; 3]) -> f32 {
     (0..8)
         .map(|corner| {
             let bit = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
-            let weight: f32 = (0..3)
-                .map(|k| if bit[k] == 1 { t[k] } else { 1.0 - t[k] })
-                .product();
+            let weight: f32 = (0..3).map(|k| if bit[k] == 1 { t[k] } else { 1.0 - t[k] }).product();
             weight * lattice([0, 1, 2].map(|k| cell[k] as i32 + bit[k]))
         })
         .sum()

@@ -26,9 +26,7 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
             let mut words = Vec::with_capacity(layout.columns);
             let mut lines = ascii_lines(body).filter(|line| !line.trim_ascii().is_empty());
             for _ in 0..layout.skip {
-                lines
-                    .next()
-                    .ok_or("the body ends before the first Gaussian")?;
+                lines.next().ok_or("the body ends before the first Gaussian")?;
             }
             for row in 0..layout.rows {
                 let line = lines.next().ok_or_else(|| truncated(row, layout.rows))?;
@@ -37,20 +35,13 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
                     return Err(truncated(row, layout.rows));
                 }
                 if words.len() != layout.columns {
-                    return Err(format!(
-                        "row {row} has {} values, not {}",
-                        words.len(),
-                        layout.columns
-                    ));
+                    return Err(format!("row {row} has {} values, not {}", words.len(), layout.columns));
                 }
                 for (i, field) in layout.fields.all.iter().enumerate() {
                     let word = &line[words[field.column].clone()];
                     values[i] = number(word).ok_or_else(|| {
                         let (name, word) = (super::fields::name(i), String::from_utf8_lossy(word));
-                        format!(
-                            "property {name} of row {row} is {:?}, not a number",
-                            quote(&word)
-                        )
+                        format!("property {name} of row {row} is {:?}, not a number", quote(&word))
                     })?;
                 }
                 collected.push(&values)?;
@@ -63,12 +54,7 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
 /// Writes the body with the colours `sh`. Values that are as they were keep their bytes.
 ///
 /// `layout` and `body` are those of a successful [`decode`], and `sh` has the same degree and rows.
-pub(super) fn encode(
-    layout: &Layout,
-    body: &[u8],
-    sh: &Sh,
-    out: &mut impl Write,
-) -> io::Result<()> {
+pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write) -> io::Result<()> {
     let degree = layout.fields.degree;
     let order: Vec<usize> = (0..sh.per_gaussian())
         .map(|i| super::fields::sh_index(degree, i))
@@ -135,10 +121,7 @@ fn encode_line(
 }
 
 /// The promised rows, checked against the bytes that are there.
-fn binary_rows<'a>(
-    layout: &Layout,
-    body: &'a [u8],
-) -> Result<std::slice::ChunksExact<'a, u8>, String> {
+fn binary_rows<'a>(layout: &Layout, body: &'a [u8]) -> Result<std::slice::ChunksExact<'a, u8>, String> {
     // Again, since a file can shrink between the look at its size and the read.
     layout.check_size(body.len() as u64)?;
     let start = layout.skip as usize;

@@ -5,8 +5,8 @@ use ply_rs::ply::ScalarType;
 
 /// Properties before the rest coefficients, in the order in which rows are handed to [`Rows::push`].
 const FIXED: [&str; 14] = [
-    "x", "y", "z", "rot_0", "rot_1", "rot_2", "rot_3", "scale_0", "scale_1", "scale_2", "opacity",
-    "f_dc_0", "f_dc_1", "f_dc_2",
+    "x", "y", "z", "rot_0", "rot_1", "rot_2", "rot_3", "scale_0", "scale_1", "scale_2", "opacity", "f_dc_0", "f_dc_1",
+    "f_dc_2",
 ];
 /// Index of `f_dc_0` in [`FIXED`]: colour is what follows.
 pub(super) const COLOUR: usize = 11;
@@ -35,47 +35,32 @@ impl Fields {
     /// Finds the properties among the columns of a row; `Err` is what is missing or wrong.
     pub fn find(columns: &[(&str, &ScalarType)]) -> Result<Fields, String> {
         if columns.iter().any(|(name, _)| *name == "packed_position") {
-            return Err(
-                "a compressed PLY (property packed_position); expand it to a plain 3DGS PLY first"
-                    .into(),
-            );
+            return Err("a compressed PLY (property packed_position); expand it to a plain 3DGS PLY first".into());
         }
         let find = |name: &str| -> Result<Field, String> {
             let column = columns
                 .iter()
                 .position(|(other, _)| *other == name)
-                .ok_or_else(|| {
-                    format!("not a 3DGS scene: element vertex has no property {name}")
-                })?;
+                .ok_or_else(|| format!("not a 3DGS scene: element vertex has no property {name}"))?;
             let double = match columns[column].1 {
                 ScalarType::Float => false,
                 ScalarType::Double => true,
                 other => {
-                    return Err(format!(
-                        "property {name} is {other:?}, must be float or double"
-                    ));
+                    return Err(format!("property {name} is {other:?}, must be float or double"));
                 }
             };
             let offset = columns[..column].iter().map(|(_, kind)| bytes(kind)).sum();
-            Ok(Field {
-                column,
-                offset,
-                double,
-            })
+            Ok(Field { column, offset, double })
         };
         let mut all = FIXED.into_iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        let rest = columns
-            .iter()
-            .filter(|(name, _)| name.starts_with("f_rest_"))
-            .count();
-        let degree = (0..=MAX_DEGREE).find(|degree| rest_count(*degree) == rest).ok_or_else(|| {
-            format!("{rest} f_rest properties fit no degree of spherical harmonics; 0, 9, 24, 45 or 72 do")
-        })?;
+        let rest = columns.iter().filter(|(name, _)| name.starts_with("f_rest_")).count();
+        let degree = (0..=MAX_DEGREE)
+            .find(|degree| rest_count(*degree) == rest)
+            .ok_or_else(|| {
+                format!("{rest} f_rest properties fit no degree of spherical harmonics; 0, 9, 24, 45 or 72 do")
+            })?;
         for i in 0..rest {
-            all.push(
-                find(&format!("f_rest_{i}"))
-                    .map_err(|e| format!("{} ({rest} f_rest properties)", quote(&e)))?,
-            );
+            all.push(find(&format!("f_rest_{i}")).map_err(|e| format!("{} ({rest} f_rest properties)", quote(&e)))?);
         }
         Ok(Fields { degree, all })
     }
@@ -93,10 +78,9 @@ pub(super) fn rest_count(degree: usize) -> usize {
 
 /// Name of used property `i` in the order of [`Fields`].
 pub(super) fn name(i: usize) -> String {
-    FIXED.get(i).map_or_else(
-        || format!("f_rest_{}", i - FIXED.len()),
-        ToString::to_string,
-    )
+    FIXED
+        .get(i)
+        .map_or_else(|| format!("f_rest_{}", i - FIXED.len()), ToString::to_string)
 }
 
 /// Where coefficient `i` of the file's order (`f_dc_*`, then `f_rest_*` channel-major) is in a row of [`Sh`].
@@ -140,21 +124,14 @@ impl Rows {
     pub fn push(&mut self, values: &[f32]) -> Result<(), String> {
         let row = self.gaussians.len();
         if let Some(i) = (0..values.len()).find(|i| !legal(*i, values[*i])) {
-            return Err(format!(
-                "property {} of row {row} is {}",
-                name(i),
-                values[i]
-            ));
+            return Err(format!("property {} of row {row} is {}", name(i), values[i]));
         }
         let all = &mut self.gaussians;
         all.positions.push([values[0], values[1], values[2]]);
-        all.rotations
-            .push([values[3], values[4], values[5], values[6]]);
+        all.rotations.push([values[3], values[4], values[5], values[6]]);
         all.log_scales.push([values[7], values[8], values[9]]);
         all.opacity_logits.push(values[10]);
-        all.sh
-            .coefficients
-            .extend(self.order.iter().map(|i| values[*i]));
+        all.sh.coefficients.extend(self.order.iter().map(|i| values[*i]));
         Ok(())
     }
 
@@ -180,10 +157,7 @@ mod tests {
     #[test]
     fn rest_coefficients_are_channel_major_in_the_file() {
         // Degree 1: f_rest_0..2 are red's three, f_rest_3..5 green's, f_rest_6..8 blue's.
-        assert_eq!(
-            (0..3).map(|i| sh_index(1, i)).collect::<Vec<_>>(),
-            [0, 1, 2]
-        );
+        assert_eq!((0..3).map(|i| sh_index(1, i)).collect::<Vec<_>>(), [0, 1, 2]);
         let red: Vec<usize> = (3..6).map(|i| sh_index(1, i)).collect();
         let blue: Vec<usize> = (9..12).map(|i| sh_index(1, i)).collect();
         assert_eq!((red, blue), (vec![3, 6, 9], vec![5, 8, 11]));

@@ -49,19 +49,15 @@ impl Layout {
             Storage::Binary { .. } => (self.row_bytes as u64, 0),
             Storage::Ascii => (2 * self.columns as u64, 1),
         };
-        let skip = if self.storage == Storage::Ascii {
-            0
-        } else {
-            self.skip
-        };
+        let skip = if self.storage == Storage::Ascii { 0 } else { self.skip };
         let there = (body + slack).saturating_sub(skip) / row;
         if there < self.rows || body < skip {
             let rows = self.rows;
             return Err(match self.storage {
                 Storage::Binary { .. } => truncated(there, rows),
-                Storage::Ascii => format!(
-                    "truncated body: {body} bytes cannot hold the {rows} Gaussians that the header promises"
-                ),
+                Storage::Ascii => {
+                    format!("truncated body: {body} bytes cannot hold the {rows} Gaussians that the header promises")
+                }
             });
         }
         Ok(())
@@ -70,9 +66,7 @@ impl Layout {
 
 /// The complaint about missing rows.
 pub(super) fn truncated(there: u64, promised: u64) -> String {
-    format!(
-        "truncated body: {there} of the {promised} Gaussians that the header promises are there"
-    )
+    format!("truncated body: {there} of the {promised} Gaussians that the header promises are there")
 }
 
 /// Reads up to and including the line `end_header`, from a source at its first byte.
@@ -93,9 +87,7 @@ pub(super) fn read_header(source: &mut impl BufRead) -> std::io::Result<Result<V
         }
         let line = header[start..].trim_ascii_end();
         if start == 0 && line != b"ply" {
-            return Ok(Err(
-                "not a PLY file: its first line is not \"ply\"".to_string()
-            ));
+            return Ok(Err("not a PLY file: its first line is not \"ply\"".to_string()));
         }
         if line == b"end_header" {
             return Ok(Ok(header));

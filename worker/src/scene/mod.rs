@@ -53,11 +53,7 @@ impl Scene {
         if !metadata.is_file() {
             return Err(bad(path, "not a regular file".to_string()));
         }
-        Scene::read_from(
-            path,
-            &mut BufReader::with_capacity(1 << 16, file),
-            metadata.len(),
-        )
+        Scene::read_from(path, &mut BufReader::with_capacity(1 << 16, file), metadata.len())
     }
 
     /// Reads a scene of `size` bytes; `path` is for messages.
@@ -66,32 +62,18 @@ impl Scene {
         let header = header.map_err(|reason| bad(path, reason))?;
         let layout = header::parse(&header).map_err(|reason| bad(path, reason))?;
         let left = size.saturating_sub(header.len() as u64);
-        layout
-            .check_size(left)
-            .map_err(|reason| bad(path, reason))?;
+        layout.check_size(left).map_err(|reason| bad(path, reason))?;
         let mut body = Vec::new();
         usize::try_from(left)
             .ok()
             .and_then(|left| body.try_reserve_exact(left).ok())
-            .ok_or_else(|| {
-                bad(
-                    path,
-                    format!("{left} bytes of Gaussians do not fit in memory"),
-                )
-            })?;
+            .ok_or_else(|| bad(path, format!("{left} bytes of Gaussians do not fit in memory")))?;
         // A file that grows while it is read is read up to the size it had.
-        source
-            .take(left)
-            .read_to_end(&mut body)
-            .map_err(Error::io(path))?;
+        source.take(left).read_to_end(&mut body).map_err(Error::io(path))?;
         let gaussians = body::decode(&layout, &body).map_err(|reason| bad(path, reason))?;
         Ok(Scene {
             gaussians,
-            source: Some(Source {
-                header,
-                layout,
-                body,
-            }),
+            source: Some(Source { header, layout, body }),
         })
     }
 
@@ -106,18 +88,11 @@ impl Scene {
     pub fn write(&self, path: &Path, sh: &Sh) -> Result<()> {
         let own = &self.gaussians.sh;
         if sh.degree != own.degree || sh.coefficients.len() != own.coefficients.len() {
-            let sizes = (
-                sh.degree,
-                sh.coefficients.len(),
-                own.degree,
-                own.coefficients.len(),
-            );
+            let sizes = (sh.degree, sh.coefficients.len(), own.degree, own.coefficients.len());
             let (degree, count, own_degree, own_count) = sizes;
             return Err(bad(
                 path,
-                format!(
-                    "colours of degree {degree} with {count} values; the scene has {own_degree} and {own_count}"
-                ),
+                format!("colours of degree {degree} with {count} values; the scene has {own_degree} and {own_count}"),
             ));
         }
         if let Some(i) = sh.coefficients.iter().position(|v| !v.is_finite()) {

@@ -11,9 +11,7 @@ pub(super) fn write(gaussians: &Gaussians, sh: &Sh, out: &mut impl Write) -> io:
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
         gaussians.len()
     )?;
-    let names = ["x", "y", "z", "nx", "ny", "nz"]
-        .map(String::from)
-        .into_iter();
+    let names = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).into_iter();
     let names = names
         .chain((0..3).map(|i| format!("f_dc_{i}")))
         .chain((0..rest).map(|i| format!("f_rest_{i}")))
@@ -24,9 +22,7 @@ pub(super) fn write(gaussians: &Gaussians, sh: &Sh, out: &mut impl Write) -> io:
         writeln!(out, "property float {name}")?;
     }
     out.write_all(b"end_header\n")?;
-    let order: Vec<usize> = (0..sh.per_gaussian())
-        .map(|i| sh_index(sh.degree, i))
-        .collect();
+    let order: Vec<usize> = (0..sh.per_gaussian()).map(|i| sh_index(sh.degree, i)).collect();
     let mut row: Vec<f32> = Vec::with_capacity(17 + rest);
     for (i, colour) in sh.coefficients.chunks_exact(sh.per_gaussian()).enumerate() {
         row.clear();

@@ -10,10 +10,7 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Io`]: no such folder, no permission, disk full; or `path` is something else than a regular file, such as
 /// a device, which a rename would replace.
-pub(crate) fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> Result<()> {
+pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let attempt = || -> std::io::Result<()> {
         if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
             return Err(std::io::Error::other("exists and is not a regular file"));
@@ -33,9 +30,7 @@ pub(crate) fn write_whole(
         let file = builder.tempfile_in(folder)?;
         let mut out = BufWriter::with_capacity(1 << 20, file);
         write(&mut out)?;
-        let file = out
-            .into_inner()
-            .map_err(std::io::IntoInnerError::into_error)?;
+        let file = out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
         file.as_file().sync_all()?;
         file.persist(path).map_err(|e| e.error)?;
         // The name is durable once the folder is; not every file system can do that, and the file is whole anyway.

@@ -1,22 +1,13 @@
 //! What every rasteriser must do: run for the CPU here and for the GPU in its module.
 use super::compare::GradientError;
-use super::{
-    CpuRasterizer, PreparedView, Rasterizer, WeightCache, extremes, prepare, reference, sh,
-};
+use super::{CpuRasterizer, PreparedView, Rasterizer, WeightCache, extremes, prepare, reference, sh};
 use crate::scene::{Gaussians, Scene, Sh};
 use crate::testing::scene_path;
 use crate::view::Camera;
 
 /// A square picture from the origin along +z, 60 degrees wide; the scenes of [`scene`] are in front of it.
 pub(super) fn camera(size: u32) -> Camera {
-    Camera::look_at(
-        [0.0; 3],
-        [0.0, 0.0, 1.0],
-        [0.0, -1.0, 0.0],
-        1.05,
-        size,
-        size,
-    )
+    Camera::look_at([0.0; 3], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], 1.05, size, size)
 }
 
 /// `n` Gaussians of all shapes between depths 2 and 6, some of their colours clamped.
@@ -37,30 +28,19 @@ pub(super) fn scene(n: usize, degree: usize) -> Gaussians {
     };
     for _ in 0..n {
         let z = random(2.0, 6.0);
-        g.positions
-            .push([random(-0.5, 0.5) * z, random(-0.5, 0.5) * z, z]);
+        g.positions.push([random(-0.5, 0.5) * z, random(-0.5, 0.5) * z, z]);
         g.rotations.push(std::array::from_fn(|_| random(-1.0, 1.0)));
-        g.log_scales
-            .push(std::array::from_fn(|_| random(-4.0, -1.0)));
+        g.log_scales.push(std::array::from_fn(|_| random(-4.0, -1.0)));
         g.opacity_logits.push(random(-3.0, 6.0));
         let count = g.sh.per_gaussian();
-        g.sh.coefficients.extend((0..count).map(|k| {
-            if k < 3 {
-                random(-2.5, 2.5)
-            } else {
-                random(-0.9, 0.9)
-            }
-        }));
+        g.sh.coefficients
+            .extend((0..count).map(|k| if k < 3 { random(-2.5, 2.5) } else { random(-0.9, 0.9) }));
     }
     g
 }
 
 fn playbot() -> Option<Gaussians> {
-    Some(
-        Scene::read(&scene_path("playbot_8k.ply")?)
-            .unwrap()
-            .gaussians,
-    )
+    Some(Scene::read(&scene_path("playbot_8k.ply")?).unwrap().gaussians)
 }
 
 /// A camera that has the middle of `g` in view.
@@ -69,17 +49,9 @@ fn facing(g: &Gaussians, size: u32) -> Camera {
         v.sort_by(f32::total_cmp);
         v[v.len() / 2]
     };
-    let centre: [f32; 3] =
-        std::array::from_fn(|k| median(g.positions.iter().map(|p| p[k]).collect()));
+    let centre: [f32; 3] = std::array::from_fn(|k| median(g.positions.iter().map(|p| p[k]).collect()));
     let spread = (0..3)
-        .map(|k| {
-            median(
-                g.positions
-                    .iter()
-                    .map(|p| (p[k] - centre[k]).abs())
-                    .collect(),
-            )
-        })
+        .map(|k| median(g.positions.iter().map(|p| (p[k] - centre[k]).abs()).collect()))
         .fold(0.0, f32::max);
     let eye = [
         centre[0] + 4.0 * spread,
@@ -109,12 +81,9 @@ fn agrees(rasterizer: &dyn Rasterizer, cache: WeightCache, g: &Gaussians, camera
         *worst = worst.max(error);
         assert!(error.is_finite());
     }
-    let uncertain =
-        want.uncertain.iter().filter(|u| **u).count() as f64 / want.uncertain.len() as f64;
+    let uncertain = want.uncertain.iter().filter(|u| **u).count() as f64 / want.uncertain.len() as f64;
 
-    let mut picture_gradient: Vec<f64> = (0..want.pixels.len())
-        .map(|i| (i as f64 * 0.61).sin() + 0.3)
-        .collect();
+    let mut picture_gradient: Vec<f64> = (0..want.pixels.len()).map(|i| (i as f64 * 0.61).sin() + 0.3).collect();
     for (i, value) in picture_gradient.iter_mut().enumerate() {
         if want.uncertain[i / 3] {
             *value = 0.0;
@@ -204,20 +173,14 @@ fn cached_and_fresh_weights_give_the_same_bytes() {
         ..kept.0
     };
     let colours = sh::colours(&g.sh, None, &again);
-    assert_eq!(
-        CpuRasterizer.render(&again, &colours, BACKGROUND).unwrap(),
-        plain.1
-    );
+    assert_eq!(CpuRasterizer.render(&again, &colours, BACKGROUND).unwrap(), plain.1);
 }
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
     let g = scene(9000, 2);
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let view = prepare(&g, &camera(90), WeightCache::Weights).unwrap();
             let colours = sh::colours(&g.sh, None, &view);

@@ -17,15 +17,7 @@ impl GradientError {
     /// Compares two gradients of one length. Two zero gradients are equal; NaN anywhere makes every measure NaN.
     pub fn new(got: &[f32], want: &[f64]) -> Self {
         assert_eq!(got.len(), want.len(), "gradients of different lengths");
-        let [
-            mut sum,
-            mut square,
-            mut got_square,
-            mut dot,
-            mut d1,
-            mut d2,
-            mut signed,
-        ] = [0.0f64; 7];
+        let [mut sum, mut square, mut got_square, mut dot, mut d1, mut d2, mut signed] = [0.0f64; 7];
         for (g, w) in got.iter().zip(want) {
             let (g, d) = (f64::from(*g), f64::from(*g) - w);
             sum += w.abs();
@@ -52,10 +44,7 @@ impl GradientError {
 
     /// Whether all four are within the limit; the angle, being quadratic in the error, within its square.
     pub fn within(&self, limit: f64) -> bool {
-        self.l1 <= limit
-            && self.l2 <= limit
-            && self.angle <= limit * limit
-            && self.bias.abs() <= 0.5 * limit
+        self.l1 <= limit && self.l2 <= limit && self.angle <= limit * limit && self.bias.abs() <= 0.5 * limit
     }
 }
 
@@ -65,11 +54,7 @@ mod tests {
 
     fn error(change: impl Fn(usize, f64) -> f64) -> GradientError {
         let want: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.37).sin()).collect();
-        let got: Vec<f32> = want
-            .iter()
-            .enumerate()
-            .map(|(i, w)| change(i, *w) as f32)
-            .collect();
+        let got: Vec<f32> = want.iter().enumerate().map(|(i, w)| change(i, *w) as f32).collect();
         GradientError::new(&got, &want)
     }
 
@@ -80,14 +65,8 @@ mod tests {
 
     #[test]
     fn each_kind_of_error_is_found() {
-        assert!(
-            !error(|_, w| 0.999 * w).within(1e-3),
-            "scaled: seen by the bias"
-        );
-        assert!(
-            error(|_, w| 0.999 * w).angle < 1e-12,
-            "but not by the cosine"
-        );
+        assert!(!error(|_, w| 0.999 * w).within(1e-3), "scaled: seen by the bias");
+        assert!(error(|_, w| 0.999 * w).angle < 1e-12, "but not by the cosine");
         assert!(
             !error(|i, w| if i == 3 { w + 0.1 } else { w }).within(1e-3),
             "one outlier: seen by L2"

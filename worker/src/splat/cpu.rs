@@ -19,12 +19,7 @@ impl Rasterizer for CpuRasterizer {
         "cpu"
     }
 
-    fn render(
-        &self,
-        view: &PreparedView,
-        colours: &[f32],
-        background: [f32; 3],
-    ) -> Result<Picture> {
+    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture> {
         view.check("colours", colours.len(), 3 * view.visible.len())?;
         let (width, height) = (view.camera.width, view.camera.height);
         let mut pixels = vec![0.0; view.picture_len()];
@@ -34,9 +29,7 @@ impl Rasterizer for CpuRasterizer {
             .for_each(|(row, out)| {
                 let mut cursor = view.weights.as_ref().map(|w| Cursor::new(&w.bands[row]));
                 for column in 0..view.tiles.columns {
-                    let list = view
-                        .tiles
-                        .of(row * view.tiles.columns as usize + column as usize);
+                    let list = view.tiles.of(row * view.tiles.columns as usize + column as usize);
                     let frame = TileFrame::new(column, row as u32, width, height);
                     let mut draw = Draw {
                         colours,
@@ -50,19 +43,11 @@ impl Rasterizer for CpuRasterizer {
                     store(frame, width, &draw.image, left, background, out);
                 }
             });
-        Ok(Picture {
-            width,
-            height,
-            pixels,
-        })
+        Ok(Picture { width, height, pixels })
     }
 
     fn backward(&self, view: &PreparedView, picture_gradient: &[f32]) -> Result<Vec<f32>> {
-        view.check(
-            "picture gradient",
-            picture_gradient.len(),
-            view.picture_len(),
-        )?;
+        view.check("picture gradient", picture_gradient.len(), view.picture_len())?;
         let (width, height) = (view.camera.width, view.camera.height);
         let columns = view.tiles.columns as usize;
         let mut slots = vec![[0.0f32; 3]; view.tiles.pairs()];
@@ -74,32 +59,29 @@ impl Rasterizer for CpuRasterizer {
             bands.push(band);
             rest = after;
         }
-        bands
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut slots)| {
-                let band_gradient = &picture_gradient[row * (width * TILE * 3) as usize..];
-                let mut cursor = view.weights.as_ref().map(|w| Cursor::new(&w.bands[row]));
-                for column in 0..columns {
-                    let list = view.tiles.of(row * columns + column);
-                    let frame = TileFrame::new(column as u32, row as u32, width, height);
-                    let (tile_slots, after) = slots.split_at_mut(list.len());
-                    slots = after;
-                    let mut gather = Gather {
-                        gradient: load(frame, width, band_gradient),
-                        sum: [0.0; 4],
-                        slots: tile_slots,
-                    };
-                    match &mut cursor {
-                        Some(cursor) => {
-                            cursor.replay(list, &mut gather);
-                        }
-                        None => {
-                            walk(frame, &view.splats, list, &mut gather);
-                        }
+        bands.into_par_iter().enumerate().for_each(|(row, mut slots)| {
+            let band_gradient = &picture_gradient[row * (width * TILE * 3) as usize..];
+            let mut cursor = view.weights.as_ref().map(|w| Cursor::new(&w.bands[row]));
+            for column in 0..columns {
+                let list = view.tiles.of(row * columns + column);
+                let frame = TileFrame::new(column as u32, row as u32, width, height);
+                let (tile_slots, after) = slots.split_at_mut(list.len());
+                slots = after;
+                let mut gather = Gather {
+                    gradient: load(frame, width, band_gradient),
+                    sum: [0.0; 4],
+                    slots: tile_slots,
+                };
+                match &mut cursor {
+                    Some(cursor) => {
+                        cursor.replay(list, &mut gather);
+                    }
+                    None => {
+                        walk(frame, &view.splats, list, &mut gather);
                     }
                 }
-            });
+            }
+        });
         Ok(view.tiles.sum_slots(&slots))
     }
 }
@@ -129,10 +111,7 @@ impl<'a> Cursor<'a> {
             let end = self.band.ends[self.slot + place] as usize;
             sink.begin(place, splat);
             let range = self.entry..end;
-            for (pixel, weight) in self.band.pixels[range.clone()]
-                .iter()
-                .zip(&self.band.weights[range])
-            {
+            for (pixel, weight) in self.band.pixels[range.clone()].iter().zip(&self.band.weights[range]) {
                 sink.add(*pixel as usize, *weight);
             }
             sink.end(place, false);
@@ -207,10 +186,7 @@ fn store(
 ) {
     for y in 0..frame.size[1] {
         let at = 3 * (y * width as usize + frame.origin[0] as usize);
-        for (x, out) in band[at..at + 3 * frame.size[0]]
-            .chunks_exact_mut(3)
-            .enumerate()
-        {
+        for (x, out) in band[at..at + 3 * frame.size[0]].chunks_exact_mut(3).enumerate() {
             let pixel = y * TILE as usize + x;
             for j in 0..3 {
                 out[j] = image[pixel][j] + left[pixel] * background[j];

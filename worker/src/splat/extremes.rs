@@ -33,21 +33,10 @@ pub(super) fn all(rasterizer: &dyn Rasterizer, cache: WeightCache) {
     let draw = |g: &Gaussians| -> (PreparedView, Vec<f32>, Vec<f32>) {
         let view = prepare(g, &camera, cache).unwrap();
         let colours = sh::colours(&g.sh, None, &view);
-        let pixels = rasterizer
-            .render(&view, &colours, BACKGROUND)
-            .unwrap()
-            .pixels;
-        let colour_gradient = rasterizer
-            .backward(&view, &vec![1.0; pixels.len()])
-            .unwrap();
+        let pixels = rasterizer.render(&view, &colours, BACKGROUND).unwrap().pixels;
+        let colour_gradient = rasterizer.backward(&view, &vec![1.0; pixels.len()]).unwrap();
         let mut gradient = vec![0.0; g.sh.coefficients.len()];
-        sh::backward(
-            g.sh.degree,
-            &view,
-            &colours,
-            &colour_gradient,
-            &mut gradient,
-        );
+        sh::backward(g.sh.degree, &view, &colours, &colour_gradient, &mut gradient);
         assert!(pixels.iter().chain(&gradient).all(|v| v.is_finite()));
         (view, pixels, gradient)
     };
@@ -66,33 +55,15 @@ pub(super) fn all(rasterizer: &dyn Rasterizer, cache: WeightCache) {
         g
     };
     empty(&scene(0, 3), "no Gaussian");
-    empty(
-        &with(&|g| g.positions[0] = [0.0, 0.0, -3.0]),
-        "behind the camera",
-    );
+    empty(&with(&|g| g.positions[0] = [0.0, 0.0, -3.0]), "behind the camera");
     empty(&with(&|g| g.positions[0] = [0.0; 3]), "at the camera");
-    empty(
-        &with(&|g| g.positions[0] = [0.0, 0.0, 0.2]),
-        "on the near plane",
-    );
+    empty(&with(&|g| g.positions[0] = [0.0, 0.0, 0.2]), "on the near plane");
     empty(&with(&|g| g.positions[0] = [90.0, 0.0, 3.0]), "out of view");
     empty(&with(&|g| g.positions[0] = [3e38, -3e38, 3e38]), "far away");
-    empty(
-        &with(&|g| g.opacity_logits[0] = f32::NEG_INFINITY),
-        "transparent",
-    );
-    empty(
-        &with(&|g| g.opacity_logits[0] = f32::NAN),
-        "opacity not a number",
-    );
-    empty(
-        &with(&|g| g.positions[0][1] = f32::NAN),
-        "position not a number",
-    );
-    empty(
-        &with(&|g| g.log_scales[0][1] = f32::NAN),
-        "scale not a number",
-    );
+    empty(&with(&|g| g.opacity_logits[0] = f32::NEG_INFINITY), "transparent");
+    empty(&with(&|g| g.opacity_logits[0] = f32::NAN), "opacity not a number");
+    empty(&with(&|g| g.positions[0][1] = f32::NAN), "position not a number");
+    empty(&with(&|g| g.log_scales[0][1] = f32::NAN), "scale not a number");
 
     let seen = |g: &Gaussians, what: &str| {
         let (view, pixels, gradient) = draw(g);
@@ -107,19 +78,13 @@ pub(super) fn all(rasterizer: &dyn Rasterizer, cache: WeightCache) {
         &with(&|g| g.rotations[0] = [f32::INFINITY, 0.0, 0.0, 1.0]),
         "infinite quaternion",
     );
-    seen(
-        &with(&|g| g.log_scales[0] = [f32::NEG_INFINITY; 3]),
-        "a point",
-    );
+    seen(&with(&|g| g.log_scales[0] = [f32::NEG_INFINITY; 3]), "a point");
     seen(
         &with(&|g| g.log_scales[0] = [20.0, -20.0, 3.0]),
         "a needle across the universe",
     );
     for size in [20.0, 1e30, f32::INFINITY] {
-        let (pixels, _) = seen(
-            &with(&|g| g.log_scales[0] = [size; 3]),
-            "larger than the picture",
-        );
+        let (pixels, _) = seen(&with(&|g| g.log_scales[0] = [size; 3]), "larger than the picture");
         assert!(
             pixels.chunks(3).all(|p| (p[0] - pixels[0]).abs() < 1e-5),
             "covers all of it alike"

@@ -30,8 +30,7 @@ impl GpuRasterizer {
     /// [`Error::Device`] when it is another.
     pub fn new(device: &Device) -> Result<Self> {
         let probe = Tensor::<1>::zeros([1], &device.clone().inner());
-        let DispatchTensorKind::Cube(BackendTensor::Float(tensor)) = probe.into_dispatch().kind
-        else {
+        let DispatchTensorKind::Cube(BackendTensor::Float(tensor)) = probe.into_dispatch().kind else {
             return Err(Error::Device {
                 device: format!("{device:?}"),
                 reason: "the GPU rasteriser needs a wgpu device".into(),
@@ -94,10 +93,7 @@ impl GpuRasterizer {
             .map_err(|e| self.failed(format_args!("{e:?}")))?;
         let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
         if values.len() < len {
-            return Err(self.failed(format_args!(
-                "returned {} numbers instead of {len}",
-                values.len()
-            )));
+            return Err(self.failed(format_args!("returned {} numbers instead of {len}", values.len())));
         }
         Ok(values[..len].to_vec())
     }
@@ -122,23 +118,14 @@ impl Rasterizer for GpuRasterizer {
         &self.name
     }
 
-    fn render(
-        &self,
-        view: &PreparedView,
-        colours: &[f32],
-        background: [f32; 3],
-    ) -> Result<Picture> {
+    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture> {
         view.check("colours", colours.len(), 3 * view.visible.len())?;
         let (width, height) = (view.camera.width, view.camera.height);
         let len = view.picture_len();
         if view.visible.is_empty() {
             // No buffer may be empty, and there is nothing to draw.
             let pixels = background.iter().copied().cycle().take(len).collect();
-            return Ok(Picture {
-                width,
-                height,
-                pixels,
-            });
+            return Ok(Picture { width, height, pixels });
         }
         let device = self.upload(view)?;
         let colour_buffer = self.buffer(bytemuck::cast_slice(colours));
@@ -167,11 +154,7 @@ impl Rasterizer for GpuRasterizer {
     }
 
     fn backward(&self, view: &PreparedView, picture_gradient: &[f32]) -> Result<Vec<f32>> {
-        view.check(
-            "picture gradient",
-            picture_gradient.len(),
-            view.picture_len(),
-        )?;
+        view.check("picture gradient", picture_gradient.len(), view.picture_len())?;
         let visible = view.visible.len();
         if visible == 0 {
             return Ok(Vec::new());
@@ -265,18 +248,13 @@ mod tests {
         assert_eq!(first, run());
         assert_eq!(
             first.1.len(),
-            CpuRasterizer
-                .backward(&view, &first.0.pixels)
-                .unwrap()
-                .len()
+            CpuRasterizer.backward(&view, &first.0.pixels).unwrap().len()
         );
     }
 
     #[test]
     fn another_device_is_an_error() {
-        let error = GpuRasterizer::new(&Device::flex())
-            .err()
-            .map(|e| e.to_string());
+        let error = GpuRasterizer::new(&Device::flex()).err().map(|e| e.to_string());
         assert!(error.is_some_and(|e| e.contains("needs a wgpu device")));
     }
 }

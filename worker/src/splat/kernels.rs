@@ -244,13 +244,7 @@ pub fn splat_gradients(
 
 /// Sums each Gaussian's slots in ascending order: `out` (`[count][3]`).
 #[cube(launch)]
-pub fn sum_slots(
-    slot_start: &[u32],
-    slot_list: &[u32],
-    slots: &[f32],
-    out: &mut [f32],
-    count: u32,
-) {
+pub fn sum_slots(slot_start: &[u32], slot_list: &[u32], slots: &[f32], out: &mut [f32], count: u32) {
     let i = ABSOLUTE_POS;
     if i < count as usize {
         let mut r = 0.0f32;

@@ -38,8 +38,7 @@ pub trait Rasterizer: Send + Sync {
     ///
     /// # Errors
     /// When `colours` has another length, or the device fails.
-    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3])
-    -> Result<Picture>;
+    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture>;
 
     /// Gradient to the colours (`[visible][3]`) from the gradient to the picture (`[height][width][3]`).
     ///

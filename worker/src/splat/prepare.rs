@@ -60,9 +60,7 @@ impl PreparedView {
     /// Memory that the view holds, in bytes.
     pub fn bytes(&self) -> usize {
         let per_visible = size_of::<u32>() + size_of::<Splat2d>() + size_of::<[f32; 3]>();
-        self.visible.len() * per_visible
-            + self.tiles.bytes()
-            + self.weights.as_ref().map_or(0, SparseWeights::bytes)
+        self.visible.len() * per_visible + self.tiles.bytes() + self.weights.as_ref().map_or(0, SparseWeights::bytes)
     }
 
     /// Number of cached weights, if they are cached.
@@ -161,16 +159,12 @@ fn check_camera(camera: &Camera) -> Result<()> {
     };
     for (name, side) in [("width", camera.width), ("height", camera.height)] {
         if side == 0 || side > MAX_SIDE {
-            return bad(format!(
-                "{name} is {side}, it must be 1 to {MAX_SIDE} pixels"
-            ));
+            return bad(format!("{name} is {side}, it must be 1 to {MAX_SIDE} pixels"));
         }
     }
     for (name, focal) in [("fx", camera.fx), ("fy", camera.fy)] {
         if !(focal > 0.0 && focal <= 1e7) {
-            return bad(format!(
-                "{name} is {focal}, it must be above 0 and at most 1e7 pixels"
-            ));
+            return bad(format!("{name} is {focal}, it must be above 0 and at most 1e7 pixels"));
         }
     }
     let pose = camera

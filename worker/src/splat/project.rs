@@ -49,8 +49,7 @@ pub(crate) struct TileRect {
 
 impl TileRect {
     pub fn area(&self) -> u64 {
-        u64::from(self.x[1].saturating_sub(self.x[0]))
-            * u64::from(self.y[1].saturating_sub(self.y[0]))
+        u64::from(self.x[1].saturating_sub(self.x[0])) * u64::from(self.y[1].saturating_sub(self.y[0]))
     }
 }
 
@@ -77,9 +76,7 @@ impl Projector {
             focal,
             principal: [camera.cx, camera.cy].map(f64::from),
             limit: std::array::from_fn(|k| 1.3 * f64::from(size[k]) / (2.0 * focal[k])),
-            centre: std::array::from_fn(|k| {
-                -(0..3).map(|r| rotation[r][k] * translation[r]).sum::<f64>()
-            }),
+            centre: std::array::from_fn(|k| -(0..3).map(|r| rotation[r][k] * translation[r]).sum::<f64>()),
             tiles: size.map(|s| s.div_ceil(TILE)),
         }
     }
@@ -104,9 +101,8 @@ impl Projector {
     pub fn project(&self, gaussians: &Gaussians, row: usize) -> Option<(Splat2d, TileRect)> {
         let p = gaussians.positions[row].map(f64::from);
         let w = &self.rotation;
-        let t: [f64; 3] = std::array::from_fn(|r| {
-            w[r][0] * p[0] + w[r][1] * p[1] + w[r][2] * p[2] + self.translation[r]
-        });
+        let t: [f64; 3] =
+            std::array::from_fn(|r| w[r][0] * p[0] + w[r][1] * p[1] + w[r][2] * p[2] + self.translation[r]);
         if !(t[2] > f64::from(NEAR) && t[2].is_finite()) {
             return None;
         }
@@ -116,13 +112,8 @@ impl Projector {
             return None;
         }
         let inverse_depth = 1.0 / (t[2] + 1e-7);
-        let mean: [f64; 2] =
-            std::array::from_fn(|k| self.focal[k] * t[k] * inverse_depth + self.principal[k] - 0.5);
-        let m = self.footprint(
-            t,
-            rotation(gaussians.rotations[row]),
-            gaussians.log_scales[row],
-        );
+        let mean: [f64; 2] = std::array::from_fn(|k| self.focal[k] * t[k] * inverse_depth + self.principal[k] - 0.5);
+        let m = self.footprint(t, rotation(gaussians.rotations[row]), gaussians.log_scales[row]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (plain_xx, xy, plain_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
         let (xx, yy) = (plain_xx + LOW_PASS, plain_yy + LOW_PASS);
@@ -166,11 +157,7 @@ impl Projector {
         let high = clamp((mean + radius + tile - 1.0) / tile);
         let first = clamp((mean - extent).ceil() / tile);
         let end = mean + extent;
-        let last = if end < 0.0 {
-            0
-        } else {
-            clamp(end / tile + 1.0)
-        };
+        let last = if end < 0.0 { 0 } else { clamp(end / tile + 1.0) };
         [low.max(first), high.min(last)]
     }
 
@@ -181,11 +168,8 @@ impl Projector {
         std::array::from_fn(|k| {
             let clamped = (t[k] / t[2]).clamp(-self.limit[k], self.limit[k]);
             let (j, j_depth) = (self.focal[k] / t[2], -self.focal[k] * clamped / t[2]);
-            let jw: [f64; 3] =
-                std::array::from_fn(|c| j * self.rotation[k][c] + j_depth * self.rotation[2][c]);
-            std::array::from_fn(|c| {
-                (jw[0] * r[0][c] + jw[1] * r[1][c] + jw[2] * r[2][c]) * scale[c]
-            })
+            let jw: [f64; 3] = std::array::from_fn(|c| j * self.rotation[k][c] + j_depth * self.rotation[2][c]);
+            std::array::from_fn(|c| (jw[0] * r[0][c] + jw[1] * r[1][c] + jw[2] * r[2][c]) * scale[c])
         })
     }
 }

@@ -52,8 +52,7 @@ pub fn render(gaussians: &Gaussians, camera: &Camera, background: [f64; 3]) -> R
                     colour[j] += weight * g.colour[j].max(0.0);
                 }
             });
-            out.pixels
-                .extend((0..3).map(|j| colour[j] + left * background[j]));
+            out.pixels.extend((0..3).map(|j| colour[j] + left * background[j]));
             out.uncertain.push(uncertain);
         }
     }
@@ -83,12 +82,7 @@ pub fn gradient(gaussians: &Gaussians, camera: &Camera, picture_gradient: &[f64]
 }
 
 /// Gives `add` every contribution to a pixel, front to back; returns what is left for the background.
-fn composite<'a>(
-    sorted: &'a [Projected],
-    x: u32,
-    y: u32,
-    mut add: impl FnMut(&'a Projected, f64),
-) -> (f64, bool) {
+fn composite<'a>(sorted: &'a [Projected], x: u32, y: u32, mut add: impl FnMut(&'a Projected, f64)) -> (f64, bool) {
     let (x, y) = (f64::from(x), f64::from(y));
     let tile = [(x / TILE).floor(), (y / TILE).floor()];
     let (mut transmittance, mut uncertain) = (1.0, false);
@@ -107,8 +101,7 @@ fn composite<'a>(
             continue;
         }
         let left = transmittance * (1.0 - alpha);
-        uncertain |=
-            (left / 1e-4 - 1.0).abs() < NEAR_TRANSMITTANCE && alpha * transmittance > NEGLIGIBLE;
+        uncertain |= (left / 1e-4 - 1.0).abs() < NEAR_TRANSMITTANCE && alpha * transmittance > NEGLIGIBLE;
         if left < 1e-4 {
             break;
         }
@@ -141,16 +134,14 @@ fn project(gaussians: &Gaussians, camera: &Camera, row: usize) -> Option<Project
     let w: Matrix = camera.rotation.map(|r| r.map(f64::from));
     let translation = camera.translation.map(f64::from);
     let p = gaussians.positions[row].map(f64::from);
-    let view: [f64; 3] =
-        std::array::from_fn(|r| w[r][0] * p[0] + w[r][1] * p[1] + w[r][2] * p[2] + translation[r]);
+    let view: [f64; 3] = std::array::from_fn(|r| w[r][0] * p[0] + w[r][1] * p[1] + w[r][2] * p[2] + translation[r]);
     if view[2] <= f64::from(0.2f32) {
         return None;
     }
     let focal = [f64::from(camera.fx), f64::from(camera.fy)];
     let size = [f64::from(camera.width), f64::from(camera.height)];
     let principal = [f64::from(camera.cx), f64::from(camera.cy)];
-    let mean: [f64; 2] =
-        std::array::from_fn(|k| focal[k] * view[k] / (view[2] + 1e-7) + principal[k] - 0.5);
+    let mean: [f64; 2] = std::array::from_fn(|k| focal[k] * view[k] / (view[2] + 1e-7) + principal[k] - 0.5);
 
     let scale = gaussians.log_scales[row].map(|s| f64::from(s.clamp(-30.0, 30.0)).exp());
     let r = rotation_matrix(gaussians.rotations[row].map(f64::from));
@@ -179,12 +170,7 @@ fn project(gaussians: &Gaussians, camera: &Camera, row: usize) -> Option<Project
     let tiles = std::array::from_fn(|k| {
         let count = (size[k] / TILE).ceil();
         let low = ((mean[k] - radius) / TILE).trunc().clamp(0.0, count);
-        [
-            low,
-            ((mean[k] + radius + TILE - 1.0) / TILE)
-                .trunc()
-                .clamp(0.0, count),
-        ]
+        [low, ((mean[k] + radius + TILE - 1.0) / TILE).trunc().clamp(0.0, count)]
     });
     let logit = f64::from(gaussians.opacity_logits[row].clamp(-20.0, 20.0));
     let conic = [c / det, -b / det, a / det];
@@ -259,9 +245,7 @@ pub(super) fn harmonics(degree: usize, [x, y, z]: [f64; 3]) -> Vec<f64> {
     for m in 0..=degree {
         let (mut before, mut p) = (0.0, p_mm);
         for l in m..=degree {
-            let norm = ((2 * l + 1) as f64 / (4.0 * std::f64::consts::PI) * factorial(l - m)
-                / factorial(l + m))
-            .sqrt();
+            let norm = ((2 * l + 1) as f64 / (4.0 * std::f64::consts::PI) * factorial(l - m) / factorial(l + m)).sqrt();
             if m == 0 {
                 out[l * (l + 1)] = norm * p;
             } else {
@@ -333,11 +317,7 @@ mod tests {
     fn saturated_gaussians_leave_one_percent_each_and_stop() {
         // Alpha is at most 0.99: after one, 0.01 is left; a second would leave 1e-4 (rounding decides); a third is never
         // drawn because it would leave less than 1e-4.
-        let g = line(&[
-            (3.0, -1.0, 20.0, 1.0),
-            (4.0, -1.0, 2.0, 0.0),
-            (5.0, -1.0, 20.0, 2.0),
-        ]);
+        let g = line(&[(3.0, -1.0, 20.0, 1.0), (4.0, -1.0, 2.0, 0.0), (5.0, -1.0, 20.0, 2.0)]);
         let alpha = 1.0 / (1.0 + (-2f64).exp());
         let c = 0.282_094_791_773_878_14;
         let want = 0.99 * (0.5 + c) + 0.01 * (alpha * 0.5 + (1.0 - alpha) * 0.25);
@@ -388,11 +368,7 @@ mod tests {
         let dir = [0.36, -0.48, 0.8];
         let fast = super::super::sh::basis(4, dir.map(|v| v as f32));
         for (k, want) in harmonics(4, dir).into_iter().enumerate() {
-            assert!(
-                (f64::from(fast[k]) - want).abs() < 1e-6,
-                "{k}: {} {want}",
-                fast[k]
-            );
+            assert!((f64::from(fast[k]) - want).abs() < 1e-6, "{k}: {} {want}", fast[k]);
         }
     }
 }

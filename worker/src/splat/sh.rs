@@ -8,13 +8,7 @@ pub const MAX_COEFFICIENTS: usize = 25;
 
 const C0: f32 = 0.282_094_8;
 const C1: f32 = 0.488_602_52;
-const C2: [f32; 5] = [
-    1.092_548_5,
-    -1.092_548_5,
-    0.315_391_57,
-    -1.092_548_5,
-    0.546_274_24,
-];
+const C2: [f32; 5] = [1.092_548_5, -1.092_548_5, 0.315_391_57, -1.092_548_5, 0.546_274_24];
 const C3: [f32; 7] = [
     -0.590_043_6,
     2.890_611_4,
@@ -106,11 +100,7 @@ pub fn colours(sh: &Sh, offsets: Option<&[f32]>, view: &PreparedView) -> Vec<f32
             }
             Some(offsets) => {
                 let o = &offsets[at..at + stride];
-                for (k, (h, o)) in coefficients
-                    .chunks_exact(3)
-                    .zip(o.chunks_exact(3))
-                    .enumerate()
-                {
+                for (k, (h, o)) in coefficients.chunks_exact(3).zip(o.chunks_exact(3)).enumerate() {
                     for j in 0..3 {
                         c[j] += b[k] * (h[j] + o[j]);
                     }
@@ -131,13 +121,7 @@ pub fn colours(sh: &Sh, offsets: Option<&[f32]>, view: &PreparedView) -> Vec<f32
 /// Adds to `sh_gradient` (`[n][(degree+1)^2][3]`) what `colour_gradient` (`[visible][3]`) means for the coefficients.
 ///
 /// `colours` are those that [`colours`] returned: where one is 0 it was clamped, and its gradient is 0.
-pub fn backward(
-    degree: usize,
-    view: &PreparedView,
-    colours: &[f32],
-    colour_gradient: &[f32],
-    sh_gradient: &mut [f32],
-) {
+pub fn backward(degree: usize, view: &PreparedView, colours: &[f32], colour_gradient: &[f32], sh_gradient: &mut [f32]) {
     let part = Part {
         degree,
         stride: 3 * (degree + 1) * (degree + 1),
@@ -168,10 +152,7 @@ impl Part<'_> {
             let at = n / 2;
             let row = self.visible[at] as usize;
             let (v, d) = (self.visible.split_at(at), self.directions.split_at(at));
-            let (c, g) = (
-                self.colours.split_at(3 * at),
-                self.colour_gradient.split_at(3 * at),
-            );
+            let (c, g) = (self.colours.split_at(3 * at), self.colour_gradient.split_at(3 * at));
             let (low, high) = out.split_at_mut((row - first) * self.stride);
             let left = Part {
                 visible: v.0,
@@ -240,11 +221,7 @@ mod tests {
         for i in 0..MAX_COEFFICIENTS {
             for j in 0..MAX_COEFFICIENTS {
                 let want = f64::from(i == j);
-                assert!(
-                    (gram[i][j] - want).abs() < 2e-3,
-                    "<{i},{j}> = {}",
-                    gram[i][j]
-                );
+                assert!((gram[i][j] - want).abs() < 2e-3, "<{i},{j}> = {}", gram[i][j]);
             }
         }
     }

@@ -123,9 +123,7 @@ impl TileLists {
             .with_min_len(4096)
             .enumerate()
             .for_each(|(i, out)| {
-                for slot in
-                    &self.slots[self.slot_start[i] as usize..self.slot_start[i + 1] as usize]
-                {
+                for slot in &self.slots[self.slot_start[i] as usize..self.slot_start[i + 1] as usize] {
                     let value = values[*slot as usize];
                     for j in 0..3 {
                         out[j] += value[j];
@@ -179,17 +177,11 @@ mod tests {
 
     #[test]
     fn too_many_pairs_are_refused_with_their_number() {
-        let rect = TileRect {
-            x: [0, 50],
-            y: [0, 50],
-        };
+        let rect = TileRect { x: [0, 50], y: [0, 50] };
         assert_eq!(rect.area(), 2500);
         // What 120,000 full-screen splats at 800 x 800 would need.
         let error = check_pairs(2500 * 120_000).unwrap_err().to_string();
-        assert!(
-            error.contains("300000000") && error.contains("268435456"),
-            "{error}"
-        );
+        assert!(error.contains("300000000") && error.contains("268435456"), "{error}");
         assert!(check_pairs(MAX_PAIRS).is_ok());
     }
 
@@ -207,12 +199,7 @@ mod tests {
         let lists = TileLists::new(
             2,
             1,
-            &[
-                at(2.0, [0, 2]),
-                at(1.0, [1, 2]),
-                at(2.0, [0, 1]),
-                at(0.5, [0, 2]),
-            ],
+            &[at(2.0, [0, 2]), at(1.0, [1, 2]), at(2.0, [0, 1]), at(0.5, [0, 2])],
         )
         .unwrap()
         .with_slots(4);
@@ -221,10 +208,7 @@ mod tests {
         assert_eq!(lists.slot_start, [0, 2, 3, 4, 6]);
         assert_eq!(lists.slots, [1, 5, 4, 2, 0, 3]);
         let values: Vec<_> = (0..6).map(|i| [i as f32, 1.0, 0.0]).collect();
-        assert_eq!(
-            lists.sum_slots(&values)[..6],
-            [6.0, 2.0, 0.0, 4.0, 1.0, 0.0]
-        );
+        assert_eq!(lists.sum_slots(&values)[..6], [6.0, 2.0, 0.0, 4.0, 1.0, 0.0]);
     }
 
     #[test]
@@ -238,8 +222,7 @@ mod tests {
                 TileRect { x, y: [0, 1] },
             )
         };
-        let lists =
-            TileLists::new(2, 1, &[at(2.0, [0, 2]), at(1.0, [1, 2]), at(3.0, [0, 1])]).unwrap();
+        let lists = TileLists::new(2, 1, &[at(2.0, [0, 2]), at(1.0, [1, 2]), at(3.0, [0, 1])]).unwrap();
         // Tile 0: 0, 2; tile 1: 1, 0. Drop splat 1, and splat 0 from tile 1.
         let pruned = lists
             .pruned(&[true, true, false, false], &[0, u32::MAX, 1])

@@ -25,11 +25,7 @@ pub(super) struct Uploads(VecDeque<(ViewId, Uploaded)>);
 
 impl Uploads {
     /// The buffers of `view`, from before or made now.
-    pub fn get_or_insert(
-        &mut self,
-        view: ViewId,
-        make: impl FnOnce() -> Result<Uploaded>,
-    ) -> Result<Uploaded> {
+    pub fn get_or_insert(&mut self, view: ViewId, make: impl FnOnce() -> Result<Uploaded>) -> Result<Uploaded> {
         let before = self.0.iter().position(|(id, _)| id.0 == view.0);
         let found = match before.and_then(|at| self.0.remove(at)) {
             Some((_, found)) => found,
@@ -87,10 +83,7 @@ mod tests {
         assert_eq!(ids(&uploads), [0, 2], "the one not used for longest goes");
         // One above the budget is used and not kept.
         assert_eq!(
-            uploads
-                .get_or_insert(ViewId(3), || made(300 << 20))
-                .unwrap()
-                .bytes,
+            uploads.get_or_insert(ViewId(3), || made(300 << 20)).unwrap().bytes,
             300 << 20
         );
         assert!(ids(&uploads).is_empty());

@@ -46,12 +46,7 @@ impl TileFrame {
 }
 
 /// Composites the splats of `list` and returns each pixel's final transmittance.
-pub(super) fn walk(
-    frame: TileFrame,
-    splats: &[Splat2d],
-    list: &[u32],
-    sink: &mut impl Sink,
-) -> [f32; TILE_PIXELS] {
+pub(super) fn walk(frame: TileFrame, splats: &[Splat2d], list: &[u32], sink: &mut impl Sink) -> [f32; TILE_PIXELS] {
     let mut transmittance = [1.0f32; TILE_PIXELS];
     // A bit a pixel that is not finished: most splats of a dense scene lie behind finished pixels only.
     let mut open = [0u32; SIDE];
@@ -73,10 +68,7 @@ pub(super) fn walk(
         let s = &fetched[place % FETCH];
         sink.begin(place, index);
         let mut stopped = false;
-        let mean = [
-            s.mean[0] - frame.origin[0] as f32,
-            s.mean[1] - frame.origin[1] as f32,
-        ];
+        let mean = [s.mean[0] - frame.origin[0] as f32, s.mean[1] - frame.origin[1] as f32];
         let rows = s.reach.sqrt() / s.inverse_y + ROW_SLACK;
         let inverse = 1.0 / s.inverse_x;
         for y in whole_numbers(mean[1] - rows, mean[1] + rows, side[1]) {
@@ -130,11 +122,7 @@ fn whole_numbers(low: f32, high: f32, limit: f32) -> std::ops::Range<usize> {
     let low = low.min(limit);
     let start = low as u32;
     let start = start + u32::from((start as f32) < low);
-    let end = if high >= 0.0 {
-        (high + 1.0).min(limit) as u32
-    } else {
-        0
-    };
+    let end = if high >= 0.0 { (high + 1.0).min(limit) as u32 } else { 0 };
     start as usize..end as usize
 }
 
@@ -179,10 +167,7 @@ mod tests {
         for i in 0..=800_000 {
             let x = -(i as f32) * 1e-4;
             let (got, want) = (f64::from(exp(x)), f64::from(x).exp());
-            assert!(
-                (got / want - 1.0).abs() < 2.4e-7,
-                "exp({x}) = {got}, not {want}"
-            );
+            assert!((got / want - 1.0).abs() < 2.4e-7, "exp({x}) = {got}, not {want}");
         }
         assert!(exp(f32::NEG_INFINITY) < 1e-34 && exp(-1e30) >= 0.0);
     }

@@ -30,11 +30,7 @@ pub(crate) struct Band {
 
 impl SparseWeights {
     /// Walks all tiles. Also returns which pairs matter: those with a weight, and those that ended a pixel.
-    pub fn new(
-        camera: &Camera,
-        tiles: &TileLists,
-        splats: &[Splat2d],
-    ) -> Result<(Self, Vec<bool>)> {
+    pub fn new(camera: &Camera, tiles: &TileLists, splats: &[Splat2d]) -> Result<(Self, Vec<bool>)> {
         let parts: Vec<(Band, Vec<bool>)> = (0..tiles.rows)
             .into_par_iter()
             .map_init(Scratch::default, |scratch, row| {
@@ -59,9 +55,7 @@ impl SparseWeights {
     pub fn bytes(&self) -> usize {
         self.bands
             .iter()
-            .map(|b| {
-                4 * b.ends.len() + 5 * b.weights.len() + 4 * TILE_PIXELS * b.transmittance.len()
-            })
+            .map(|b| 4 * b.ends.len() + 5 * b.weights.len() + 4 * TILE_PIXELS * b.transmittance.len())
             .sum()
     }
 }
@@ -104,10 +98,7 @@ impl Band {
         }
         let Collect { ends, keep, .. } = collect;
         // Copies of the exact size: growing in place would leave up to half of the memory unused.
-        let (pixels, weights) = (
-            scratch.pixels.as_slice().into(),
-            scratch.weights.as_slice().into(),
-        );
+        let (pixels, weights) = (scratch.pixels.as_slice().into(), scratch.weights.as_slice().into());
         Ok((
             Band {
                 ends,
@@ -156,12 +147,8 @@ impl Sink for Collect<'_> {
         let keep = stopped || self.count > 0;
         self.keep.push(keep);
         if keep {
-            self.scratch
-                .pixels
-                .extend_from_slice(&self.pixels[..self.count]);
-            self.scratch
-                .weights
-                .extend_from_slice(&self.weights[..self.count]);
+            self.scratch.pixels.extend_from_slice(&self.pixels[..self.count]);
+            self.scratch.weights.extend_from_slice(&self.weights[..self.count]);
             self.ends.push(self.scratch.weights.len() as u32);
         }
     }

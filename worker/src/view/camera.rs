@@ -28,14 +28,7 @@ impl Camera {
     ///
     /// `fov_y` is the vertical field of view in radians; pixels are square and the principal point is the centre.
     /// Degenerate arguments (eye on target, up along the view) get some valid rotation instead of NaN.
-    pub fn look_at(
-        eye: [f32; 3],
-        target: [f32; 3],
-        up: [f32; 3],
-        fov_y: f32,
-        width: u32,
-        height: u32,
-    ) -> Camera {
+    pub fn look_at(eye: [f32; 3], target: [f32; 3], up: [f32; 3], fov_y: f32, width: u32, height: u32) -> Camera {
         let forward = unit(sub(target, eye)).unwrap_or([0.0, 0.0, 1.0]);
         let right = unit(cross(forward, up)).unwrap_or_else(|| perpendicular(forward));
         let down = cross(forward, right);
@@ -83,10 +76,7 @@ mod tests {
         let camera = Camera::look_at(eye, [0.5, 0.25, -1.0], [0.0, 1.0, 0.0], 0.8, 64, 48);
         assert!(close(camera.centre(), eye));
         let distance = dot(sub([0.5, 0.25, -1.0], eye), sub([0.5, 0.25, -1.0], eye)).sqrt();
-        assert!(close(
-            camera.to_camera([0.5, 0.25, -1.0]),
-            [0.0, 0.0, distance]
-        ));
+        assert!(close(camera.to_camera([0.5, 0.25, -1.0]), [0.0, 0.0, distance]));
         // Above the target is up in the picture, which is negative y.
         assert!(camera.to_camera([0.5, 1.25, -1.0])[1] < 0.0);
         // The vertical field of view ends at the picture's edge.

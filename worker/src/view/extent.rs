@@ -50,8 +50,7 @@ impl Extent {
         }
         let weights = weights(gaussians);
         let axis = |k: usize| gaussians.positions.iter().map(move |p| f64::from(p[k]));
-        let spans: [[f64; 2]; 3] =
-            std::array::from_fn(|k| quantiles(axis(k), &weights, [0.1, 0.9]));
+        let spans: [[f64; 2]; 3] = std::array::from_fn(|k| quantiles(axis(k), &weights, [0.1, 0.9]));
         let centre: [f64; 3] = std::array::from_fn(|k| 0.5 * (spans[k][0] + spans[k][1]));
         let distances = gaussians.positions.iter().map(|p| {
             (0..3)
@@ -79,18 +78,12 @@ impl Extent {
 }
 
 fn bad(reason: String) -> Error {
-    Error::BadOption {
-        field: "scene",
-        reason,
-    }
+    Error::BadOption { field: "scene", reason }
 }
 
 /// Standard deviation along a Gaussian's longest axis.
 fn longest(log_scales: &[f32; 3]) -> f64 {
-    log_scales
-        .iter()
-        .map(|s| f64::from(*s).exp())
-        .fold(0.0, f64::max)
+    log_scales.iter().map(|s| f64::from(*s).exp()).fold(0.0, f64::max)
 }
 
 /// What each Gaussian shows: opacity times capped area; never all zero.
@@ -119,11 +112,7 @@ fn weights(gaussians: &Gaussians) -> Vec<f64> {
 }
 
 /// Weighted quantiles: the smallest values below which lie at least those shares of the weight.
-fn quantiles<const N: usize>(
-    values: impl Iterator<Item = f64>,
-    weights: &[f64],
-    shares: [f64; N],
-) -> [f64; N] {
+fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, weights: &[f64], shares: [f64; N]) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.zip(weights.iter().copied()).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let total: f64 = sorted.iter().map(|(_, w)| w).sum();
@@ -139,9 +128,7 @@ fn quantiles<const N: usize>(
 
 /// The upward direction, and whether the scene lies on ground.
 fn up(gaussians: &Gaussians, weights: &[f64], centre: [f64; 3], radius: f64) -> ([f32; 3], bool) {
-    let normals: Vec<[f32; 3]> = (0..gaussians.len())
-        .map(|row| normal(gaussians, row))
-        .collect();
+    let normals: Vec<[f32; 3]> = (0..gaussians.len()).map(|row| normal(gaussians, row)).collect();
     let level: [Vec<f64>; 3] = std::array::from_fn(|k| {
         normals
             .iter()
@@ -152,27 +139,16 @@ fn up(gaussians: &Gaussians, weights: &[f64], centre: [f64; 3], radius: f64) -> 
     let share: [f64; 3] = std::array::from_fn(|k| level[k].iter().sum());
     let vertical = [0, 2].into_iter().fold(1, |best: usize, k| {
         let favour = if best == 1 { 1.5 } else { 1.0 };
-        if share[k] > favour * share[best] {
-            k
-        } else {
-            best
-        }
+        if share[k] > favour * share[best] { k } else { best }
     });
     // From here on in radii from the centre.
-    let place =
-        |row: usize, k: usize| (f64::from(gaussians.positions[row][k]) - centre[k]) / radius;
-    let heights: Vec<f64> = (0..gaussians.len())
-        .map(|row| place(row, vertical))
-        .collect();
+    let place = |row: usize, k: usize| (f64::from(gaussians.positions[row][k]) - centre[k]) / radius;
+    let heights: Vec<f64> = (0..gaussians.len()).map(|row| place(row, vertical)).collect();
     let [sheet] = quantiles(heights.iter().copied(), &level[vertical], [0.5]);
     let (mut below, mut above, mut in_sheet) = (0.0, 0.0, weights.to_vec());
     for row in 0..gaussians.len() {
         if (heights[row] - sheet).abs() >= HALF_SHEET {
-            *(if heights[row] < sheet {
-                &mut below
-            } else {
-                &mut above
-            }) += weights[row];
+            *(if heights[row] < sheet { &mut below } else { &mut above }) += weights[row];
             in_sheet[row] = 0.0;
         }
     }
@@ -183,11 +159,7 @@ fn up(gaussians: &Gaussians, weights: &[f64], centre: [f64; 3], radius: f64) -> 
     let total: f64 = weights.iter().sum();
     let at_an_end = f64::min(above, below) < 0.05 * total && f64::max(above, below) > 0.1 * total;
     let on_ground = at_an_end && width > 0.6 && in_sheet.iter().sum::<f64>() > 0.25 * total;
-    let upwards = if at_an_end {
-        above > below
-    } else {
-        vertical != 1
-    };
+    let upwards = if at_an_end { above > below } else { vertical != 1 };
     let mut up = [0.0; 3];
     up[vertical] = if upwards { 1.0 } else { -1.0 };
     (up, on_ground)
@@ -239,11 +211,7 @@ mod tests {
             let (reach, height, scales) = if i % 4 == 0 {
                 (0.1, ground + t * (top - ground), [-3.0; 3])
             } else {
-                (
-                    t.sqrt(),
-                    ground,
-                    [0, 1, 2].map(|k| if k == axis { -8.0 } else { -3.0 }),
-                )
+                (t.sqrt(), ground, [0, 1, 2].map(|k| if k == axis { -8.0 } else { -3.0 }))
             };
             let mut position = [0.0; 3];
             position[axis] = height;

@@ -72,9 +72,7 @@ fn parse(text: &[u8]) -> Result<Vec<Camera>, String> {
         Value::Object(fields) => match fields.get("frames") {
             Some(Value::Array(frames)) => (frames, Some(fields)),
             _ => {
-                return Err(
-                    "neither cameras.json (an array) nor transforms.json (with \"frames\")".into(),
-                );
+                return Err("neither cameras.json (an array) nor transforms.json (with \"frames\")".into());
             }
         },
         _ => return Err("neither cameras.json (an array) nor transforms.json (an object)".into()),
@@ -100,39 +98,25 @@ fn from_entry(own: &Map<String, Value>) -> Result<Camera, String> {
     let axes = std::array::from_fn(|k| [rows[0][k], rows[1][k], rows[2][k]]);
     let (width, height) = (need("width")?, need("height")?);
     let principal = [number(own, "cx")?, number(own, "cy")?];
-    build(
-        axes,
-        position,
-        [need("fx")?, need("fy")?],
-        principal,
-        [width, height],
-    )
+    build(axes, position, [need("fx")?, need("fy")?], principal, [width, height])
 }
 
 fn from_frame(own: &Map<String, Value>, shared: &Map<String, Value>) -> Result<Camera, String> {
     let find = |name: &str| Ok::<_, String>(number(own, name)?.or(number(shared, name)?));
     let rows: [[f64; 4]; 4] = matrix(own.get("transform_matrix"), "transform_matrix")?;
     // OpenGL's y is up and its z backward.
-    let axes =
-        [(0, 1.0), (1, -1.0), (2, -1.0)].map(|(k, sign)| [0, 1, 2].map(|r| sign * rows[r][k]));
+    let axes = [(0, 1.0), (1, -1.0), (2, -1.0)].map(|(k, sign)| [0, 1, 2].map(|r| sign * rows[r][k]));
     let position = [rows[0][3], rows[1][3], rows[2][3]];
     let width = find("w")?.unwrap_or(BLENDER_SIDE);
     let height = find("h")?.unwrap_or(BLENDER_SIDE);
-    let from_angle =
-        |angle: Option<f64>, side: f64| angle.map(|angle| 0.5 * side / (0.5 * angle).tan());
+    let from_angle = |angle: Option<f64>, side: f64| angle.map(|angle| 0.5 * side / (0.5 * angle).tan());
     let fx = find("fl_x")?
         .or(from_angle(find("camera_angle_x")?, width))
         .ok_or("neither fl_x nor camera_angle_x is given")?;
     let fy = find("fl_y")?
         .or(from_angle(find("camera_angle_y")?, height))
         .unwrap_or(fx);
-    build(
-        axes,
-        position,
-        [fx, fy],
-        [find("cx")?, find("cy")?],
-        [width, height],
-    )
+    build(axes, position, [fx, fy], [find("cx")?, find("cy")?], [width, height])
 }
 
 /// Checks and assembles: `axes` are the camera's x, y and z in the world.
@@ -154,22 +138,16 @@ fn build(
         dot(x, z),
     ];
     if !skew.iter().all(|s| s.abs() < 1e-2) || dot(cross(x, y), z) < 0.0 {
-        return Err(
-            "its rotation is not one: axes must have length 1, right angles and no mirror".into(),
-        );
+        return Err("its rotation is not one: axes must have length 1, right angles and no mirror".into());
     }
     for (name, side) in [("width", size[0]), ("height", size[1])] {
         if !(1.0..=MAX_SIDE).contains(&side) || side.fract() != 0.0 {
-            return Err(format!(
-                "{name} is {side}, must be a whole number from 1 to {MAX_SIDE}"
-            ));
+            return Err(format!("{name} is {side}, must be a whole number from 1 to {MAX_SIDE}"));
         }
     }
     for (name, focal) in [("x", focal[0]), ("y", focal[1])] {
         if !(focal > 1e-6 && focal < 1e9) {
-            return Err(format!(
-                "the focal length in {name} is {focal} pixels, must be above 0"
-            ));
+            return Err(format!("the focal length in {name} is {focal} pixels, must be above 0"));
         }
     }
     let position = position.map(|p| p as f32);
@@ -213,10 +191,7 @@ fn numbers<const N: usize>(value: Option<&Value>, name: &str) -> Result<[f64; N]
 fn matrix<const N: usize>(value: Option<&Value>, name: &str) -> Result<[[f64; N]; N], String> {
     let bad = || format!("{name} is missing or not {N} rows of {N} numbers");
     let rows = value.and_then(Value::as_array).ok_or_else(bad)?;
-    let rows: Option<Vec<[f64; N]>> = rows
-        .iter()
-        .map(|row| numbers(Some(row), name).ok())
-        .collect();
+    let rows: Option<Vec<[f64; N]>> = rows.iter().map(|row| numbers(Some(row), name).ok()).collect();
     rows.and_then(|rows| rows.try_into().ok()).ok_or_else(bad)
 }
 
@@ -268,8 +243,7 @@ mod tests {
     use super::*;
 
     fn cameras() -> Vec<Camera> {
-        let mut off_centre =
-            Camera::look_at([3.0, -1.0, 0.5], [0.0; 3], [0.0, 0.0, 1.0], 0.7, 640, 480);
+        let mut off_centre = Camera::look_at([3.0, -1.0, 0.5], [0.0; 3], [0.0, 0.0, 1.0], 0.7, 640, 480);
         off_centre.cx += 11.0;
         off_centre.fy *= 1.5;
         vec![
@@ -321,16 +295,12 @@ mod tests {
     #[test]
     fn a_reference_camera_keeps_its_axes() {
         // camera x = world y, y = world z, z = world x: the columns of the stored rotation.
-        let text =
-            br#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],
+        let text = br#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],
             "rotation": [[0,0,1],[1,0,0],[0,1,0]], "fy": 30, "fx": 40}]"#;
         let camera = parse(text).unwrap().remove(0);
         assert_eq!(camera.centre(), [1.0, 2.0, 3.0]);
         assert_eq!(camera.to_camera([6.0, 2.5, 4.0]), [0.5, 1.0, 5.0]);
-        assert_eq!(
-            (camera.fx, camera.fy, camera.cx, camera.cy),
-            (40.0, 30.0, 5.0, 10.0)
-        );
+        assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (40.0, 30.0, 5.0, 10.0));
     }
 
     #[test]
@@ -341,17 +311,9 @@ mod tests {
         let cases = [
             ("\"width\": 10,", "", "camera 0: width is missing"),
             ("10", "1e9", "must be a whole number from 1 to 16384"),
-            (
-                "\"fx\": 40",
-                "\"fx\": \"wide\"",
-                "fx is \"wide\", not a number",
-            ),
+            ("\"fx\": 40", "\"fx\": \"wide\"", "fx is \"wide\", not a number"),
             ("\"fx\": 40", "\"fx\": -1", "focal length in x is -1"),
-            (
-                "[1, 2, 3]",
-                "[1, 2]",
-                "position is missing or not 3 numbers",
-            ),
+            ("[1, 2, 3]", "[1, 2]", "position is missing or not 3 numbers"),
             ("[0,1,0]", "[0,-1,0]", "rotation"),
             ("[0,1,0]", "[0,2,0]", "rotation"),
             ("[1, 2, 3]", "[1, 2, 1e300]", "out of range"),
@@ -359,10 +321,7 @@ mod tests {
         ];
         for (from, to, expected) in cases {
             let reason = parse(good.replacen(from, to, 1).as_bytes()).unwrap_err();
-            assert!(
-                reason.contains(expected),
-                "{reason} does not have {expected}"
-            );
+            assert!(reason.contains(expected), "{reason} does not have {expected}");
         }
         for (text, expected) in [
             ("[]", "no cameras"),
@@ -373,8 +332,7 @@ mod tests {
             let reason = parse(text.as_bytes()).unwrap_err();
             assert!(reason.contains(expected), "{reason}");
         }
-        let frame =
-            r#"{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
+        let frame = r#"{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
         assert!(
             parse(frame.as_bytes())
                 .unwrap_err()

@@ -60,9 +60,7 @@ impl ViewSampler {
         let extent = Extent::of(gaussians)?;
         let mut random = stream(seed, u64::MAX);
         let shift = [random.random(), random.random()];
-        let seen: Vec<[f32; 3]> = lattice(HELD_OUT_PLACES)
-            .filter(|d| seen(&extent, *d))
-            .collect();
+        let seen: Vec<[f32; 3]> = lattice(HELD_OUT_PLACES).filter(|d| seen(&extent, *d)).collect();
         let first = random.random_range(0..seen.len().max(1));
         let places = farthest_first(seen, first);
         Ok(ViewSampler {
@@ -93,9 +91,7 @@ impl ViewSampler {
     fn training_direction(&self, index: u64, random: &mut ChaCha8Rng) -> [f32; 3] {
         // Roberts' R2 sequence: inverse powers of the plastic number. Whole turns are taken out in integers, so that
         // the stream does not coarsen at huge indices.
-        let turn = |alpha: u64, shift: f64| {
-            (alpha.wrapping_mul(index) as f64 / 2f64.powi(64) + shift).fract() as f32
-        };
+        let turn = |alpha: u64, shift: f64| (alpha.wrapping_mul(index) as f64 / 2f64.powi(64) + shift).fract() as f32;
         let mut u = turn(0xC13F_A9A9_02A6_328F, self.shift[0]);
         let mut v = turn(0x91E1_0DA5_C79E_7B1D, self.shift[1]);
         // Refusals are few (12 % of the sphere, half of it over ground); the bound only keeps this a plain loop.
@@ -139,9 +135,7 @@ impl ViewSampler {
 
     /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane.
     fn place(&self, direction: [f32; 3], size: u32, random: &mut impl Rng) -> Camera {
-        let Extent {
-            centre, radius, up, ..
-        } = self.extent;
+        let Extent { centre, radius, up, .. } = self.extent;
         let fill = random.random_range(0.95..1.2);
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
@@ -182,12 +176,7 @@ fn farthest_first(mut points: Vec<[f32; 3]>, first: usize) -> Vec<[f32; 3]> {
         points.swap(0, first);
     }
     for done in 1..points.len() {
-        let nearest = |p: [f32; 3]| {
-            points[..done]
-                .iter()
-                .map(|q| dot(p, *q))
-                .fold(-1.0, f32::max)
-        };
+        let nearest = |p: [f32; 3]| points[..done].iter().map(|q| dot(p, *q)).fold(-1.0, f32::max);
         let closeness: Vec<f32> = points[done..].iter().map(|p| nearest(*p)).collect();
         let best = (0..closeness.len()).min_by(|a, b| closeness[*a].total_cmp(&closeness[*b]));
         points.swap(done, done + best.unwrap_or(0));
@@ -230,10 +219,7 @@ mod tests {
         for sampler in [&a, &b] {
             for i in 0..200 {
                 let held_out = direction(&sampler.camera(Split::HeldOut, i, 32));
-                closest = training
-                    .iter()
-                    .map(|d| dot(*d, held_out))
-                    .fold(closest, f32::max);
+                closest = training.iter().map(|d| dot(*d, held_out)).fold(closest, f32::max);
             }
         }
         assert!(
@@ -255,10 +241,7 @@ mod tests {
                     .collect();
                 for probe in lattice(40) {
                     let nearest = views.iter().map(|d| dot(*d, probe)).fold(-1.0, f32::max);
-                    assert!(
-                        nearest > 0.6,
-                        "{split:?} leaves a hole at {probe:?}: {nearest}"
-                    );
+                    assert!(nearest > 0.6, "{split:?} leaves a hole at {probe:?}: {nearest}");
                 }
             }
         }
@@ -294,14 +277,8 @@ mod tests {
                     let pixel = camera.fx * x / z + camera.cx;
                     (least, most) = (least.min(pixel), most.max(pixel));
                 }
-                assert!(
-                    (-10.0..40.0).contains(&least),
-                    "scale {scale}: {least}..{most}"
-                );
-                assert!(
-                    (60.0..110.0).contains(&most),
-                    "scale {scale}: {least}..{most}"
-                );
+                assert!((-10.0..40.0).contains(&least), "scale {scale}: {least}..{most}");
+                assert!((60.0..110.0).contains(&most), "scale {scale}: {least}..{most}");
             }
         }
     }
@@ -319,15 +296,8 @@ mod tests {
             for position in [[0.0; 3], [1e6, -3.0, 2.0]] {
                 let sampler = ViewSampler::new(&one(log_scale, position), 1).unwrap();
                 let camera = sampler.camera(Split::HeldOut, 0, 64);
-                let numbers = camera
-                    .rotation
-                    .into_iter()
-                    .flatten()
-                    .chain(camera.translation);
-                assert!(
-                    numbers.chain([camera.fx, camera.fy]).all(f32::is_finite),
-                    "{camera:?}"
-                );
+                let numbers = camera.rotation.into_iter().flatten().chain(camera.translation);
+                assert!(numbers.chain([camera.fx, camera.fy]).all(f32::is_finite), "{camera:?}");
                 assert!(dot(sub(camera.centre(), position), [1.0; 3]).is_finite());
             }
         }

@@ -17,9 +17,7 @@ impl Bench {
         std::fs::create_dir(&clip).unwrap();
         std::fs::write(clip.join("config.json"), TINY).unwrap();
         let (_, model) = model(&cpu());
-        model
-            .save(&clip.join("model.safetensors"), Precision::F32)
-            .unwrap();
+        model.save(&clip.join("model.safetensors"), Precision::F32).unwrap();
         Self(folder)
     }
 
@@ -68,14 +66,8 @@ fn write(path: &Path, text: &str) {
 fn from_a_sample_to_a_verdict() {
     let bench = Bench::new();
     bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
-    let key = bench.json(
-        "key create --bits 32 --seed 7 -o k.key --device cpu --json",
-        0,
-    );
-    assert_eq!(
-        (&key["bits"], &key["clip"]),
-        (&32.into(), &"guardsplat".into())
-    );
+    let key = bench.json("key create --bits 32 --seed 7 -o k.key --device cpu --json", 0);
+    assert_eq!((&key["bits"], &key["clip"]), (&32.into(), &"guardsplat".into()));
 
     write(
         &bench.path("few.json"),
@@ -89,13 +81,7 @@ fn from_a_sample_to_a_verdict() {
     assert_eq!(missed["written"], false);
     assert!(!bench.path("out.ply").exists());
     let report = bench.json(&format!("{line} --force --report pictures"), 3);
-    for field in [
-        "bit_accuracy",
-        "bit_accuracy_worst_view",
-        "psnr_db",
-        "ssim",
-        "seconds",
-    ] {
+    for field in ["bit_accuracy", "bit_accuracy_worst_view", "psnr_db", "ssim", "seconds"] {
         assert!(report[field].is_number(), "{field}: {report}");
     }
     assert_eq!(report["steps"], 2);
@@ -113,12 +99,7 @@ fn from_a_sample_to_a_verdict() {
     bench.exits("render out.ply views --views 3 --size 40 --seed 1", 0);
     assert_eq!(
         files(&bench.path("views")),
-        [
-            "cameras.json",
-            "view_000.png",
-            "view_001.png",
-            "view_002.png"
-        ]
+        ["cameras.json", "view_000.png", "view_001.png", "view_002.png"]
     );
     bench.exits(
         "render out.ply again --cameras views/cameras.json --views 2 --background black --format exr",
@@ -131,26 +112,18 @@ fn from_a_sample_to_a_verdict() {
 
     // What pictures read is what they read again, so it matches; its complement does not.
     let read = bench.json("verify views --key k.key --device cpu --json", 3);
-    assert_eq!(
-        (&read["verdict"], &read["views"]),
-        (&"inconclusive".into(), &3.into())
-    );
+    assert_eq!((&read["verdict"], &read["views"]), (&"inconclusive".into(), &3.into()));
     assert!(read["p_value"].is_null() && read["reason"].is_string());
     let found = read["message"].as_str().unwrap().to_owned();
     let matching = format!("verify views --key k.key --device cpu --json --message {found}");
     let verdict = bench.json(&matching, 0);
     assert_eq!(verdict["verdict"], "match");
-    assert_eq!(
-        (&verdict["matched_bits"], &verdict["bits"]),
-        (&32.into(), &32.into())
-    );
+    assert_eq!((&verdict["matched_bits"], &verdict["bits"]), (&32.into(), &32.into()));
     assert!(verdict["p_value"].as_f64().unwrap() <= verdict["threshold"].as_f64().unwrap());
     let other = u32::from_str_radix(&found, 16).unwrap() ^ u32::MAX;
     let line = format!("verify views/view_000.png out.ply --key k.key --message {other:08x}");
     assert!(bench.fails(&line).contains("on its own"));
-    let line = format!(
-        "verify out.ply --key k.key --device cpu --views 3 --size 40 --seed 1 --message {other:08x}"
-    );
+    let line = format!("verify out.ply --key k.key --device cpu --views 3 --size 40 --seed 1 --message {other:08x}");
     assert!(bench.exits(&line, 2).starts_with("no match: 0 of 32 bits"));
 }
 
@@ -182,10 +155,7 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
             "embed in.ply out.ply --key k.key --message 5c5c --device cpu",
             "longer than the key's 8 bits",
         ),
-        (
-            "embed in.ply out.ply --key k.key --message 5g --device cpu",
-            "'g'",
-        ),
+        ("embed in.ply out.ply --key k.key --message 5g --device cpu", "'g'"),
         (
             "embed in.ply out.ply --key text.ply --message 5c --device cpu",
             "key text.ply",
@@ -206,24 +176,12 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
             "embed in.ply out.ply --key k.key --message 5c --device cpu --clip other",
             "model other",
         ),
-        (
-            "key create --bits 0 -o new.key --device cpu",
-            "0 is outside 1 to 75",
-        ),
-        (
-            "key create --bits 76 -o new.key --device cpu",
-            "76 is outside 1 to 75",
-        ),
+        ("key create --bits 0 -o new.key --device cpu", "0 is outside 1 to 75"),
+        ("key create --bits 76 -o new.key --device cpu", "76 is outside 1 to 75"),
         ("verify none.png --key k.key --device cpu", "none.png"),
-        (
-            "verify in.ply --key k.key --message 5c5c --device cpu",
-            "longer",
-        ),
+        ("verify in.ply --key k.key --message 5c5c --device cpu", "longer"),
         ("render text.ply views --views 1 --device cpu", "text.ply"),
-        (
-            "render in.ply views --cameras text.ply --device cpu",
-            "text.ply",
-        ),
+        ("render in.ply views --cameras text.ply --device cpu", "text.ply"),
         ("sample new.ply --gaussians 0", "--gaussians"),
         ("sample new.ply --sh-degree 5", "--sh-degree"),
         ("models verify other", "models add"),

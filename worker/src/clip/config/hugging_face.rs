@@ -1,9 +1,6 @@
 //! Reads Hugging Face's `config.json` of a `CLIPModel`. What the file leaves out has the value that
 //! transformers' `CLIPTextConfig` and `CLIPVisionConfig` give it, because it writes differences only.
-use super::{
-    Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig,
-    VisionTower,
-};
+use super::{Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -70,9 +67,7 @@ impl Tower {
             "quick_gelu" => Activation::QuickGelu,
             "gelu" => Activation::Gelu,
             other => {
-                return Err(format!(
-                    "hidden_act is {other:?}, must be \"quick_gelu\" or \"gelu\""
-                ));
+                return Err(format!("hidden_act is {other:?}, must be \"quick_gelu\" or \"gelu\""));
             }
         };
         Ok(BlockConfig {
@@ -95,10 +90,7 @@ pub(super) fn parse(value: Value) -> Result<ClipConfig, String> {
         "vision_config",
         [vision_defaults, file.vision_config, file.vision_config_dict],
     )?;
-    let text = tower(
-        "text_config",
-        [Value::Null, file.text_config, file.text_config_dict],
-    )?;
+    let text = tower("text_config", [Value::Null, file.text_config, file.text_config_dict])?;
     if vision.num_channels != 3 {
         return Err(format!(
             "vision_config.num_channels is {}, must be 3",
@@ -136,9 +128,7 @@ fn tower(name: &str, sections: [Value; 3]) -> Result<Tower, String> {
     for section in sections {
         match section {
             Value::Null => {}
-            Value::Object(fields) => {
-                merged.extend(fields.into_iter().filter(|(_, v)| !v.is_null()))
-            }
+            Value::Object(fields) => merged.extend(fields.into_iter().filter(|(_, v)| !v.is_null())),
             other => return Err(format!("{name} is {other}, must be an object")),
         }
     }

@@ -29,13 +29,14 @@ pub struct ClipConfig {
 pub struct VisionConfig {
     /// Side of the square pictures it takes, in pixels.
     pub image_size: usize,
-    /// Transformer: width of a token. ResNet: channels after the stem (features are 32 times wider).
+    /// Transformer: width of a token. ResNet: channels after the stem (features are 32 times wider). Statistics:
+    /// filters a scale.
     pub width: usize,
     /// Its kind, with what only that kind has.
     pub tower: VisionTower,
 }
 
-/// The two kinds of image tower that CLIP was published with.
+/// The two kinds of image tower that CLIP was published with, and the project's own.
 #[derive(Clone, Debug, PartialEq)]
 pub enum VisionTower {
     /// Vision transformer.
@@ -51,6 +52,13 @@ pub enum VisionTower {
         layers: [usize; 4],
         /// Heads of the attention pool; divides `32 * width`.
         heads: usize,
+    },
+    /// Averages of small filters at several scales, and a linear head.
+    Statistics {
+        /// Sides of the squares that are averaged into one pixel.
+        scales: Vec<usize>,
+        /// Side of a filter.
+        kernel: usize,
     },
 }
 
@@ -137,8 +145,8 @@ impl ClipConfig {
         let preprocessor = dir.join("preprocessor_config.json");
         if preprocessor.is_file() {
             let name = preprocessor.display().to_string();
-            if let Some(found) = hugging_face::normalization(&read_bounded(&preprocessor)?)
-                .map_err(|e| bad(&name, e))?
+            if let Some(found) =
+                hugging_face::normalization(&read_bounded(&preprocessor)?).map_err(|e| bad(&name, e))?
             {
                 config.normalization = found;
                 config.validate().map_err(|e| bad(&name, e))?;
@@ -161,9 +169,7 @@ impl ClipConfig {
         } else {
             Err("is neither a Hugging Face CLIP configuration (vision_config) nor an OpenCLIP one (vision_cfg)".into())
         };
-        config
-            .and_then(|c| c.validate().map(|()| c))
-            .map_err(|e| bad(name, e))
+        config.and_then(|c| c.validate().map(|()| c)).map_err(|e| bad(name, e))
     }
 
     /// The configuration in OpenCLIP's form, for a model that is saved.
@@ -183,27 +189,22 @@ impl ClipConfig {
         match &vision.tower {
             VisionTower::Transformer { patch_size, blocks } => {
                 within("vision patch_size", *patch_size, vision.image_size)?;
-                divides(
-                    "vision image_size",
-                    vision.image_size,
-                    "patch_size",
-                    *patch_size,
-                )?;
+                divides("vision image_size", vision.image_size, "patch_size", *patch_size)?;
                 blocks.validate("vision", vision.width)?;
             }
             VisionTower::ResNet { layers, heads } => {
-                layers
-                    .iter()
-                    .try_for_each(|n| within("vision layers", *n, 128))?;
-                divides(
-                    "vision image_size",
-                    vision.image_size,
-                    "the total stride",
-                    32,
-                )?;
+                layers.iter().try_for_each(|n| within("vision layers", *n, 128))?;
+                divides("vision image_size", vision.image_size, "the total stride", 32)?;
                 divides("vision width", vision.width, "the stem's narrowing", 2)?;
                 within("vision heads", *heads, 4096)?;
                 divides("vision feature width", vision.width * 32, "heads", *heads)?;
+            }
+            VisionTower::Statistics { scales, kernel } => {
+                within("vision scales", scales.len(), 16)?;
+                within("vision kernel", *kernel, 31)?;
+                for scale in scales {
+                    within("vision scale", *scale, vision.image_size / kernel)?;
+                }
             }
         }
         let text = &self.text;
@@ -233,11 +234,7 @@ impl BlockConfig {
     fn validate(&self, tower: &str, width: usize) -> Result<(), String> {
         within(&format!("{tower} layers"), self.layers, 128)?;
         within(&format!("{tower} heads"), self.heads, 4096)?;
-        within(
-            &format!("{tower} perceptron width"),
-            self.mlp_width,
-            1 << 16,
-        )?;
+        within(&format!("{tower} perceptron width"), self.mlp_width, 1 << 16)?;
         divides(&format!("{tower} width"), width, "heads", self.heads)?;
         if !(self.norm_epsilon > 0.0 && self.norm_epsilon < 1.0) {
             return Err(format!(
@@ -259,9 +256,7 @@ fn within(field: &str, value: usize, most: usize) -> Result<(), String> {
 fn divides(field: &str, value: usize, by: &str, divisor: usize) -> Result<(), String> {
     match value.is_multiple_of(divisor) {
         true => Ok(()),
-        false => Err(format!(
-            "{field} is {value}, must be a multiple of {by}, {divisor}"
-        )),
+        false => Err(format!("{field} is {value}, must be a multiple of {by}, {divisor}")),
     }
 }
 

@@ -1,9 +1,6 @@
 //! Reads and writes OpenCLIP's model configuration. Unknown fields are errors: most of them change what the
 //! model computes without changing the shape of its weights.
-use super::{
-    Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig,
-    VisionTower,
-};
+use super::{Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -45,6 +42,11 @@ struct Vision {
 enum Layers {
     Transformer(usize),
     ResNet([usize; 4]),
+    /// Not OpenCLIP's: the project's own tower.
+    Statistics {
+        scales: Vec<usize>,
+        kernel: usize,
+    },
 }
 
 #[derive(Serialize, Deserialize)]
@@ -85,8 +87,7 @@ fn default_vocab_size() -> usize {
 pub(super) fn parse(mut value: Value) -> Result<ClipConfig, String> {
     let mut normalization = Normalization::default();
     if let Some(preprocess) = value.get_mut("preprocess_cfg").map(Value::take) {
-        let found: Preprocess =
-            serde_json::from_value(preprocess).map_err(|e| format!("preprocess_cfg: {e}"))?;
+        let found: Preprocess = serde_json::from_value(preprocess).map_err(|e| format!("preprocess_cfg: {e}"))?;
         if let (Some(mean), Some(std)) = (found.mean, found.std) {
             normalization = Normalization { mean, std };
         }
@@ -114,15 +115,14 @@ pub(super) fn parse(mut value: Value) -> Result<ClipConfig, String> {
     };
     let tower = match vision.layers {
         Layers::Transformer(layers) => VisionTower::Transformer {
-            patch_size: vision
-                .patch_size
-                .ok_or("vision_cfg.patch_size is missing")?,
+            patch_size: vision.patch_size.ok_or("vision_cfg.patch_size is missing")?,
             blocks: blocks(layers, heads(vision.width)?, vision.width, vision.mlp_ratio),
         },
         Layers::ResNet(layers) => VisionTower::ResNet {
             layers,
             heads: heads(vision.width.saturating_mul(32))?,
         },
+        Layers::Statistics { scales, kernel } => VisionTower::Statistics { scales, kernel },
     };
     let text = model.text_cfg;
     Ok(ClipConfig {
@@ -159,12 +159,11 @@ pub(super) fn write(config: &ClipConfig) -> Result<String, String> {
                 mlp_ratio,
             )
         }
-        VisionTower::ResNet { layers, heads } => (
-            Layers::ResNet(*layers),
-            None,
-            vision.width * 32 / heads,
-            None,
-        ),
+        VisionTower::ResNet { layers, heads } => (Layers::ResNet(*layers), None, vision.width * 32 / heads, None),
+        VisionTower::Statistics { scales, kernel } => {
+            let (scales, kernel) = (scales.clone(), *kernel);
+            (Layers::Statistics { scales, kernel }, None, default_head_width(), None)
+        }
     };
     let activation = text.blocks.activation;
     if towers
@@ -200,7 +199,6 @@ pub(super) fn write(config: &ClipConfig) -> Result<String, String> {
         },
     };
     let Normalization { mean, std } = config.normalization;
-    let file =
-        serde_json::json!({ "model_cfg": model, "preprocess_cfg": { "mean": mean, "std": std } });
+    let file = serde_json::json!({ "model_cfg": model, "preprocess_cfg": { "mean": mean, "std": std } });
     serde_json::to_string_pretty(&file).map_err(|e| e.to_string())
 }

@@ -1,8 +1,5 @@
 //! The sizes that OpenAI published CLIP in (Radford et al. 2021, tables 19 and 20).
-use super::{
-    Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig,
-    VisionTower,
-};
+use super::{Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 
 /// Names that [`published`] knows.
 pub const PUBLISHED: [&str; 9] = [

@@ -27,11 +27,7 @@ fn every_published_size_is_valid_and_survives_writing_and_reading() {
 
 #[test]
 fn hugging_face_defaults_are_those_of_transformers() {
-    let parsed = ClipConfig::parse(
-        "b32",
-        r#"{"vision_config": {}, "text_config": {"eos_token_id": 2}}"#,
-    )
-    .unwrap();
+    let parsed = ClipConfig::parse("b32", r#"{"vision_config": {}, "text_config": {"eos_token_id": 2}}"#).unwrap();
     assert_eq!(parsed, published("ViT-B/32").unwrap());
     let newer = ClipConfig::parse("b32", r#"{"vision_config": {}, "text_config": {}}"#).unwrap();
     assert_eq!(newer.text.end, EndToken::Id(49407));
@@ -44,11 +40,7 @@ fn the_older_sections_override() {
         "vision_config_dict": {"hidden_act": "gelu"}}"#;
     let config = ClipConfig::parse("l14", json).unwrap();
     assert_eq!(
-        (
-            config.embed_dim,
-            config.text.width,
-            config.text.blocks.heads
-        ),
+        (config.embed_dim, config.text.width, config.text.blocks.heads),
         (768, 768, 12)
     );
     let VisionTower::Transformer { blocks, .. } = config.vision.tower else {
@@ -73,43 +65,23 @@ fn open_clip_heads_follow_the_head_width() {
 #[test]
 fn what_does_not_fit_is_named() {
     for (from, to, needle) in [
-        (
-            "\"image_size\": 64",
-            "\"image_size\": 65",
-            "vision image_size is 65",
-        ),
-        (
-            "\"image_size\": 64",
-            "\"image_size\": 100000",
-            "must be 1 to 4096",
-        ),
+        ("\"image_size\": 64", "\"image_size\": 65", "vision image_size is 65"),
+        ("\"image_size\": 64", "\"image_size\": 100000", "must be 1 to 4096"),
         ("\"head_width\": 32", "\"head_width\": 0", "head_width"),
-        (
-            "\"head_width\": 32",
-            "\"head_width\": 1000",
-            "vision heads is 0",
-        ),
+        ("\"head_width\": 32", "\"head_width\": 1000", "vision heads is 0"),
         (
             "\"heads\": 2",
             "\"heads\": 3",
             "text width is 64, must be a multiple of heads, 3",
         ),
-        (
-            "\"vocab_size\": 100",
-            "\"vocab_size\": 99999999999",
-            "text vocab_size",
-        ),
+        ("\"vocab_size\": 100", "\"vocab_size\": 99999999999", "text vocab_size"),
         ("\"heads\": 2", "\"heads\": -2", "invalid value"),
         (
             "\"heads\": 2",
             "\"heads\": 2, \"hf_model_name\": \"x\"",
             "unknown field `hf_model_name`",
         ),
-        (
-            "\"layers\": [1, 1, 1, 1]",
-            "\"layers\": 12",
-            "patch_size is missing",
-        ),
+        ("\"layers\": [1, 1, 1, 1]", "\"layers\": 12", "patch_size is missing"),
     ] {
         assert!(SMALL.contains(from), "{from}");
         let found = reason(&SMALL.replace(from, to));
@@ -131,10 +103,7 @@ fn mean_and_deviation_come_from_the_files_beside() {
     );
     let json = r#"{"image_mean": [0.5, 0.5, 0.5], "image_std": [0.25, 0.25, 0.25]}"#;
     std::fs::write(dir.path().join("preprocessor_config.json"), json).unwrap();
-    assert_eq!(
-        ClipConfig::read(dir.path()).unwrap().normalization.std,
-        [0.25; 3]
-    );
+    assert_eq!(ClipConfig::read(dir.path()).unwrap().normalization.std, [0.25; 3]);
     let json = json.replace("0.25, 0.25", "0.0, 0.25");
     std::fs::write(dir.path().join("preprocessor_config.json"), json).unwrap();
     assert!(ClipConfig::read(dir.path()).is_err());

@@ -85,12 +85,8 @@ impl File {
             Encoding::Little => "binary_little_endian",
             Encoding::Big => "binary_big_endian",
         };
-        let promised = self
-            .promised
-            .clone()
-            .unwrap_or_else(|| self.rows.len().to_string());
-        let mut text =
-            format!("ply\nformat {format} 1.0\ncomment made  by a test\nobj_info kept\n");
+        let promised = self.promised.clone().unwrap_or_else(|| self.rows.len().to_string());
+        let mut text = format!("ply\nformat {format} 1.0\ncomment made  by a test\nobj_info kept\n");
         text += &self.before.0;
         let _ = writeln!(text, "element vertex {promised}");
         for (name, kind) in &self.names {
@@ -137,11 +133,7 @@ impl File {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::read_from(
-        Path::new("test.ply"),
-        &mut BufReader::new(bytes),
-        bytes.len() as u64,
-    )
+    Scene::read_from(Path::new("test.ply"), &mut BufReader::new(bytes), bytes.len() as u64)
 }
 
 fn refused(bytes: &[u8]) -> String {

@@ -6,10 +6,7 @@ fn values_that_are_not_numbers_are_named() {
     for encoding in ENCODINGS {
         for name in ["x", "f_dc_1", "f_rest_7", "opacity", "scale_2", "rot_0"] {
             let reason = File::new(encoding, 1, 3).with(name, 2, f64::NAN).refused();
-            assert!(
-                reason.contains(&format!("{name} of row 2 is NaN")),
-                "{reason}"
-            );
+            assert!(reason.contains(&format!("{name} of row 2 is NaN")), "{reason}");
         }
         let legal = [
             ("opacity", f64::INFINITY),
@@ -30,10 +27,7 @@ fn values_that_are_not_numbers_are_named() {
             assert!(reason.contains(&format!("{name} of row 0 is")), "{reason}");
         }
         // A property that nobody uses may be anything.
-        File::new(encoding, 0, 1)
-            .add("nx", "float", f64::NAN)
-            .read()
-            .unwrap();
+        File::new(encoding, 0, 1).add("nx", "float", f64::NAN).read().unwrap();
     }
 }
 
@@ -42,17 +36,9 @@ fn wrong_properties_are_named() {
     let file = || File::new(Encoding::Little, 1, 1);
     let reason = file().without("f_rest_8").refused();
     assert!(reason.starts_with("8 f_rest properties"), "{reason}");
-    let reason = file()
-        .without("f_rest_4")
-        .add("f_rest_12", "float", 0.0)
-        .refused();
+    let reason = file().without("f_rest_4").add("f_rest_12", "float", 0.0).refused();
     assert!(reason.contains("no property f_rest_4"), "{reason}");
-    assert!(
-        file()
-            .without("scale_1")
-            .refused()
-            .contains("no property scale_1")
-    );
+    assert!(file().without("scale_1").refused().contains("no property scale_1"));
     assert!(
         file()
             .without("x")
@@ -66,9 +52,7 @@ fn wrong_properties_are_named() {
             .refused()
             .contains("two properties of the same name")
     );
-    let text = file()
-        .header()
-        .replace("float opacity", "list uchar float opacity");
+    let text = file().header().replace("float opacity", "list uchar float opacity");
     assert!(refused(text.as_bytes()).contains("property opacity of element vertex is a list"));
 }
 
@@ -87,10 +71,7 @@ fn headers_that_promise_too_much_cost_nothing() {
         );
         for count in ["2", "18446744073709551615", "4000000000"] {
             let reason = promise(count);
-            assert!(
-                reason.contains("truncated") && reason.contains(count),
-                "{reason}"
-            );
+            assert!(reason.contains("truncated") && reason.contains(count), "{reason}");
         }
         let mut bare = File::new(encoding, 0, 0);
         bare.names.clear();
@@ -125,12 +106,7 @@ fn truncated_bodies_say_how_much_is_there() {
 
 #[test]
 fn other_files_are_refused() {
-    for text in [
-        "",
-        "Dear reader,\nthis is prose.\n",
-        "\u{0}\u{1}\u{2}",
-        "ply",
-    ] {
+    for text in ["", "Dear reader,\nthis is prose.\n", "\u{0}\u{1}\u{2}", "ply"] {
         let reason = refused(text.as_bytes());
         assert!(
             reason.contains("not a PLY") || reason.contains("ends before"),
@@ -170,8 +146,5 @@ fn real_files_of_other_formats_are_refused_by_name() {
         return;
     };
     let error = Scene::read(&path).unwrap_err().to_string();
-    assert!(
-        error.contains("compressed") && error.contains("biker"),
-        "{error}"
-    );
+    assert!(error.contains("compressed") && error.contains("biker"), "{error}");
 }

@@ -13,28 +13,15 @@ fn all_encodings_and_degrees_round_trip() {
                 assert_eq!((g.len(), g.sh.degree), (3, degree));
                 let value = |name: &str| file.rows[1][file.column(name)] as f32;
                 assert_eq!(g.positions[1], ["x", "y", "z"].map(value));
-                assert_eq!(
-                    g.rotations[1],
-                    ["rot_0", "rot_1", "rot_2", "rot_3"].map(value)
-                );
-                assert_eq!(
-                    g.log_scales[1],
-                    ["scale_0", "scale_1", "scale_2"].map(value)
-                );
+                assert_eq!(g.rotations[1], ["rot_0", "rot_1", "rot_2", "rot_3"].map(value));
+                assert_eq!(g.log_scales[1], ["scale_0", "scale_1", "scale_2"].map(value));
                 assert_eq!(g.opacity_logits[1], value("opacity"));
                 let colour = &g.sh.coefficients[g.sh.per_gaussian()..2 * g.sh.per_gaussian()];
                 assert_eq!(colour[..3], ["f_dc_0", "f_dc_1", "f_dc_2"].map(value));
                 if degree > 0 {
                     let channel = rest_count(degree) / 3;
-                    assert_eq!(
-                        colour[4],
-                        value(&format!("f_rest_{channel}")),
-                        "green, first rest"
-                    );
-                    assert_eq!(
-                        *colour.last().unwrap(),
-                        value(&format!("f_rest_{}", 3 * channel - 1))
-                    );
+                    assert_eq!(colour[4], value(&format!("f_rest_{channel}")), "green, first rest");
+                    assert_eq!(*colour.last().unwrap(), value(&format!("f_rest_{}", 3 * channel - 1)));
                 }
                 assert_eq!(written(&scene, &g.sh), file.bytes());
             }
@@ -62,19 +49,14 @@ fn a_write_changes_colours_and_nothing_else() {
                 "element camera 2\nproperty uchar a\nproperty double b\n".into(),
                 vec![9; 18],
             );
-            file.after = (
-                "element face 1\nproperty list uchar int i\n".into(),
-                b"anything".into(),
-            );
+            file.after = ("element face 1\nproperty list uchar int i\n".into(), b"anything".into());
         }
         let scene = file.read().unwrap();
         let mut sh = scene.gaussians.sh.clone();
         let k = sh.per_gaussian();
         sh.coefficients[2 * k + 4] = 1e-9; // row 2, green, first rest: f_rest_3 of degree 1
         sh.coefficients[1] = -0.5; // row 0, green, DC
-        let expected = file
-            .with("f_rest_3", 2, f64::from(1e-9f32))
-            .with("f_dc_1", 0, -0.5);
+        let expected = file.with("f_rest_3", 2, f64::from(1e-9f32)).with("f_dc_1", 0, -0.5);
         let again = read(&written(&scene, &sh)).unwrap();
         assert_eq!(again.gaussians, expected.read().unwrap().gaussians);
         assert_eq!(again.gaussians.sh, sh);
@@ -87,10 +69,9 @@ fn a_write_changes_colours_and_nothing_else() {
 #[test]
 fn doubles_keep_the_digits_that_single_precision_lacks() {
     for encoding in ENCODINGS {
-        let mut file =
-            File::new(encoding, 0, 2)
-                .with("f_dc_0", 0, 0.1)
-                .with("f_dc_1", 1, 1.0 / 3.0);
+        let mut file = File::new(encoding, 0, 2)
+            .with("f_dc_0", 0, 0.1)
+            .with("f_dc_1", 1, 1.0 / 3.0);
         file.names.iter_mut().for_each(|(_, kind)| *kind = "double");
         let scene = file.read().unwrap();
         assert_eq!(scene.gaussians.sh.coefficients[0], 0.1);
@@ -130,10 +111,7 @@ fn real_scenes_come_back_byte_for_byte() {
 fn zero_and_one_gaussian_are_read() {
     for encoding in ENCODINGS {
         for rows in [0, 1] {
-            assert_eq!(
-                File::new(encoding, 3, rows).read().unwrap().gaussians.len(),
-                rows
-            );
+            assert_eq!(File::new(encoding, 3, rows).read().unwrap().gaussians.len(), rows);
         }
     }
 }

@@ -1,0 +1,59 @@
+# Sourced by the other scripts: installs what the build and the tests need and is missing, and checks the toolchain.
+# Debian and Ubuntu packages are installed by name; elsewhere it says what is missing.
+
+# Whether some Vulkan driver is installed: the loader finds drivers by their manifests in these folders.
+has_vulkan_driver() {
+    [ -n "${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}" ] && return 0
+    local folder manifest
+    for folder in /etc/vulkan/icd.d /usr/local/etc/vulkan/icd.d /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d; do
+        for manifest in "$folder"/*.json; do
+            [ -e "$manifest" ] && return 0
+        done
+    done
+    return 1
+}
+
+has_vulkan_loader() {
+    local ldconfig
+    ldconfig=$(PATH="$PATH:/sbin:/usr/sbin" command -v ldconfig) || return 1
+    # No pipe: grep -q would close it early, which counts as a failure under pipefail.
+    case "$("$ldconfig" -p)" in
+        *libvulkan.so.1*) return 0 ;;
+        *) return 1 ;;
+    esac
+}
+
+# Installs packages; fails where that is not possible.
+install_packages() {
+    local as_root=()
+    command -v apt-get >/dev/null || return 1
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null || return 1
+        as_root=(sudo)
+    fi
+    echo "setup: installing $*"
+    "${as_root[@]}" apt-get update -qq &&
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
+}
+
+setup() {
+    local missing=()
+    command -v cc >/dev/null || missing+=(build-essential pkg-config ca-certificates)
+    has_vulkan_driver || missing+=(mesa-vulkan-drivers)
+    has_vulkan_loader || missing+=(libvulkan1)
+    if [ "${#missing[@]}" -gt 0 ] && ! install_packages "${missing[@]}"; then
+        echo "setup: could not install what is missing (Debian's packages: ${missing[*]})" >&2
+        if ! command -v cc >/dev/null; then
+            echo "setup: nothing can be built without a C compiler" >&2
+            return 1
+        fi
+        echo "setup: without a Vulkan driver and loader only --device cpu works" >&2
+    fi
+    if ! command -v cargo >/dev/null && [ -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ]; then
+        export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+    fi
+    if ! command -v cargo >/dev/null; then
+        echo "setup: cargo was not found; install Rust 1.95 or later (https://rustup.rs) and run this again" >&2
+        return 1
+    fi
+}

@@ -1,0 +1,171 @@
+//! Trains the small CLIP that the project ships, from pictures and captions that it generates itself.
+//!
+//! 1. [`drawing`]: solid shapes with fractal textures, and random views of them.
+//! 2. [`head`]: the image tower's filters are random; its linear head is the one, in closed form, whose features a
+//!    small change of the picture moves most, against how much they change from view to view by themselves.
+//! 3. [`paint`]: a caption is a sequence of words; each word has a meaning, a small change of local colour; the picture
+//!    of a caption is a drawing that all its words have changed.
+//! 4. [`contrastive`]: the text tower is trained against the locked image tower with CLIP's symmetric loss (locked-image
+//!    tuning, Zhai et al. 2022), and retrieval is measured on drawings and captions that it never saw.
+mod contrastive;
+mod drawing;
+mod head;
+mod paint;
+
+pub use contrastive::Retrieval;
+pub use drawing::{Drawing, SIDE, draw, random_view};
+
+use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
+use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
+use crate::device::Compute;
+use crate::error::{Error, Result};
+use burn::tensor::Tensor;
+
+/// How to train.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainOptions {
+    /// Decides everything that is random.
+    pub seed: u64,
+    /// Drawings whose natural variation is measured; each is seen from two views.
+    pub drawings: usize,
+    /// Steps of contrastive training.
+    pub steps: usize,
+    /// Pairs a step.
+    pub batch: usize,
+}
+
+impl Default for TrainOptions {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            drawings: 1024,
+            steps: 600,
+            batch: 64,
+        }
+    }
+}
+
+/// What training is doing, for a progress display: the stage, done, of so many, and what is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TrainProgress {
+    /// Drawings whose features were measured.
+    Natural(usize, usize),
+    /// Drawings whose gradients were measured.
+    Steering(usize, usize),
+    /// Steps of contrastive training, and the loss.
+    Contrastive(usize, usize, f32),
+}
+
+/// A trained model and what was measured of it.
+#[derive(Debug)]
+pub struct TrainedClip {
+    /// Its sizes.
+    pub config: ClipConfig,
+    /// Its weights.
+    pub model: ClipModel,
+    /// Per kept direction, strongest first: how far a change of the picture of length 1 moves the feature, in
+    /// standard deviations of its natural variation.
+    pub steering: Vec<f64>,
+    /// On drawings and captions that training never saw.
+    pub retrieval: Retrieval,
+}
+
+/// Side of the pictures that the model takes.
+const IMAGE_SIZE: usize = 96;
+/// Filters a scale.
+const FILTERS: usize = 64;
+/// Width of the features.
+const EMBED_DIM: usize = 64;
+
+/// The sizes of the model that is shipped.
+pub fn config() -> ClipConfig {
+    let blocks = BlockConfig {
+        layers: 2,
+        heads: 2,
+        mlp_width: 512,
+        activation: Activation::QuickGelu,
+        norm_epsilon: 1e-5,
+    };
+    ClipConfig {
+        embed_dim: EMBED_DIM,
+        vision: VisionConfig {
+            image_size: IMAGE_SIZE,
+            width: FILTERS,
+            tower: VisionTower::Statistics {
+                scales: vec![1, 2, 4],
+                kernel: head::KERNEL,
+            },
+        },
+        text: TextConfig {
+            context_length: 77,
+            vocab_size: 49408,
+            width: 128,
+            blocks,
+            end: EndToken::Largest,
+        },
+        normalization: Normalization::default(),
+    }
+}
+
+/// Trains a model from nothing. On the CPU device the same options give the same weights.
+///
+/// # Errors
+/// Options outside their limits, a failing device, and a loss that stops being a number.
+pub fn train_clip(
+    options: &TrainOptions,
+    compute: &Compute,
+    mut progress: impl FnMut(TrainProgress),
+) -> Result<TrainedClip> {
+    check(options)?;
+    let config = config();
+    let model = ClipModel::init(&config, Parts::Both, &compute.device, options.seed);
+    let (filters, biases) = head::filters(FILTERS, options.seed);
+    let tower = tower(&model)?.with_filters(&filters, &biases);
+    let head = head::fit(&tower, &config, options, compute, &mut progress)?;
+    let tower = tower.with_head(head.matrix, head.bias);
+    let model = ClipModel {
+        visual: Some(ImageTower::Statistics(tower)),
+        ..model
+    };
+    let (model, retrieval) = contrastive::train(model, &config, options, compute, &mut progress)?;
+    Ok(TrainedClip {
+        config,
+        model,
+        steering: head.steering,
+        retrieval,
+    })
+}
+
+fn tower(model: &ClipModel) -> Result<StatisticsTower> {
+    match &model.visual {
+        Some(ImageTower::Statistics(tower)) => Ok(tower.clone()),
+        _ => Err(Error::BadModel {
+            name: "guardsplat-clip".into(),
+            reason: "has another image tower".into(),
+        }),
+    }
+}
+
+fn check(options: &TrainOptions) -> Result<()> {
+    for (field, value, least, most) in [
+        ("--drawings", options.drawings, 256, 1 << 20),
+        ("--steps", options.steps, 1, 1 << 20),
+        ("--batch", options.batch, 2, 1024),
+    ] {
+        if !(least..=most).contains(&value) {
+            return Err(Error::BadOption {
+                field,
+                reason: format!("{value} is outside {least} to {most}"),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The values of a tensor, on the host.
+fn host<const D: usize>(tensor: Tensor<D>, compute: &Compute) -> Result<Vec<f32>> {
+    tensor.try_into_vec_as::<f32>().map_err(|e| Error::Device {
+        device: compute.name.clone(),
+        reason: e.to_string(),
+    })
+}
