@@ -36,6 +36,10 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use std::path::{Path, PathBuf};
 
+/// Configuration and weights of the project's own model; `docs/clip.md` tells how they came about.
+const SHIPPED_CONFIG: &str = include_str!("../../models/guardsplat-clip/config.json");
+static SHIPPED_WEIGHTS: &[u8] = include_bytes!("../../models/guardsplat-clip/model.safetensors");
+
 /// A loaded CLIP with frozen weights.
 #[derive(Debug)]
 pub struct Clip {
@@ -64,16 +68,22 @@ impl Clip {
         })
     }
 
-    /// The project's own small CLIP, from `$GUARDSPLAT_CLIP` when that is set.
+    /// The project's own small CLIP, which is part of the program; `$GUARDSPLAT_CLIP` names a folder to use instead.
     ///
     /// # Errors
     /// As [`Clip::load`].
     pub fn shipped(device: &Device, parts: Parts) -> Result<Self> {
-        let dir = std::env::var_os("GUARDSPLAT_CLIP").map_or_else(
-            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models/guardsplat-clip"),
-            PathBuf::from,
-        );
-        Self::load(&dir, device, parts)
+        if let Some(dir) = std::env::var_os("GUARDSPLAT_CLIP") {
+            return Self::load(Path::new(&dir), device, parts);
+        }
+        let config = ClipConfig::parse("guardsplat-clip", SHIPPED_CONFIG)?;
+        let mut file = TensorFile::from_bytes("guardsplat-clip", SHIPPED_WEIGHTS)?;
+        let model = ClipModel::new(&config, parts, device).load(&mut file)?;
+        Ok(Self {
+            config,
+            hash: file.sha256()?,
+            model: model.freeze(),
+        })
     }
 
     /// A frozen model from its parts, for one that was just trained or that has no file.

@@ -94,3 +94,91 @@ impl Scale {
         mean / level
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::config::{ClipConfig, VisionTower};
+    use super::super::{ClipModel, ImageTower, Parts};
+    use super::*;
+    use burn::tensor::TensorData;
+
+    fn config() -> ClipConfig {
+        let mut config = crate::train::config();
+        config.vision.image_size = 24;
+        config.vision.width = 8;
+        config.embed_dim = 6;
+        config
+    }
+
+    fn tower() -> StatisticsTower {
+        match ClipModel::init(&config(), Parts::Image, &Device::flex(), 3).visual {
+            Some(ImageTower::Statistics(tower)) => tower,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn picture(value: impl Fn(usize) -> f32) -> Tensor<4> {
+        let values: Vec<f32> = (0..3 * 24 * 24).map(value).collect();
+        Tensor::from_data(TensorData::new(values, [1, 3, 24, 24]), &Device::flex())
+    }
+
+    fn values(tensor: Tensor<2>) -> Vec<f32> {
+        tensor.try_to_vec_as::<f32>().unwrap()
+    }
+
+    #[test]
+    fn flat_pictures_have_finite_features() {
+        for level in [-2.0, 0.0, 2.0] {
+            assert!(
+                values(tower().forward(&picture(|_| level)))
+                    .iter()
+                    .all(|v| v.is_finite())
+            );
+        }
+    }
+
+    #[test]
+    fn averages_do_not_depend_on_the_place() {
+        // The same blob in two places, away from the border and aligned to the coarsest scale.
+        let blob = |x0: usize, y0: usize| {
+            picture(move |i| {
+                let (x, y) = (i % 24, i / 24 % 24);
+                let inside = (x0..x0 + 4).contains(&x) && (y0..y0 + 4).contains(&y);
+                if inside {
+                    ((x - x0) as f32 - 1.5) * 0.4 + (y - y0) as f32 * 0.1
+                } else {
+                    0.0
+                }
+            })
+        };
+        let averages = |at| {
+            let VisionTower::Statistics { scales, .. } = config().vision.tower else {
+                panic!()
+            };
+            assert_eq!(scales, [1, 2, 4]);
+            values(tower().statistics(&at))
+        };
+        let (a, b, elsewhere) = (
+            averages(blob(8, 8)),
+            averages(blob(12, 8)),
+            averages(picture(|i| (i as f32).sin())),
+        );
+        // The coarsest scale has 6 x 6 pixels, which a kernel of 5 does not cover alike.
+        let gap = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(gap(&a[..16], &b[..16]) < 1e-4, "{}", gap(&a[..16], &b[..16]));
+        assert!(gap(&a[..16], &elsewhere[..16]) > 1e-2);
+    }
+
+    #[test]
+    fn configuration_survives_writing() {
+        let text = config().to_open_clip().unwrap();
+        assert_eq!(ClipConfig::parse("test", &text).unwrap(), config());
+        let broken = text.replace("\"kernel\": 5", "\"kernel\": 25");
+        assert!(
+            ClipConfig::parse("test", &broken)
+                .unwrap_err()
+                .to_string()
+                .contains("scale")
+        );
+    }
+}

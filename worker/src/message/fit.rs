@@ -2,11 +2,14 @@
 //!
 //! All pictures sit in one corner of CLIP's space and all texts in another, and features of a scene change from view
 //! to view more than a mark can move them. So: centre each tower by its own mean, drop the directions in which natural
-//! pictures vary most, bring both towers to the same spread, and keep what natural variation is left as the noise that
+//! pictures vary most, bring both towers to the same spread (texts alike in all directions), and keep what natural variation is left as the noise that
 //! the decoder must learn to stand.
 use super::eigen::{self, dot};
 use super::projection::{MAX_WIDTH, Projection};
 use crate::error::{Error, Result};
+
+/// Smallest variance of text features that is believed, against the largest.
+const SMALLEST_TEXT_VARIANCE: f64 = 1e-4;
 
 /// How to build a projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +65,8 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
         basis = product(&turn[..rank * rest], &basis, rest, width);
     }
     let (image, text) = (congruence(&basis, &image, width), congruence(&basis, &text, width));
-    let (image_scale, text_scale) = (unit_spread("image", &image, rank)?, unit_spread("text", &text, rank)?);
+    let image_scale = unit_spread("image", &image, rank)?;
+    let whitener = whitener(text, rank)?;
     let scaled: Vec<f64> = image.iter().map(|c| c * image_scale * image_scale).collect();
     Ok(Projection {
         width,
@@ -70,7 +74,7 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
         mean_image: mean_image.iter().map(|&v| v as f32).collect(),
         mean_text: mean_text.iter().map(|&v| v as f32).collect(),
         matrix_image: transposed(&basis, width, image_scale),
-        matrix_text: transposed(&basis, width, text_scale),
+        matrix_text: transposed(&product(&whitener, &basis, rank, width), width, 1.0),
         noise: cholesky(scaled, rank),
     })
 }
@@ -114,11 +118,34 @@ fn covariance(what: &'static str, rows: &[f32], width: usize) -> Result<(Vec<f64
     Ok((mean, sum))
 }
 
-fn decompose(matrix: Vec<f64>, n: usize) -> Result<Vec<f64>> {
-    let eigen = eigen::symmetric(matrix, n).ok_or_else(|| Error::BadOption {
+fn no_directions() -> Error {
+    Error::BadOption {
         field: "features",
         reason: "their covariance has no principal directions".into(),
-    })?;
+    }
+}
+
+/// The symmetric matrix that gives text features of this covariance the same variance in every direction, and unit
+/// spread. Messages of one key fill a few directions only; natural variation would hide what the others tell.
+fn whitener(text: Vec<f64>, n: usize) -> Result<Vec<f64>> {
+    unit_spread("text", &text, n)?;
+    let eigen = eigen::symmetric(text.clone(), n).ok_or_else(no_directions)?;
+    let floor = eigen.values[0] * SMALLEST_TEXT_VARIANCE;
+    let mut out = vec![0.0; n * n];
+    for (row, value) in eigen.vectors.chunks_exact(n).zip(&eigen.values) {
+        let factor = 1.0 / value.max(floor).sqrt();
+        for (i, out) in out.chunks_exact_mut(n).enumerate() {
+            out.iter_mut().zip(row).for_each(|(o, v)| *o += factor * row[i] * v);
+        }
+    }
+    // Directions under the floor are not brought up to the others: scale to unit spread all the same.
+    let spread = unit_spread("text", &congruence(&out, &text, n), n)?;
+    out.iter_mut().for_each(|v| *v *= spread);
+    Ok(out)
+}
+
+fn decompose(matrix: Vec<f64>, n: usize) -> Result<Vec<f64>> {
+    let eigen = eigen::symmetric(matrix, n).ok_or_else(no_directions)?;
     debug_assert!(eigen.values.len() == n);
     Ok(eigen.vectors)
 }
@@ -225,6 +252,28 @@ mod tests {
         }
         check_spread(&p.project_text(&texts), p.rank);
         check_spread(&p.project_image(&images), p.rank);
+    }
+
+    #[test]
+    fn texts_vary_alike_in_all_directions() {
+        let (images, texts) = features();
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: Some(9),
+            },
+        )
+        .unwrap();
+        let covariance = check_spread(&p.project_text(&texts), p.rank);
+        for (i, row) in covariance.chunks_exact(p.rank).enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((value - expected).abs() < 1e-2, "{i} {j} {value}");
+            }
+        }
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub(super) fn train(
     };
     let drawings: Vec<Drawing> = (0..DRAWINGS as u64)
         .into_par_iter()
-        .map(|i| draw(options.seed ^ 0x7472_6169_6e, i))
+        .map(|i| draw(options.seed ^ 0x0074_7261_696e, i))
         .collect();
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut optimizer = AdamWConfig::new()

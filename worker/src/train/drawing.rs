@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use std::f32::consts::PI;
 
 /// Side of a drawing in pixels.
-pub const SIDE: usize = 160;
+pub const SIDE: usize = 256;
 const AREA: usize = SIDE * SIDE;
 
 /// A drawing: four planes of `SIDE * SIDE`, red, green, blue in [0, 1] and the mask of the object.
@@ -115,7 +115,7 @@ fn texture(rng: &mut impl Rng) -> Vec<f32> {
     let power = rng.random_range(0.3..1.3_f32);
     let mut channels = vec![0.0; 3 * AREA];
     for channel in channels.chunks_exact_mut(AREA) {
-        for cell in [64, 32, 16, 8, 4, 2, 1] {
+        for cell in [128, 64, 32, 16, 8, 4, 2, 1] {
             octave(channel, cell, (cell as f32).powf(power), rng);
         }
     }

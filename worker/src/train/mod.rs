@@ -39,7 +39,7 @@ impl Default for TrainOptions {
         Self {
             seed: 1,
             drawings: 1024,
-            steps: 600,
+            steps: 300,
             batch: 64,
         }
     }
@@ -71,11 +71,11 @@ pub struct TrainedClip {
 }
 
 /// Side of the pictures that the model takes.
-const IMAGE_SIZE: usize = 96;
+const IMAGE_SIZE: usize = 160;
 /// Filters a scale.
 const FILTERS: usize = 64;
 /// Width of the features.
-const EMBED_DIM: usize = 64;
+const EMBED_DIM: usize = 96;
 
 /// The sizes of the model that is shipped.
 pub fn config() -> ClipConfig {
