@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Views that a scene is read from
     #[arg(long, default_value_t = DEFAULT_VIEWS as u32, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// Side of these views in pixels; twice CLIP's input unless given
+    /// Side of these views in pixels; CLIP's input unless given
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
     /// What is behind a scene, or shows through transparent pixels

@@ -53,7 +53,7 @@ pub struct EarlyStop {
 pub struct Verify {
     /// Held-out views.
     pub views: usize,
-    /// Their side in pixels; `None` takes twice CLIP's input.
+    /// Their side in pixels; `None` takes CLIP's input.
     pub size: Option<u32>,
     /// The message must be right from so many of them.
     pub message_views: usize,
@@ -150,25 +150,30 @@ impl Preset {
     pub fn settings(self) -> Settings {
         let standard = Settings {
             seed: 0,
-            steps: 1300,
-            views_per_step: 16,
-            fresh_per_step: 8,
-            pool_views: 128,
+            steps: 600,
+            views_per_step: 8,
+            fresh_per_step: 4,
+            pool_views: 150,
             pool_mebibytes: 1024,
-            size: 128,
-            black_backgrounds: 0.2,
+            size: 160,
+            black_backgrounds: 0.1,
             lambda: Lambdas {
                 reconstruction: 1.0,
                 l1: 0.8,
                 ssim: 0.2,
                 lpips: 0.0,
-                message: 0.03,
+                message: 0.1,
                 offset_dc: 10.0,
                 offset_rest: 10.0,
             },
-            adam: AdamOptions::default(),
+            adam: AdamOptions {
+                rate_dc: 0.02,
+                rate_rest: 0.001,
+                final_rate: 0.1,
+                ..AdamOptions::default()
+            },
             balance: Some(Balance {
-                target_psnr_db: 36.5,
+                target_psnr_db: 36.4,
                 ..Balance::default()
             }),
             augmentation: Augmentation::default(),
@@ -178,7 +183,7 @@ impl Preset {
                 min_steps: 200,
                 bit_accuracy: 0.985,
                 margin: 1.0,
-                psnr_db: 36.3,
+                psnr_db: 36.1,
                 patience: 2,
             }),
             verify: Verify {
@@ -195,10 +200,8 @@ impl Preset {
         match self {
             Self::Standard => standard,
             Self::Draft => Settings {
-                steps: 400,
-                views_per_step: 8,
-                fresh_per_step: 4,
-                pool_views: 64,
+                steps: 200,
+                pool_views: 100,
                 balance: Some(Balance {
                     target_psnr_db: 34.5,
                     ..Balance::default()
@@ -207,7 +210,7 @@ impl Preset {
                     min_steps: 100,
                     bit_accuracy: 0.95,
                     margin: 0.5,
-                    psnr_db: 34.3,
+                    psnr_db: 34.1,
                     ..stop
                 }),
                 target: Target {
@@ -218,13 +221,17 @@ impl Preset {
                 ..standard
             },
             Self::Paper => Settings {
+                steps: 1300,
+                views_per_step: 16,
                 fresh_per_step: 16,
                 size: 224,
                 black_backgrounds: 0.0,
                 lambda: Lambdas {
                     lpips: 1.0,
+                    message: 0.03,
                     ..standard.lambda
                 },
+                adam: AdamOptions::default(),
                 balance: None,
                 augmentation: Augmentation {
                     brightness: 0.0,
@@ -359,7 +366,7 @@ mod tests {
         let reason = |json| standard.overridden(json).unwrap_err().to_string();
         assert!(reason(r#"{"stepz": 7}"#).contains("stepz"));
         assert!(reason("[]").contains("settings"));
-        assert!(reason(r#"{"fresh_per_step": 99}"#).contains("99 is outside 0 to 16"));
+        assert!(reason(r#"{"fresh_per_step": 99}"#).contains("99 is outside 0 to 8"));
         assert!(reason(r#"{"size": 4}"#).contains("outside 16"));
     }
 }

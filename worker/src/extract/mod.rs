@@ -15,10 +15,10 @@ use crate::view::{Split, ViewSampler};
 /// Views that a scene is read from where nothing else is asked for.
 pub const DEFAULT_VIEWS: usize = 20;
 
-/// Side of views in pixels where nothing else is asked for: twice what CLIP takes in, between 128 and 512. Sharper
-/// pictures change what CLIP sees only within its own resampling.
+/// Side of views in pixels where nothing else is asked for: what CLIP takes in, between 128 and 512. The presets train
+/// at the shipped CLIP's size, and a mark is read best at the size it was trained at.
 pub fn default_size(engine: &Engine) -> u32 {
-    (2 * engine.clip.config.vision.image_size).clamp(128, 512) as u32
+    engine.clip.config.vision.image_size.clamp(128, 512) as u32
 }
 
 /// Reads pictures, whatever their sizes.
