@@ -210,7 +210,7 @@ impl Preset {
                     min_steps: 100,
                     bit_accuracy: 0.95,
                     margin: 0.5,
-                    psnr_db: 34.1,
+                    psnr_db: 34.3,
                     ..stop
                 }),
                 target: Target {
