@@ -1,1 +1,10 @@
-//! The GuardSplat API: protocol buffers and generated code. Empty so far: the engine in `worker` comes first.
+//! The GuardSplat API, compiled from `proto/guardsplat/v1`.
+
+/// Messages, clients and servers of `guardsplat.v1`.
+#[allow(missing_docs, clippy::all)] // generated; the .proto files are documented
+pub mod v1 {
+    tonic::include_proto!("guardsplat.v1");
+}
+
+/// All files as a `google.protobuf.FileDescriptorSet`, for server reflection.
+pub const FILE_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/guardsplat.bin"));
