@@ -1,0 +1,143 @@
+//! Short words for what the tests do all the time.
+use std::time::Duration;
+
+use uuid::Uuid;
+
+use super::super::{
+    ArtifactId, ArtifactState, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, NewArtifact, NewJob, Origin,
+};
+
+/// How long the leases of the tests are.
+pub const LEASE: Duration = Duration::from_secs(30);
+
+/// So many seconds after the tests' beginning of time.
+pub fn at(seconds: i64) -> i64 {
+    1_700_000_000_000_000 + seconds * 1_000_000
+}
+
+pub fn new_job() -> NewJob {
+    NewJob {
+        id: Uuid::now_v7(),
+        display_name: "a scene".into(),
+        kind: JobKind::Embed,
+        spec: vec![1, 2, 3],
+        inputs: Vec::new(),
+        key: None,
+        request_id: None,
+        fingerprint: [7; 32],
+        max_attempts: 3,
+    }
+}
+
+pub async fn queue(ledger: &dyn Ledger, now: i64) -> JobId {
+    ledger.create_job(new_job(), now).await.expect("a job is queued").id
+}
+
+pub async fn job(ledger: &dyn Ledger, id: JobId) -> JobRow {
+    ledger
+        .get_job(id)
+        .await
+        .expect("the ledger can be read")
+        .expect("the job is there")
+}
+
+pub async fn claim(ledger: &dyn Ledger, now: i64) -> Option<Lease> {
+    ledger
+        .claim("worker-1", LEASE, now)
+        .await
+        .expect("the ledger can be claimed from")
+}
+
+/// Claims the one job that is expected to be next.
+pub async fn claim_of(ledger: &dyn Ledger, id: JobId, now: i64) -> Lease {
+    let lease = claim(ledger, now).await.expect("a job is there to be claimed");
+    assert_eq!(lease.job.id, id, "another job came first");
+    lease
+}
+
+pub fn failure(message: &str) -> Option<Failure> {
+    Some(Failure {
+        reason: 4,
+        message: message.into(),
+    })
+}
+
+pub fn new_artifact(origin: Origin, secret: bool) -> NewArtifact {
+    let id = Uuid::now_v7();
+    let path = format!("artifacts/{id}");
+    NewArtifact {
+        id,
+        display_name: "scene.ply".into(),
+        size: 10,
+        sha256: "ab".repeat(32),
+        origin,
+        secret,
+        path,
+    }
+}
+
+pub async fn upload(ledger: &dyn Ledger, now: i64) -> ArtifactId {
+    let new = new_artifact(Origin::Upload, false);
+    let id = ledger
+        .create_artifact(new, now)
+        .await
+        .expect("an upload is announced")
+        .id;
+    ledger
+        .artifact_ready(id, None, now)
+        .await
+        .expect("an upload is complete");
+    id
+}
+
+/// An output that is announced, but whose bytes aren't all there.
+pub async fn pending_output(ledger: &dyn Ledger, lease: &Lease, secret: bool, now: i64) -> ArtifactId {
+    let origin = Origin::Output {
+        job: lease.job.id,
+        token: lease.token.clone(),
+    };
+    ledger
+        .create_artifact(new_artifact(origin, secret), now)
+        .await
+        .expect("an output is announced")
+        .id
+}
+
+pub async fn output(ledger: &dyn Ledger, lease: &Lease, secret: bool, now: i64) -> ArtifactId {
+    let id = pending_output(ledger, lease, secret, now).await;
+    let stored = ledger
+        .artifact_ready(id, Some(&lease.token), now)
+        .await
+        .expect("an output is complete");
+    assert_eq!(stored.state, ArtifactState::Stored);
+    id
+}
+
+pub async fn complete(ledger: &dyn Ledger, lease: &Lease, outputs: &[ArtifactId], now: i64) -> JobRow {
+    let done = ledger.complete(lease.job.id, &lease.token, vec![9], outputs.to_vec(), None, now);
+    done.await.expect("a leased job can be completed")
+}
+
+/// Whether an artifact is seen from outside.
+pub async fn visible(ledger: &dyn Ledger, id: ArtifactId) -> bool {
+    ledger.get_artifact(id).await.expect("the ledger can be read").is_some()
+}
+
+pub fn is_lost<T>(result: &Result<T, LedgerError>) -> bool {
+    matches!(result, Err(LedgerError::LeaseLost(_)))
+}
+
+/// That the result is an error of this form.
+macro_rules! refused {
+    ($result:expr, $pattern:pat $(if $guard:expr)?) => {
+        match $result {
+            Err($pattern) $(if $guard)? => {}
+            Err(other) => panic!("refused for another reason: {other:?}"),
+            Ok(_) => panic!("not refused"),
+        }
+    };
+}
+pub(crate) use refused;
+
+/// No job at all.
+pub const NONE: [JobId; 0] = [];

@@ -1,0 +1,82 @@
+//! What every implementation of the ledger must do, as tests that run against a real one.
+//!
+//! `conformance_suite!(factory)` makes a test of each; a function here that the macro doesn't name is dead code, which
+//! the compiler reports.
+mod artifacts;
+mod attempts;
+mod cancelling;
+mod fencing;
+pub(crate) mod fixture;
+pub mod model;
+mod outputs;
+mod queue;
+mod submission;
+
+use std::sync::Arc;
+
+use super::Ledger;
+
+pub(crate) use artifacts::*;
+pub(crate) use attempts::*;
+pub(crate) use cancelling::*;
+pub(crate) use fencing::*;
+pub(crate) use outputs::*;
+pub(crate) use queue::*;
+pub(crate) use submission::*;
+
+/// A place for one ledger, empty at first.
+#[tonic::async_trait]
+pub trait Factory: Send + Sync {
+    /// Opens it; again after the one opened before is gone.
+    async fn open(&self) -> Arc<dyn Ledger>;
+}
+
+/// Makes a test of every function of the suite; each gets a factory of its own from `$factory`.
+macro_rules! conformance_suite {
+    ($factory:expr) => {
+        $crate::ledger::conformance::conformance_suite!(@tests $factory;
+            a_job_is_kept_as_it_was_given
+            the_same_request_is_the_same_job
+            one_request_sent_many_times_at_once_is_one_job
+            what_a_job_needs_must_be_there
+            acknowledged_work_survives
+            pages_have_no_gaps_or_repeats_while_jobs_are_added
+            states_select_jobs
+            first_in_first_out
+            positions_count_the_jobs_ahead
+            many_claims_never_share_a_job
+            the_fourth_claim_gets_nothing
+            a_job_without_attempts_is_never_given_out
+            a_failed_attempt_waits_before_the_next
+            a_final_failure_is_not_repeated
+            a_released_job_is_not_charged_and_keeps_its_place
+            reports_extend_the_lease_and_carry_progress
+            a_lost_worker_is_noticed
+            tokens_differ_and_are_the_only_key
+            a_reaped_zombie_can_write_nothing
+            a_zombie_can_not_disturb_its_successor
+            a_finished_job_takes_nothing_more
+            unknown_things_are_not_found
+            cancelling_a_queued_job_ends_it
+            cancelling_a_running_job_asks_for_its_end
+            a_cancelled_job_is_not_tried_again
+            a_job_may_finish_although_it_was_cancelled
+            only_a_cancelled_job_ends_as_cancelled
+            uploads_are_seen_when_they_are_complete
+            what_a_job_needs_is_not_deleted
+            abandoned_uploads_are_collected
+            outputs_of_attempts_that_are_over_are_collected
+            outputs_are_published_by_completion_only
+            completion_publishes_all_or_nothing
+            keys_are_published_and_their_files_never
+            keys_come_in_pages
+        );
+    };
+    (@tests $factory:expr; $($test:ident)*) => {$(
+        #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+        async fn $test() {
+            $crate::ledger::conformance::$test(&$factory).await;
+        }
+    )*};
+}
+pub(crate) use conformance_suite;

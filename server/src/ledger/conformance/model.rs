@@ -1,0 +1,321 @@
+//! Random work against a ledger and a model of it that is simple enough to be seen right.
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use uuid::Uuid;
+
+use super::super::{JobId, JobState, Ledger, NewJob, Result, retry::backoff};
+use super::fixture::*;
+
+/// One thing that somebody does. Numbers choose among the jobs, requests and leases that there are.
+#[derive(Clone, Debug)]
+pub enum Step {
+    /// Queues a job, perhaps under a request id of a few, with one of two bodies.
+    Create(Option<u8>, bool),
+    /// Takes the next job.
+    Claim,
+    /// Reports under any lease ever given out, with progress or without.
+    Report(usize, Option<u8>),
+    /// Completes under any lease.
+    Complete(usize),
+    /// Fails under any lease; retryable, cancelled.
+    Fail(usize, bool, bool),
+    /// Hands back under any lease.
+    Release(usize),
+    /// Cancels any job.
+    Cancel(usize),
+    /// Lets seconds pass.
+    Wait(u8),
+    /// Ends leases that expired.
+    Reap,
+}
+
+/// Any sequence of steps.
+pub fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let step = prop_oneof![
+        4 => (proptest::option::of(0..4_u8), any::<bool>()).prop_map(|(request, body)| Step::Create(request, body)),
+        6 => Just(Step::Claim),
+        2 => (any::<usize>(), proptest::option::of(0..3_u8)).prop_map(|(lease, news)| Step::Report(lease, news)),
+        1 => any::<usize>().prop_map(Step::Complete),
+        3 => (any::<usize>(), prop::bool::weighted(0.8), prop::bool::weighted(0.2))
+            .prop_map(|(lease, retryable, cancelled)| Step::Fail(lease, retryable, cancelled)),
+        1 => any::<usize>().prop_map(Step::Release),
+        2 => any::<usize>().prop_map(Step::Cancel),
+        4 => (0..40_u8).prop_map(Step::Wait),
+        3 => Just(Step::Reap),
+    ];
+    proptest::collection::vec(step, 1..80)
+}
+
+/// A job as the model sees it.
+#[derive(Clone, Debug, PartialEq)]
+struct Job {
+    id: JobId,
+    request: Option<(u8, bool)>,
+    state: JobState,
+    cancel: bool,
+    attempt: i32,
+    progress: Option<u8>,
+    run_after: Option<i64>,
+    create_time: i64,
+    revision: i64,
+    /// Which lease has it, and until when.
+    lease: Option<(usize, i64)>,
+}
+
+impl Job {
+    fn place(&self) -> (i64, JobId) {
+        (self.run_after.unwrap_or(self.create_time), self.id)
+    }
+
+    fn leave(&mut self, state: JobState, run_after: Option<i64>) {
+        *self = Job {
+            state,
+            run_after,
+            cancel: false,
+            lease: None,
+            revision: self.revision + 1,
+            ..self.clone()
+        };
+    }
+
+    fn attempt_failed(&mut self, now: i64) {
+        match (self.cancel, self.attempt < 3) {
+            (true, _) => self.leave(JobState::Cancelled, None),
+            (false, true) => self.leave(JobState::Queued, Some(now + backoff(self.attempt))),
+            (false, false) => self.leave(JobState::Failed, None),
+        }
+    }
+}
+
+/// The model, beside the ledger that it is compared with.
+struct Pair {
+    ledger: Arc<dyn Ledger>,
+    jobs: Vec<Job>,
+    /// Every lease ever given out: the job's place in `jobs`, and the token.
+    leases: Vec<(usize, String)>,
+    now: i64,
+}
+
+/// Does the steps on both, and compares after each.
+pub async fn agrees(ledger: Arc<dyn Ledger>, steps: Vec<Step>) {
+    let mut pair = Pair {
+        ledger,
+        jobs: Vec::new(),
+        leases: Vec::new(),
+        now: at(0),
+    };
+    for step in steps {
+        pair.step(&step).await;
+        pair.compare(&step).await;
+    }
+}
+
+impl Pair {
+    async fn step(&mut self, step: &Step) {
+        let now = self.now;
+        match *step {
+            Step::Create(request, body) => self.create(request, body).await,
+            Step::Claim => self.claim().await,
+            Step::Wait(seconds) => self.now += i64::from(seconds) * 1_000_000,
+            Step::Reap => self.reap().await,
+            Step::Cancel(choice) => self.cancel(choice).await,
+            Step::Report(choice, news) => {
+                let Some((lease, id, token)) = self.lease(choice) else {
+                    return;
+                };
+                let done = self.ledger.report(id, &token, news.map(|n| vec![n]), LEASE, now).await;
+                let cancel = done.as_ref().ok().copied();
+                self.fenced(lease, &done, |job| {
+                    assert_eq!(cancel, Some(job.cancel));
+                    job.lease = Some((lease, now + LEASE.as_micros() as i64));
+                    if news.is_some() && news != job.progress {
+                        job.progress = news;
+                        job.revision += 1;
+                    }
+                });
+            }
+            Step::Complete(choice) => {
+                let Some((lease, id, token)) = self.lease(choice) else {
+                    return;
+                };
+                let done = self.ledger.complete(id, &token, vec![9], vec![], None, now).await;
+                self.fenced(lease, &done, |job| job.leave(JobState::Succeeded, None));
+            }
+            Step::Fail(choice, retryable, cancelled) => {
+                let Some((lease, id, token)) = self.lease(choice) else {
+                    return;
+                };
+                let done = self
+                    .ledger
+                    .fail(id, &token, failure("x"), retryable, cancelled, now)
+                    .await;
+                let refused = matches!(done, Err(super::super::LedgerError::CancelNotRequested(_)));
+                self.fenced(lease, &done, |job| match (cancelled, retryable) {
+                    (true, _) if job.cancel => job.leave(JobState::Cancelled, None),
+                    (true, _) => assert!(refused),
+                    (false, true) => job.attempt_failed(now),
+                    (false, false) => job.leave(JobState::Failed, None),
+                });
+            }
+            Step::Release(choice) => {
+                let Some((lease, id, token)) = self.lease(choice) else {
+                    return;
+                };
+                let done = self.ledger.release(id, &token, now).await;
+                self.fenced(lease, &done, |job| {
+                    let cancelled = job.cancel;
+                    job.leave(
+                        if cancelled {
+                            JobState::Cancelled
+                        } else {
+                            JobState::Queued
+                        },
+                        None,
+                    );
+                    job.attempt -= i32::from(!cancelled);
+                });
+            }
+        }
+    }
+
+    fn lease(&self, choice: usize) -> Option<(usize, JobId, String)> {
+        let lease = choice.checked_rem(self.leases.len())?;
+        let (job, token) = &self.leases[lease];
+        Some((lease, self.jobs[*job].id, token.clone()))
+    }
+
+    /// Applies `change` if the lease is current, and sees that otherwise the ledger refused it as lost.
+    fn fenced<T>(&mut self, lease: usize, done: &Result<T>, change: impl FnOnce(&mut Job)) {
+        let job = &mut self.jobs[self.leases[lease].0];
+        let current = job.lease.is_some_and(|(holder, _)| holder == lease);
+        assert_eq!(is_lost(done), !current);
+        if current {
+            change(job);
+        }
+    }
+
+    async fn create(&mut self, request: Option<u8>, body: bool) {
+        let request_id = request.map(|r| Uuid::from_u128(u128::from(r) + 1));
+        let new = NewJob {
+            request_id,
+            fingerprint: [u8::from(body); 32],
+            ..new_job()
+        };
+        let id = new.id;
+        let made = self.ledger.create_job(new, self.now).await;
+        let known = self
+            .jobs
+            .iter()
+            .find(|job| job.request.is_some_and(|(r, _)| Some(r) == request));
+        match known {
+            Some(job) if job.request == request.map(|r| (r, body)) => assert_eq!(made.unwrap().id, job.id),
+            Some(_) => assert!(made.is_err()),
+            None => {
+                assert_eq!(made.unwrap().id, id);
+                self.jobs.push(Job {
+                    id,
+                    request: request.map(|r| (r, body)),
+                    state: JobState::Queued,
+                    cancel: false,
+                    attempt: 0,
+                    progress: None,
+                    run_after: None,
+                    create_time: self.now,
+                    revision: 1,
+                    lease: None,
+                });
+            }
+        }
+    }
+
+    async fn claim(&mut self) {
+        let (now, holder) = (self.now, self.leases.len());
+        let given = claim(&*self.ledger, now).await;
+        let ready =
+            |job: &&(usize, &mut Job)| job.1.state == JobState::Queued && job.1.run_after.is_none_or(|t| t <= now);
+        let next = self
+            .jobs
+            .iter_mut()
+            .enumerate()
+            .filter(|job| ready(&job))
+            .min_by_key(|(_, job)| job.place());
+        assert_eq!(
+            given.as_ref().map(|lease| lease.job.id),
+            next.as_ref().map(|(_, job)| job.id)
+        );
+        if let (Some((place, job)), Some(lease)) = (next, given) {
+            job.leave(JobState::Running, None);
+            (job.attempt, job.progress) = (job.attempt + 1, None);
+            job.lease = Some((holder, now + LEASE.as_micros() as i64));
+            self.leases.push((place, lease.token));
+        }
+    }
+
+    async fn reap(&mut self) {
+        let mut reaped = self.ledger.reap(self.now).await.unwrap();
+        let mut expected = Vec::new();
+        for job in &mut self.jobs {
+            if job.lease.is_some_and(|(_, end)| end <= self.now) {
+                expected.push(job.id);
+                job.attempt_failed(self.now);
+            }
+        }
+        reaped.sort();
+        expected.sort();
+        assert_eq!(reaped, expected);
+    }
+
+    async fn cancel(&mut self, choice: usize) {
+        let Some(place) = choice.checked_rem(self.jobs.len()) else {
+            return;
+        };
+        let job = &mut self.jobs[place];
+        let done = self.ledger.cancel_job(job.id, self.now).await;
+        assert_eq!(done.is_err(), job.state.is_over());
+        match job.state {
+            JobState::Queued => job.leave(JobState::Cancelled, None),
+            JobState::Running if !job.cancel => (job.cancel, job.revision) = (true, job.revision + 1),
+            _ => {}
+        }
+    }
+
+    /// Everything that can be seen, in the model and in the ledger.
+    async fn compare(&self, step: &Step) {
+        let mut rows = self.ledger.list_jobs(&[], None, 1000).await.unwrap();
+        let mut jobs = self.jobs.clone();
+        rows.sort_by_key(|row| row.id);
+        jobs.sort_by_key(|job| job.id);
+        assert_eq!(rows.len(), jobs.len(), "after {step:?}");
+        for (row, job) in rows.iter().zip(&jobs) {
+            let ahead = jobs
+                .iter()
+                .filter(|other| other.state == JobState::Queued && other.place() < job.place())
+                .count();
+            let position = (job.state == JobState::Queued).then_some(ahead as i64);
+            assert_eq!(
+                (
+                    row.id,
+                    row.state,
+                    row.cancel_requested,
+                    row.attempt,
+                    row.progress.clone(),
+                    row.run_after,
+                    row.revision
+                ),
+                (
+                    job.id,
+                    job.state,
+                    job.cancel,
+                    job.attempt,
+                    job.progress.map(|p| vec![p]),
+                    job.run_after,
+                    job.revision
+                ),
+                "after {step:?}"
+            );
+            assert_eq!(row.queue_position, position, "after {step:?}");
+            assert_eq!(row.end_time.is_some(), job.state.is_over(), "after {step:?}");
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What can go wrong in the ledger.
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::types::{ArtifactId, JobId, JobState};
+
+/// Result of a ledger operation.
+pub type Result<T> = std::result::Result<T, LedgerError>;
+
+/// Why the ledger refused or could not do something.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum LedgerError {
+    /// There is no such thing, or it isn't visible.
+    #[error("there is no {kind} {id}")]
+    NotFound {
+        /// `job`, `artifact` or `key`.
+        kind: &'static str,
+        /// Which.
+        id: Uuid,
+    },
+    /// The request id was used for something else.
+    #[error("request id {0} was used for another job")]
+    RequestIdReused(Uuid),
+    /// The job is over, so it can't be cancelled.
+    #[error("job {job} is already over")]
+    Finished {
+        /// Which.
+        job: JobId,
+        /// How it ended.
+        state: JobState,
+    },
+    /// The token is not the job's current lease.
+    #[error("the lease of job {0} is lost: another attempt has it, or it is over")]
+    LeaseLost(JobId),
+    /// A queued or running job needs the artifact.
+    #[error("artifact {artifact} is needed by job {job}")]
+    InUse {
+        /// What was to be deleted.
+        artifact: ArtifactId,
+        /// A job that needs it.
+        job: JobId,
+    },
+    /// The artifact can't be published by this attempt.
+    #[error("artifact {0} is no finished output of this attempt")]
+    NotAnOutput(ArtifactId),
+    /// A worker gave a job up as cancelled that nobody had cancelled.
+    #[error("nobody asked for the end of job {0}")]
+    CancelNotRequested(JobId),
+    /// The database failed.
+    #[error("the ledger's database failed")]
+    Database(#[source] Arc<sqlx::Error>),
+    /// The database could not be brought to this version's layout.
+    #[error("the ledger's database could not be set up")]
+    Migrate(#[source] Arc<sqlx::migrate::MigrateError>),
+    /// A row holds something that this version doesn't know.
+    #[error("the ledger holds an unknown {what}: {value}")]
+    Corrupt {
+        /// What kind of value.
+        what: &'static str,
+        /// The value.
+        value: i64,
+    },
+    /// The ledger has been closed.
+    #[error("the ledger is closed")]
+    Closed,
+}
+
+impl LedgerError {
+    pub(crate) fn no_job(id: JobId) -> Self {
+        Self::NotFound { kind: "job", id }
+    }
+
+    pub(crate) fn no_artifact(id: ArtifactId) -> Self {
+        Self::NotFound { kind: "artifact", id }
+    }
+}
+
+impl From<sqlx::Error> for LedgerError {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Database(Arc::new(error))
+    }
+}
+
+impl From<sqlx::migrate::MigrateError> for LedgerError {
+    fn from(error: sqlx::migrate::MigrateError) -> Self {
+        Self::Migrate(Arc::new(error))
+    }
+}

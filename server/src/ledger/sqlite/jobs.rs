@@ -1,0 +1,201 @@
+//! Jobs as their owners see them: made, looked at, listed, cancelled.
+use std::collections::HashMap;
+
+use futures::TryStreamExt;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+use uuid::Uuid;
+
+use super::super::types::{ArtifactId, JobId, JobRow, JobState, NewJob};
+use super::super::{LedgerError, Result};
+use super::rows;
+use super::transition::{Next, leave};
+
+/// A job and the queued jobs before it.
+pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
+    SELECT count(*) FROM jobs q INDEXED BY jobs_queue WHERE q.state = 1 AND (q.queue_time, q.id) < (j.queue_time, j.id)\
+    ) END AS queue_position FROM jobs j WHERE j.id = ?1";
+
+/// A page of all jobs.
+pub(super) const PAGE: &str =
+    "SELECT * FROM jobs WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3";
+
+/// A page of the jobs in one state.
+pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs WHERE state = ?4 AND (create_time, id) < (?1, ?2) \
+    ORDER BY create_time DESC, id DESC LIMIT ?3";
+
+/// The whole queue in its order.
+pub(super) const QUEUE: &str = "SELECT id FROM jobs INDEXED BY jobs_queue WHERE state = 1 ORDER BY queue_time, id";
+
+pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> Result<JobRow> {
+    if let Some(request) = new.request_id
+        && let Some(row) = by_request(db, request).await?
+    {
+        let fingerprint: Vec<u8> = row.try_get("fingerprint")?;
+        return if fingerprint == new.fingerprint {
+            rows::job(&row)
+        } else {
+            Err(LedgerError::RequestIdReused(request))
+        };
+    }
+    for input in &new.inputs {
+        let visible = sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0")
+            .bind(input.as_bytes().as_slice());
+        visible
+            .fetch_optional(&mut *db)
+            .await?
+            .ok_or_else(|| LedgerError::no_artifact(*input))?;
+    }
+    if let Some(key) = new.key {
+        let there = sqlx::query("SELECT 1 FROM keys WHERE id = ?1").bind(key.as_bytes().as_slice());
+        there
+            .fetch_optional(&mut *db)
+            .await?
+            .ok_or(LedgerError::NotFound { kind: "key", id: key })?;
+    }
+    let row = sqlx::query(
+        "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
+         create_time, update_time, queue_time) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9) RETURNING *",
+    )
+    .bind(new.id.as_bytes().as_slice())
+    .bind(&new.display_name)
+    .bind(new.kind as i64)
+    .bind(&new.spec)
+    .bind(new.key.as_ref().map(|id| id.as_bytes().as_slice()))
+    .bind(new.request_id.as_ref().map(|id| id.as_bytes().as_slice()))
+    .bind(new.fingerprint.as_slice())
+    .bind(new.max_attempts)
+    .bind(now)
+    .fetch_one(&mut *db)
+    .await?;
+    for input in &new.inputs {
+        // The same picture may be named twice.
+        sqlx::query("INSERT OR IGNORE INTO job_inputs (artifact_id, job_id) VALUES (?1, ?2)")
+            .bind(input.as_bytes().as_slice())
+            .bind(new.id.as_bytes().as_slice())
+            .execute(&mut *db)
+            .await?;
+    }
+    rows::job(&row)
+}
+
+pub(super) async fn find_request(db: &mut SqliteConnection, request: Uuid) -> Result<Option<JobRow>> {
+    by_request(db, request).await?.as_ref().map(rows::job).transpose()
+}
+
+async fn by_request(db: &mut SqliteConnection, request: Uuid) -> Result<Option<SqliteRow>> {
+    let query = sqlx::query("SELECT * FROM jobs WHERE request_id = ?1").bind(request.as_bytes().as_slice());
+    Ok(query.fetch_optional(db).await?)
+}
+
+pub(super) async fn get(db: &mut SqliteConnection, id: JobId) -> Result<Option<JobRow>> {
+    let row = sqlx::query(GET)
+        .bind(id.as_bytes().as_slice())
+        .fetch_optional(db)
+        .await?;
+    row.map(|row| {
+        Ok(JobRow {
+            queue_position: row.try_get("queue_position")?,
+            ..rows::job(&row)?
+        })
+    })
+    .transpose()
+}
+
+/// Must run in a transaction, so that pages of several states fit together.
+pub(super) async fn list(
+    db: &mut SqliteConnection,
+    states: &[JobState],
+    before: Option<(i64, JobId)>,
+    limit: u32,
+) -> Result<Vec<JobRow>> {
+    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
+    let mut jobs = Vec::new();
+    if states.is_empty() {
+        let all = sqlx::query(PAGE);
+        for row in all
+            .bind(time)
+            .bind(id.as_bytes().as_slice())
+            .bind(limit)
+            .fetch_all(&mut *db)
+            .await?
+        {
+            jobs.push(rows::job(&row)?);
+        }
+    }
+    // State by state, each from its index: a few running jobs are found quickly among many finished ones.
+    for (i, state) in states.iter().enumerate() {
+        if states[..i].contains(state) {
+            continue;
+        }
+        let one = sqlx::query(PAGE_OF_STATE);
+        let one = one
+            .bind(time)
+            .bind(id.as_bytes().as_slice())
+            .bind(limit)
+            .bind(*state as i64);
+        for row in one.fetch_all(&mut *db).await? {
+            jobs.push(rows::job(&row)?);
+        }
+    }
+    jobs.sort_by_key(|job| std::cmp::Reverse((job.create_time, job.id)));
+    jobs.truncate(usize::try_from(limit).unwrap_or(usize::MAX));
+    if jobs.iter().any(|job| job.state == JobState::Queued) {
+        let positions = positions(db).await?;
+        for job in &mut jobs {
+            job.queue_position = positions.get(&job.id).copied();
+        }
+    }
+    Ok(jobs)
+}
+
+/// The whole queue, walked once: counting for each job of a page would walk it for each.
+async fn positions(db: &mut SqliteConnection) -> Result<HashMap<JobId, i64>> {
+    let mut queue = sqlx::query(QUEUE).fetch(db);
+    let mut positions = HashMap::new();
+    while let Some(row) = queue.try_next().await? {
+        let ahead = positions.len() as i64;
+        positions.insert(rows::id(&row, "id")?, ahead);
+    }
+    Ok(positions)
+}
+
+pub(super) async fn cancel(db: &mut SqliteConnection, id: JobId, now: i64) -> Result<JobRow> {
+    let row = by_id(db, id).await?.ok_or_else(|| LedgerError::no_job(id))?;
+    let job = rows::job(&row)?;
+    match job.state {
+        JobState::Queued => leave(db, id, Next::Cancelled, now).await,
+        JobState::Running if job.cancel_requested => Ok(job),
+        JobState::Running => {
+            let asked = sqlx::query(
+                "UPDATE jobs SET cancel_requested = 1, update_time = ?2, revision = revision + 1 WHERE id = ?1 RETURNING *",
+            );
+            rows::job(&asked.bind(id.as_bytes().as_slice()).bind(now).fetch_one(db).await?)
+        }
+        state => Err(LedgerError::Finished { job: id, state }),
+    }
+}
+
+pub(super) async fn by_id(db: &mut SqliteConnection, id: JobId) -> Result<Option<SqliteRow>> {
+    Ok(sqlx::query("SELECT * FROM jobs WHERE id = ?1")
+        .bind(id.as_bytes().as_slice())
+        .fetch_optional(db)
+        .await?)
+}
+
+/// A queued or running job that reads the artifact.
+pub(super) async fn user_of(db: &mut SqliteConnection, artifact: ArtifactId) -> Result<Option<JobId>> {
+    let user = sqlx::query(
+        "SELECT j.id FROM job_inputs i JOIN jobs j ON j.id = i.job_id \
+         WHERE i.artifact_id = ?1 AND j.state IN (1, 2) LIMIT 1",
+    );
+    let row = user.bind(artifact.as_bytes().as_slice()).fetch_optional(db).await?;
+    row.map(|row| rows::id(&row, "id")).transpose()
+}
+
+pub(super) async fn queue_depth(db: &mut SqliteConnection) -> Result<i64> {
+    Ok(sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 1")
+        .fetch_one(db)
+        .await?)
+}

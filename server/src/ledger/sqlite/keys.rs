@@ -1,0 +1,45 @@
+//! Rows of keys.
+use sqlx::SqliteConnection;
+use uuid::Uuid;
+
+use super::super::Result;
+use super::super::types::{JobId, KeyId, KeyRow, NewKey};
+use super::rows;
+
+pub(super) async fn create(db: &mut SqliteConnection, new: NewKey, job: JobId, now: i64) -> Result<()> {
+    sqlx::query(
+        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+    )
+    .bind(new.id.as_bytes().as_slice())
+    .bind(&new.display_name)
+    .bind(new.bits)
+    .bind(&new.clip)
+    .bind(&new.clip_sha256)
+    .bind(new.seeded)
+    .bind(now)
+    .bind(job.as_bytes().as_slice())
+    .bind(new.artifact.as_bytes().as_slice())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn get(db: &mut SqliteConnection, id: KeyId) -> Result<Option<KeyRow>> {
+    let query = sqlx::query("SELECT * FROM keys WHERE id = ?1").bind(id.as_bytes().as_slice());
+    query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
+}
+
+pub(super) async fn list(db: &mut SqliteConnection, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
+    let query = sqlx::query(
+        "SELECT * FROM keys WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3",
+    );
+    let found = query
+        .bind(time)
+        .bind(id.as_bytes().as_slice())
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
+    found.iter().map(rows::key).collect()
+}

@@ -1,0 +1,178 @@
+//! Jobs as workers see them. Every change under a token checks the token in the transaction that changes.
+use std::time::Duration;
+
+use sqlx::{Row, SqliteConnection};
+
+use super::super::types::{
+    ArtifactId, Failure, JobId, JobRow, JobState, Lease, NewKey, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+};
+use super::super::{LedgerError, Result, token};
+use super::transition::{Next, after_failure, leave};
+use super::{artifacts, jobs, keys, rows};
+
+/// One statement takes the first job of the queue, and either counts an attempt and leases it, or fails it because no
+/// attempt is left. So a job that kills its worker is bounded even if nobody lives to tell. Left alone,
+/// the planner would read all queued jobs by another index and sort them; hence `INDEXED BY`.
+pub(super) const CLAIM: &str = "UPDATE jobs SET \
+    state = iif(attempt < max_attempts, 2, 4), \
+    worker = iif(attempt < max_attempts, ?1, NULL), \
+    lease_token = iif(attempt < max_attempts, ?2, NULL), \
+    lease_expires = iif(attempt < max_attempts, ?3, NULL), \
+    start_time = iif(attempt < max_attempts, ?4, start_time), \
+    end_time = iif(attempt < max_attempts, NULL, ?4), \
+    progress = iif(attempt < max_attempts, NULL, progress), \
+    failure_reason = iif(attempt < max_attempts, NULL, ?5), \
+    failure_message = iif(attempt < max_attempts, NULL, 'no attempt is left' || coalesce('; ' || failure_message, '')), \
+    attempt = attempt + iif(attempt < max_attempts, 1, 0), \
+    run_after = NULL, update_time = ?4, revision = revision + 1 \
+    WHERE id = (SELECT id FROM jobs INDEXED BY jobs_queue WHERE state = 1 AND (run_after IS NULL OR run_after <= ?4) \
+        ORDER BY queue_time, id LIMIT 1) \
+    RETURNING *";
+
+pub(super) async fn claim(
+    db: &mut SqliteConnection,
+    worker: String,
+    lease: Duration,
+    now: i64,
+) -> Result<Option<Lease>> {
+    let token = token::fresh();
+    loop {
+        let row = sqlx::query(CLAIM)
+            .bind(&worker)
+            .bind(token::hash(&token))
+            .bind(end_of(lease, now))
+            .bind(now)
+            .bind(REASON_ATTEMPTS_EXHAUSTED)
+            .fetch_optional(&mut *db)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let job = rows::job(&row)?;
+        if job.state == JobState::Running {
+            return Ok(Some(Lease { job, token }));
+        }
+    }
+}
+
+/// The job, if the token with this hash is its lease.
+pub(super) async fn leased(db: &mut SqliteConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+    let row = jobs::by_id(db, id).await?.ok_or_else(|| LedgerError::no_job(id))?;
+    let current: Option<Vec<u8>> = row.try_get("lease_token")?;
+    if current.as_deref() == Some(token) {
+        rows::job(&row)
+    } else {
+        Err(LedgerError::LeaseLost(id))
+    }
+}
+
+pub(super) async fn report(
+    db: &mut SqliteConnection,
+    id: JobId,
+    token: Vec<u8>,
+    progress: Option<Vec<u8>>,
+    lease: Duration,
+    now: i64,
+) -> Result<bool> {
+    let job = leased(db, id, &token).await?;
+    let news = progress.is_some() && progress != job.progress;
+    sqlx::query(
+        "UPDATE jobs SET lease_expires = ?2, progress = iif(?3, ?4, progress), update_time = iif(?3, ?5, update_time), \
+         revision = revision + iif(?3, 1, 0) WHERE id = ?1",
+    )
+    .bind(id.as_bytes().as_slice())
+    .bind(end_of(lease, now))
+    .bind(news)
+    .bind(progress)
+    .bind(now)
+    .execute(db)
+    .await?;
+    Ok(job.cancel_requested)
+}
+
+pub(super) async fn complete(
+    db: &mut SqliteConnection,
+    id: JobId,
+    token: Vec<u8>,
+    result: Vec<u8>,
+    outputs: Vec<ArtifactId>,
+    key: Option<NewKey>,
+    now: i64,
+) -> Result<JobRow> {
+    leased(db, id, &token).await?;
+    for output in outputs {
+        artifacts::publish(db, output, id, &token, false, now).await?;
+    }
+    if let Some(key) = key {
+        artifacts::publish(db, key.artifact, id, &token, true, now).await?;
+        keys::create(db, key, id, now).await?;
+    }
+    leave(db, id, Next::Succeeded(result), now).await
+}
+
+pub(super) async fn fail(
+    db: &mut SqliteConnection,
+    id: JobId,
+    token: Vec<u8>,
+    failure: Option<Failure>,
+    retryable: bool,
+    cancelled: bool,
+    now: i64,
+) -> Result<JobRow> {
+    let job = leased(db, id, &token).await?;
+    let failure = failure.unwrap_or_else(|| Failure {
+        reason: 0,
+        message: "the worker gave no reason".into(),
+    });
+    let next = match (cancelled, retryable) {
+        (true, _) if job.cancel_requested => Next::Cancelled,
+        (true, _) => return Err(LedgerError::CancelNotRequested(id)),
+        (false, true) => after_failure(&job, failure, now),
+        (false, false) => Next::Failed(failure),
+    };
+    leave(db, id, next, now).await
+}
+
+pub(super) async fn release(db: &mut SqliteConnection, id: JobId, token: Vec<u8>, now: i64) -> Result<JobRow> {
+    let job = leased(db, id, &token).await?;
+    leave(
+        db,
+        id,
+        if job.cancel_requested {
+            Next::Cancelled
+        } else {
+            Next::Released
+        },
+        now,
+    )
+    .await
+}
+
+pub(super) async fn reap(db: &mut SqliteConnection, now: i64) -> Result<Vec<JobId>> {
+    let expired = sqlx::query("SELECT * FROM jobs WHERE state = 2 AND lease_expires <= ?1 ORDER BY lease_expires")
+        .bind(now)
+        .fetch_all(&mut *db)
+        .await?;
+    let mut reaped = Vec::with_capacity(expired.len());
+    for row in expired {
+        let job = rows::job(&row)?;
+        let worker: Option<String> = row.try_get("worker")?;
+        let message = format!(
+            "worker {:?} was lost: it did not report in time",
+            worker.unwrap_or_default()
+        );
+        let next = after_failure(
+            &job,
+            Failure {
+                reason: REASON_WORKER_LOST,
+                message,
+            },
+            now,
+        );
+        leave(db, job.id, next, now).await?;
+        reaped.push(job.id);
+    }
+    Ok(reaped)
+}
+
+fn end_of(lease: Duration, now: i64) -> i64 {
+    now.saturating_add(i64::try_from(lease.as_micros()).unwrap_or(i64::MAX))
+}

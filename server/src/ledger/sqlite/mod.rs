@@ -1,0 +1,201 @@
+//! The ledger in a SQLite file: one writer that commits in groups, readers beside it (WAL).
+mod artifacts;
+mod jobs;
+mod keys;
+mod leases;
+mod open;
+mod rows;
+#[cfg(test)]
+mod tests;
+mod transition;
+mod writer;
+
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::SqlitePool;
+use uuid::Uuid;
+
+use super::types::{
+    ArtifactId, ArtifactRow, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey,
+};
+use super::{Ledger, LedgerError, Result, token};
+use writer::Writer;
+
+/// A ledger in one SQLite file.
+pub struct SqliteLedger {
+    readers: SqlitePool,
+    writer: Writer,
+}
+
+impl SqliteLedger {
+    /// Opens the ledger in `path`, making or updating it as needed.
+    ///
+    /// # Errors
+    /// `Database` when the file can't be opened or is no database, `Migrate` when a newer version wrote it.
+    pub async fn open(path: &Path) -> Result<Self> {
+        Self::open_with(open::options(path)).await
+    }
+
+    async fn open_with(options: sqlx::sqlite::SqliteConnectOptions) -> Result<Self> {
+        let first = open::migrated(&options).await?;
+        let readers = open::readers(&options);
+        Ok(Self {
+            readers,
+            writer: Writer::start(options, first),
+        })
+    }
+
+    /// Finishes what was begun and closes the file. Later calls fail with `Closed`.
+    pub async fn close(&self) {
+        self.writer.close().await;
+        self.readers.close().await;
+    }
+}
+
+#[tonic::async_trait]
+impl Ledger for SqliteLedger {
+    async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow> {
+        let job = self.writer.run(move |db| Box::pin(jobs::create(db, new, now))).await?;
+        // The position is counted by a reader: counting a long queue would hold up the writer.
+        Ok(self.get_job(job.id).await?.unwrap_or(job))
+    }
+
+    async fn find_request(&self, request: Uuid) -> Result<Option<JobRow>> {
+        jobs::find_request(&mut *self.readers.acquire().await?, request).await
+    }
+
+    async fn get_job(&self, id: JobId) -> Result<Option<JobRow>> {
+        jobs::get(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn list_jobs(&self, states: &[JobState], before: Option<(i64, JobId)>, limit: u32) -> Result<Vec<JobRow>> {
+        let mut snapshot = self.readers.begin().await?;
+        jobs::list(&mut snapshot, states, before, limit).await
+    }
+
+    async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
+        self.writer.run(move |db| Box::pin(jobs::cancel(db, id, now))).await
+    }
+
+    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
+        let worker = worker.to_owned();
+        self.writer
+            .run(move |db| Box::pin(leases::claim(db, worker, lease, now)))
+            .await
+    }
+
+    async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {
+        leases::leased(&mut *self.readers.acquire().await?, id, &token::hash(token)).await
+    }
+
+    async fn report(
+        &self,
+        id: JobId,
+        token: &str,
+        progress: Option<Vec<u8>>,
+        lease: Duration,
+        now: i64,
+    ) -> Result<bool> {
+        let token = token::hash(token);
+        self.writer
+            .run(move |db| Box::pin(leases::report(db, id, token, progress, lease, now)))
+            .await
+    }
+
+    async fn complete(
+        &self,
+        id: JobId,
+        token: &str,
+        result: Vec<u8>,
+        outputs: Vec<ArtifactId>,
+        key: Option<NewKey>,
+        now: i64,
+    ) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.writer
+            .run(move |db| Box::pin(leases::complete(db, id, token, result, outputs, key, now)))
+            .await
+    }
+
+    async fn fail(
+        &self,
+        id: JobId,
+        token: &str,
+        failure: Option<Failure>,
+        retryable: bool,
+        cancelled: bool,
+        now: i64,
+    ) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.writer
+            .run(move |db| Box::pin(leases::fail(db, id, token, failure, retryable, cancelled, now)))
+            .await
+    }
+
+    async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.writer
+            .run(move |db| Box::pin(leases::release(db, id, token, now)))
+            .await
+    }
+
+    async fn reap(&self, now: i64) -> Result<Vec<JobId>> {
+        self.writer.run(move |db| Box::pin(leases::reap(db, now))).await
+    }
+
+    async fn create_artifact(&self, new: NewArtifact, now: i64) -> Result<ArtifactRow> {
+        self.writer
+            .run(move |db| Box::pin(artifacts::create(db, new, now)))
+            .await
+    }
+
+    async fn artifact_ready(&self, id: ArtifactId, token: Option<&str>, now: i64) -> Result<ArtifactRow> {
+        let token = token.map(token::hash);
+        self.writer
+            .run(move |db| Box::pin(artifacts::ready(db, id, token, now)))
+            .await
+    }
+
+    async fn get_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+        artifacts::get_visible(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn get_any_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+        artifacts::get(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn delete_artifact(&self, id: ArtifactId, now: i64) -> Result<()> {
+        self.writer
+            .run(move |db| Box::pin(artifacts::delete(db, id, now)))
+            .await
+    }
+
+    async fn abandoned_artifacts(&self, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
+        self.writer
+            .run(move |db| Box::pin(artifacts::abandoned(db, older_than, limit)))
+            .await
+    }
+
+    async fn forget_artifact(&self, id: ArtifactId) -> Result<()> {
+        self.writer.run(move |db| Box::pin(artifacts::forget(db, id))).await
+    }
+
+    async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>> {
+        keys::get(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+        keys::list(&mut *self.readers.acquire().await?, before, limit).await
+    }
+
+    async fn queue_depth(&self) -> Result<i64> {
+        jobs::queue_depth(&mut *self.readers.acquire().await?).await
+    }
+
+    async fn check(&self) -> Result<()> {
+        self.queue_depth().await?;
+        // An empty transaction of the writer takes the write lock, and writes nothing.
+        self.writer.run(|_| Box::pin(async { Ok::<_, LedgerError>(()) })).await
+    }
+}

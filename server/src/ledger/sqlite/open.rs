@@ -1,0 +1,56 @@
+//! Opening the file: durability, locking, and the layout of its tables.
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{Connection, SqlSafeStr, SqliteConnection, SqlitePool};
+
+use super::super::Result;
+
+/// How long a connection waits for another process (a backup, a person with a shell) to let go of the file.
+const BUSY: Duration = Duration::from_secs(10);
+
+/// Connections that only read.
+const READERS: u32 = 4;
+
+pub(super) fn options(path: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(path)
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        // WAL with `NORMAL` may lose the last commits when the power goes; an acknowledged job must not.
+        .synchronous(SqliteSynchronous::Full)
+        .busy_timeout(BUSY)
+        .foreign_keys(true)
+}
+
+pub(super) async fn connect(options: &SqliteConnectOptions) -> Result<SqliteConnection> {
+    Ok(SqliteConnection::connect_with(options).await?)
+}
+
+/// The first connection, after bringing the tables to this version's layout.
+pub(super) async fn migrated(options: &SqliteConnectOptions) -> Result<SqliteConnection> {
+    let mut db = connect(options).await?;
+    // `run` would do the same, but its future can't be seen to move between threads.
+    migrator().run_direct(None, &mut db, false).await?;
+    Ok(db)
+}
+
+pub(super) fn readers(options: &SqliteConnectOptions) -> SqlitePool {
+    SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .test_before_acquire(false)
+        .connect_lazy_with(options.clone().create_if_missing(false).pragma("query_only", "1"))
+}
+
+fn migrator() -> Migrator {
+    let layout = include_str!("../../../migrations/sqlite/0001_ledger.sql");
+    Migrator::with_migrations(vec![Migration::new(
+        1,
+        "ledger".into(),
+        MigrationType::Simple,
+        layout.into_sql_str(),
+        false,
+    )])
+}

@@ -1,0 +1,113 @@
+//! Rows of the tables, read into the ledger's types.
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use uuid::Uuid;
+
+use super::super::types::{ArtifactRow, ArtifactState, Failure, JobKind, JobRow, JobState, KeyRow};
+use super::super::{LedgerError, Result};
+
+pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
+    let reason: Option<i32> = row.try_get("failure_reason")?;
+    let message: Option<String> = row.try_get("failure_message")?;
+    Ok(JobRow {
+        id: id(row, "id")?,
+        display_name: row.try_get("display_name")?,
+        kind: kind(row.try_get("kind")?)?,
+        spec: row.try_get("spec")?,
+        state: state(row.try_get("state")?)?,
+        cancel_requested: row.try_get("cancel_requested")?,
+        attempt: row.try_get("attempt")?,
+        max_attempts: row.try_get("max_attempts")?,
+        progress: row.try_get("progress")?,
+        result: row.try_get("result")?,
+        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+        create_time: row.try_get("create_time")?,
+        update_time: row.try_get("update_time")?,
+        start_time: row.try_get("start_time")?,
+        end_time: row.try_get("end_time")?,
+        run_after: row.try_get("run_after")?,
+        revision: row.try_get("revision")?,
+        queue_position: None,
+    })
+}
+
+pub(super) fn artifact(row: &SqliteRow) -> Result<ArtifactRow> {
+    Ok(ArtifactRow {
+        id: id(row, "id")?,
+        display_name: row.try_get("display_name")?,
+        size: row.try_get("size")?,
+        sha256: row.try_get("sha256")?,
+        job: optional_id(row, "job_id")?,
+        secret: row.try_get("secret")?,
+        path: row.try_get("path")?,
+        state: match row.try_get("state")? {
+            1 => ArtifactState::Pending,
+            2 => ArtifactState::Stored,
+            3 => ArtifactState::Ready,
+            4 => ArtifactState::Deleted,
+            value => {
+                return Err(LedgerError::Corrupt {
+                    what: "state of an artifact",
+                    value,
+                });
+            }
+        },
+        create_time: row.try_get("create_time")?,
+    })
+}
+
+pub(super) fn key(row: &SqliteRow) -> Result<KeyRow> {
+    Ok(KeyRow {
+        id: id(row, "id")?,
+        display_name: row.try_get("display_name")?,
+        bits: row.try_get("bits")?,
+        clip: row.try_get("clip")?,
+        clip_sha256: row.try_get("clip_sha256")?,
+        seeded: row.try_get("seeded")?,
+        create_time: row.try_get("create_time")?,
+        job: id(row, "job_id")?,
+        artifact: id(row, "artifact_id")?,
+    })
+}
+
+pub(super) fn id(row: &SqliteRow, column: &str) -> Result<Uuid> {
+    optional_id(row, column)?.ok_or_else(|| sqlx::Error::ColumnNotFound(column.to_owned()).into())
+}
+
+fn optional_id(row: &SqliteRow, column: &str) -> Result<Option<Uuid>> {
+    let bytes: Option<Vec<u8>> = row.try_get(column)?;
+    let uuid = bytes.as_deref().map(Uuid::from_slice).transpose();
+    uuid.map_err(|e| {
+        sqlx::Error::ColumnDecode {
+            index: column.to_owned(),
+            source: e.into(),
+        }
+        .into()
+    })
+}
+
+fn kind(value: i64) -> Result<JobKind> {
+    match value {
+        1 => Ok(JobKind::Embed),
+        2 => Ok(JobKind::Verify),
+        3 => Ok(JobKind::CreateKey),
+        _ => Err(LedgerError::Corrupt {
+            what: "kind of job",
+            value,
+        }),
+    }
+}
+
+fn state(value: i64) -> Result<JobState> {
+    match value {
+        1 => Ok(JobState::Queued),
+        2 => Ok(JobState::Running),
+        3 => Ok(JobState::Succeeded),
+        4 => Ok(JobState::Failed),
+        5 => Ok(JobState::Cancelled),
+        _ => Err(LedgerError::Corrupt {
+            what: "state of a job",
+            value,
+        }),
+    }
+}

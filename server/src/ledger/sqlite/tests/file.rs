@@ -1,0 +1,164 @@
+//! The file: what is in it, and what becomes of it when things go wrong.
+use guardsplat_proto::v1::failure::Reason;
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{Connection, Row, SqliteConnection};
+
+use super::super::super::conformance::fixture::*;
+use super::super::super::{JobState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, SqliteLedger};
+use super::super::open;
+use super::Folder;
+
+pub(super) async fn raw(folder: &Folder) -> SqliteConnection {
+    let options = SqliteConnectOptions::new().filename(folder.path());
+    SqliteConnection::connect_with(&options).await.unwrap()
+}
+
+#[tokio::test]
+async fn killed_without_warning_nothing_acknowledged_is_lost() {
+    let folder = Folder::new();
+    let ledger = folder.ledger().await;
+    let mut ids = Vec::new();
+    for i in 0..20 {
+        ids.push(queue(&*ledger, at(i)).await);
+    }
+    // What the disk has at this moment, while nothing is closed or tidied up.
+    let copy = Folder::new();
+    for suffix in ["", "-wal"] {
+        let name = |folder: &Folder| format!("{}{suffix}", folder.path().display());
+        std::fs::copy(name(&folder), name(&copy)).unwrap();
+    }
+    let after = copy.ledger().await;
+    for id in ids {
+        assert_eq!(job(&*after, id).await, job(&*ledger, id).await);
+    }
+}
+
+#[tokio::test]
+async fn durability_is_switched_on() {
+    let folder = Folder::new();
+    let mut db = open::migrated(&open::options(&folder.path())).await.unwrap();
+    for (pragma, expected) in [
+        ("PRAGMA synchronous", "2"),
+        ("PRAGMA foreign_keys", "1"),
+        ("PRAGMA busy_timeout", "10000"),
+    ] {
+        let value: i64 = sqlx::query(pragma).fetch_one(&mut db).await.unwrap().get(0);
+        assert_eq!(value.to_string(), expected, "{pragma}");
+    }
+    let mode: String = sqlx::query("PRAGMA journal_mode")
+        .fetch_one(&mut db)
+        .await
+        .unwrap()
+        .get(0);
+    assert_eq!(mode, "wal");
+}
+
+#[tokio::test]
+async fn a_full_disk_loses_nothing_and_is_told() {
+    let folder = Folder::new();
+    folder.ledger().await.close().await;
+    let options = open::options(&folder.path()).pragma("max_page_count", "60");
+    let ledger = SqliteLedger::open_with(options).await.unwrap();
+    let mut kept = Vec::new();
+    let error = loop {
+        let new = crate::ledger::NewJob {
+            spec: vec![0; 5000],
+            ..new_job()
+        };
+        match ledger.create_job(new, at(0)).await {
+            Ok(job) => kept.push(job.id),
+            Err(error) => break error,
+        }
+        assert!(kept.len() < 1000, "the disk never got full");
+    };
+    assert!(matches!(error, LedgerError::Database(_)), "{error:?}");
+    assert!(!kept.is_empty());
+    assert_eq!(ledger.queue_depth().await.unwrap(), kept.len() as i64);
+    // Room again: the ledger goes on without a restart.
+    ledger.close().await;
+    let ledger = folder.ledger().await;
+    queue(&*ledger, at(1)).await;
+    assert_eq!(ledger.queue_depth().await.unwrap(), kept.len() as i64 + 1);
+}
+
+#[tokio::test]
+async fn tokens_are_kept_as_hashes_only() {
+    let folder = Folder::new();
+    let ledger = folder.ledger().await;
+    queue(&*ledger, at(0)).await;
+    let lease = claim(&*ledger, at(1)).await.unwrap();
+    output(&*ledger, &lease, true, at(2)).await;
+    for file in std::fs::read_dir(folder.path().parent().unwrap()).unwrap() {
+        let bytes = std::fs::read(file.unwrap().path()).unwrap();
+        assert!(!bytes.windows(lease.token.len()).any(|w| w == lease.token.as_bytes()));
+    }
+}
+
+#[tokio::test]
+async fn files_of_others_are_refused() {
+    let folder = Folder::new();
+    std::fs::write(
+        folder.path(),
+        "no database, but long enough to be read as the header of one".repeat(10),
+    )
+    .unwrap();
+    assert!(matches!(
+        SqliteLedger::open(&folder.path()).await.err(),
+        Some(LedgerError::Database(_))
+    ));
+
+    let folder = Folder::new();
+    folder.ledger().await.close().await;
+    let mut db = raw(&folder).await;
+    let newer = "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) \
+                 VALUES (99, 'of a newer version', 1, x'00', 0)";
+    sqlx::query(newer).execute(&mut db).await.unwrap();
+    db.close().await.unwrap();
+    assert!(matches!(
+        SqliteLedger::open(&folder.path()).await.err(),
+        Some(LedgerError::Migrate(_))
+    ));
+}
+
+#[tokio::test]
+async fn what_a_newer_version_wrote_into_a_row_is_an_error_and_no_panic() {
+    let folder = Folder::new();
+    let ledger = folder.ledger().await;
+    let id = queue(&*ledger, at(0)).await;
+    sqlx::query("UPDATE jobs SET kind = 77")
+        .execute(&mut raw(&folder).await)
+        .await
+        .unwrap();
+    refused!(
+        ledger.get_job(id).await,
+        LedgerError::Corrupt {
+            what: "kind of job",
+            value: 77
+        }
+    );
+}
+
+#[tokio::test]
+async fn a_closed_ledger_says_so() {
+    let ledger = Folder::new().ledger().await;
+    ledger.close().await;
+    refused!(ledger.cancel_job(uuid::Uuid::nil(), 0).await, LedgerError::Closed);
+    assert!(ledger.check().await.is_err());
+    ledger.close().await;
+}
+
+#[test]
+fn numbers_are_those_of_the_api() {
+    assert_eq!(REASON_WORKER_LOST, Reason::WorkerLost as i32);
+    assert_eq!(REASON_ATTEMPTS_EXHAUSTED, Reason::AttemptsExhausted as i32);
+    use guardsplat_proto::v1::job::State;
+    for (ours, theirs) in [
+        (JobState::Queued, State::Queued),
+        (JobState::Running, State::Running),
+        (JobState::Succeeded, State::Succeeded),
+        (JobState::Failed, State::Failed),
+        (JobState::Cancelled, State::Cancelled),
+    ] {
+        assert_eq!(ours as i32, theirs as i32);
+    }
+}

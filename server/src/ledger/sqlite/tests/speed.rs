@@ -1,0 +1,97 @@
+//! How fast it is, and that the queue is found by its index.
+use std::time::Instant;
+
+use sqlx::Row;
+
+use super::super::super::conformance::fixture::*;
+use super::super::super::{Ledger, NewJob};
+use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
+use super::super::leases::CLAIM;
+use super::Folder;
+use super::file::raw;
+
+/// How SQLite would go about a statement.
+async fn plan(folder: &Folder, statement: &str) -> String {
+    let explain = sqlx::AssertSqlSafe(format!("EXPLAIN QUERY PLAN {statement}"));
+    let plan = sqlx::query(explain).fetch_all(&mut raw(folder).await).await.unwrap();
+    plan.iter().map(|row| row.get::<String, _>("detail") + "; ").collect()
+}
+
+#[tokio::test]
+async fn jobs_are_found_by_their_indexes_and_never_sorted() {
+    let folder = Folder::new();
+    folder.ledger().await.close().await;
+    let by_index = [
+        (CLAIM, "INDEX jobs_queue"),
+        (GET, "INDEX jobs_queue ((queue_time,id)<"),
+        (PAGE, "INDEX jobs_by_time ((create_time,id)<"),
+        (PAGE_OF_STATE, "INDEX jobs_by_state (state=? AND (create_time,id)<"),
+        (QUEUE, "INDEX jobs_queue"),
+    ];
+    for (statement, index) in by_index {
+        let plan = plan(&folder, statement).await;
+        assert!(
+            plan.contains(index) && !plan.contains("TEMP B-TREE"),
+            "{statement}: {plan}"
+        );
+    }
+}
+
+/// Median, 99th percentile and worst of so many milliseconds.
+fn quantiles(mut ms: Vec<f64>) -> [f64; 3] {
+    ms.sort_by(f64::total_cmp);
+    [ms[ms.len() / 2], ms[ms.len() * 99 / 100], ms[ms.len() - 1]]
+}
+
+/// Run with `-- --ignored --nocapture`; the figures depend on the disk.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "a measurement"]
+async fn a_thousand_submissions() {
+    for clients in [1, 8, 50] {
+        let folder = Folder::new();
+        let ledger = folder.ledger().await;
+        let start = Instant::now();
+        let tasks: Vec<_> = (0..clients)
+            .map(|_| {
+                let ledger = ledger.clone();
+                tokio::spawn(async move {
+                    let mut ms = Vec::new();
+                    for i in 0..1000 / clients {
+                        let start = Instant::now();
+                        ledger
+                            .create_job(
+                                NewJob {
+                                    spec: vec![0; 200],
+                                    ..new_job()
+                                },
+                                at(i),
+                            )
+                            .await
+                            .unwrap();
+                        ms.push(start.elapsed().as_secs_f64() * 1e3);
+                    }
+                    ms
+                })
+            })
+            .collect();
+        let mut ms = Vec::new();
+        for task in tasks {
+            ms.extend(task.await.unwrap());
+        }
+        let total = start.elapsed().as_secs_f64();
+        let [p50, p99, worst] = quantiles(ms);
+        println!(
+            "create, {clients} at once: p50 {p50:.1} ms, p99 {p99:.1} ms, worst {worst:.1} ms, {total:.1} s in all"
+        );
+        assert!(p99 < 50.0, "99 of 100 submissions take {p99} ms");
+
+        let mut ms = Vec::new();
+        for _ in 0..200 {
+            let start = Instant::now();
+            claim(&*ledger, at(5000)).await.unwrap();
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let [p50, p99, worst] = quantiles(ms);
+        println!("claim, 1000 queued: p50 {p50:.1} ms, p99 {p99:.1} ms, worst {worst:.1} ms");
+    }
+}

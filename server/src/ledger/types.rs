@@ -1,0 +1,257 @@
+//! What the ledger keeps: jobs, artifacts and keys, as rows without any wire format.
+use std::fmt;
+
+use uuid::Uuid;
+
+/// Name of a job; a version 7 UUID.
+pub type JobId = Uuid;
+/// Name of an artifact.
+pub type ArtifactId = Uuid;
+/// Name of a key.
+pub type KeyId = Uuid;
+
+/// [`Failure::reason`] of an attempt whose worker was lost, as in `guardsplat.v1.Failure.Reason`.
+pub const REASON_WORKER_LOST: i32 = 3;
+/// [`Failure::reason`] of a job whose attempts are used up, as in `guardsplat.v1.Failure.Reason`.
+pub const REASON_ATTEMPTS_EXHAUSTED: i32 = 5;
+
+/// What a job does. Numbers are kept in the database.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobKind {
+    /// Marks a scene.
+    Embed = 1,
+    /// Reads a suspect.
+    Verify = 2,
+    /// Makes a key.
+    CreateKey = 3,
+}
+
+/// What became of a job. Numbers are kept in the database, and are those of `guardsplat.v1.Job.State`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JobState {
+    /// Waits for a worker.
+    Queued = 1,
+    /// A worker has it.
+    Running = 2,
+    /// Done.
+    Succeeded = 3,
+    /// Given up.
+    Failed = 4,
+    /// Ended because somebody asked.
+    Cancelled = 5,
+}
+
+impl JobState {
+    /// Whether nothing of the job changes any more.
+    pub fn is_over(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+    }
+}
+
+/// Why a job or an attempt failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// For programs: a number of `guardsplat.v1.Failure.Reason`.
+    pub reason: i32,
+    /// For people.
+    pub message: String,
+}
+
+/// A job as it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobRow {
+    /// Its name.
+    pub id: JobId,
+    /// What people call it.
+    pub display_name: String,
+    /// What it does.
+    pub kind: JobKind,
+    /// The encoded `guardsplat.v1` message of its kind.
+    pub spec: Vec<u8>,
+    /// What became of it.
+    pub state: JobState,
+    /// Somebody asked for the end of it while it was running.
+    pub cancel_requested: bool,
+    /// Attempts counted so far.
+    pub attempt: i32,
+    /// How many there may be.
+    pub max_attempts: i32,
+    /// Encoded `guardsplat.v1.Progress` of the last attempt.
+    pub progress: Option<Vec<u8>>,
+    /// Encoded result of its kind.
+    pub result: Option<Vec<u8>>,
+    /// Why it failed, or why its last attempt did.
+    pub failure: Option<Failure>,
+    /// When it was accepted.
+    pub create_time: i64,
+    /// When anything of it changed last.
+    pub update_time: i64,
+    /// When a worker was last given it.
+    pub start_time: Option<i64>,
+    /// When it was over.
+    pub end_time: Option<i64>,
+    /// Not given to a worker before.
+    pub run_after: Option<i64>,
+    /// One more with every change.
+    pub revision: i64,
+    /// Queued jobs ahead of it; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
+    pub queue_position: Option<i64>,
+}
+
+/// A job to queue.
+#[derive(Clone, Debug)]
+pub struct NewJob {
+    /// Its name.
+    pub id: JobId,
+    /// What people call it.
+    pub display_name: String,
+    /// What it does.
+    pub kind: JobKind,
+    /// The encoded message of its kind.
+    pub spec: Vec<u8>,
+    /// Artifacts it reads; kept while it is queued or running.
+    pub inputs: Vec<ArtifactId>,
+    /// The key it needs.
+    pub key: Option<KeyId>,
+    /// Names the request, so that it can be repeated.
+    pub request_id: Option<Uuid>,
+    /// SHA-256 of the request.
+    pub fingerprint: [u8; 32],
+    /// How many attempts there may be.
+    pub max_attempts: i32,
+}
+
+/// The right to one attempt of a job.
+#[derive(Clone)]
+pub struct Lease {
+    /// The job.
+    pub job: JobRow,
+    /// The secret that goes with every write of the attempt. Only its hash is kept.
+    pub token: String,
+}
+
+impl fmt::Debug for Lease {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lease").field("job", &self.job).finish_non_exhaustive()
+    }
+}
+
+/// Where an artifact comes from.
+#[derive(Clone)]
+pub enum Origin {
+    /// A client sends it.
+    Upload,
+    /// An attempt of a job made it.
+    Output {
+        /// The job.
+        job: JobId,
+        /// The lease of the attempt.
+        token: String,
+    },
+}
+
+impl fmt::Debug for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Upload => f.write_str("Upload"),
+            Self::Output { job, .. } => f.debug_struct("Output").field("job", job).finish_non_exhaustive(),
+        }
+    }
+}
+
+/// An artifact whose bytes are about to be stored.
+#[derive(Clone, Debug)]
+pub struct NewArtifact {
+    /// Its name.
+    pub id: ArtifactId,
+    /// What people call it.
+    pub display_name: String,
+    /// Length in bytes.
+    pub size: i64,
+    /// SHA-256 of the bytes, lower-case hexadecimal.
+    pub sha256: String,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// A key file: never visible.
+    pub secret: bool,
+    /// Where the store has the bytes.
+    pub path: String,
+}
+
+/// How far an artifact is. Numbers are kept in the database.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ArtifactState {
+    /// Its bytes are on the way.
+    Pending = 1,
+    /// An output, all there, that no job has published.
+    Stored = 2,
+    /// There for good; visible unless it is secret.
+    Ready = 3,
+    /// Gone for everybody; its bytes may still be there.
+    Deleted = 4,
+}
+
+/// What is known of an artifact; the bytes live in the store.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArtifactRow {
+    /// Its name.
+    pub id: ArtifactId,
+    /// What people call it.
+    pub display_name: String,
+    /// Length in bytes.
+    pub size: i64,
+    /// SHA-256 of the bytes, lower-case hexadecimal.
+    pub sha256: String,
+    /// The job that made it; none for uploads.
+    pub job: Option<JobId>,
+    /// A key file: never visible.
+    pub secret: bool,
+    /// Where the store has the bytes.
+    pub path: String,
+    /// How far it is.
+    pub state: ArtifactState,
+    /// When it was announced.
+    pub create_time: i64,
+}
+
+/// A key that a job made.
+#[derive(Clone, Debug)]
+pub struct NewKey {
+    /// Its name.
+    pub id: KeyId,
+    /// What people call it.
+    pub display_name: String,
+    /// Bits of its messages.
+    pub bits: u32,
+    /// The CLIP it belongs to.
+    pub clip: String,
+    /// SHA-256 of that CLIP's weights, hexadecimal.
+    pub clip_sha256: String,
+    /// Whether it was made from a seed.
+    pub seeded: bool,
+    /// The secret output that holds the key file.
+    pub artifact: ArtifactId,
+}
+
+/// What is known of a key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyRow {
+    /// Its name.
+    pub id: KeyId,
+    /// What people call it.
+    pub display_name: String,
+    /// Bits of its messages.
+    pub bits: u32,
+    /// The CLIP it belongs to.
+    pub clip: String,
+    /// SHA-256 of that CLIP's weights, hexadecimal.
+    pub clip_sha256: String,
+    /// Whether it was made from a seed.
+    pub seeded: bool,
+    /// When it was made.
+    pub create_time: i64,
+    /// The job that made it.
+    pub job: JobId,
+    /// The secret artifact that holds the key file.
+    pub artifact: ArtifactId,
+}
