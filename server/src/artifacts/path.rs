@@ -1,0 +1,63 @@
+//! Where an artifact lies in the store. Paths are made of ids alone, never of names that a caller chose.
+use std::fmt;
+
+use object_store::path::Path;
+use sha2::{Digest, Sha256};
+use uuid::Uuid;
+
+use super::{StoreError, StoreResult};
+
+const UPLOADS: &str = "uploads";
+const OUTPUTS: &str = "outputs";
+/// Hexadecimal digits of a lease's hash in a path: enough to tell the attempts of a job apart.
+const LEASE_DIGITS: usize = 16;
+
+/// The path of one artifact.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct ArtifactPath(Path);
+
+impl ArtifactPath {
+    /// Where an upload lies.
+    pub fn upload(id: Uuid) -> Self {
+        Self(Path::from_iter([UPLOADS.to_owned(), id.to_string()]))
+    }
+
+    /// Where an output of an attempt lies. Attempts have folders of their own, so that one that was given up can't
+    /// touch what its successor writes. The folder is named by a hash, because the token itself is a secret.
+    pub fn output(job: Uuid, lease_token: &str, id: Uuid) -> Self {
+        let mut lease = hex::encode(Sha256::digest(lease_token.as_bytes()));
+        lease.truncate(LEASE_DIGITS);
+        Self(Path::from_iter([
+            OUTPUTS.to_owned(),
+            job.to_string(),
+            lease,
+            id.to_string(),
+        ]))
+    }
+
+    /// Reads a path as the ledger keeps it. Anything that was not made by one of the functions above is refused.
+    pub fn parse(text: &str) -> StoreResult<Self> {
+        let is_id = |part: &str| Uuid::try_parse(part).is_ok_and(|id| id.to_string() == part);
+        let is_lease =
+            |part: &str| part.len() == LEASE_DIGITS && part.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+        let known = match text.split('/').collect::<Vec<_>>()[..] {
+            [UPLOADS, id] => is_id(id),
+            [OUTPUTS, job, lease, id] => is_id(job) && is_lease(lease) && is_id(id),
+            _ => false,
+        };
+        if !known {
+            return Err(StoreError::BadPath(text.to_owned()));
+        }
+        Ok(Self(Path::from(text)))
+    }
+
+    pub(super) fn as_object_path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl fmt::Display for ArtifactPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}

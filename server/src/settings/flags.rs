@@ -1,0 +1,111 @@
+//! The command line. A flag stands above every other layer, and is empty unless it was given.
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Parser;
+
+use super::{LogFormat, Settings, WorkerDevice};
+
+/// The GuardSplat server: takes jobs over gRPC, keeps them, and gives them to workers.
+///
+/// Settings come from, in this order: defaults, a file, environment variables (GUARDSPLAT_ and the setting's name in
+/// capitals), flags. The master key is taken from GUARDSPLAT_MASTER_KEY (64 hexadecimal digits), the file that
+/// --master-key-file names, or master.key in the data folder, which is made at the first start.
+#[derive(Clone, Debug, Default, Parser)]
+#[command(name = "guardsplat-server", version, args_override_self = true)]
+pub struct Flags {
+    /// Settings file [default: /etc/guardsplat/server.toml, if it is there]
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Address and port to listen on; port 0 takes any that is free
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub listen: Option<SocketAddr>,
+    /// Folder of everything that is kept
+    #[arg(long, value_name = "FOLDER")]
+    pub data_dir: Option<PathBuf>,
+    /// Most bytes of an artifact
+    #[arg(long, value_name = "BYTES")]
+    pub max_artifact_bytes: Option<u64>,
+    /// Most jobs that may wait
+    #[arg(long, value_name = "JOBS")]
+    pub max_queued_jobs: Option<u64>,
+    /// Seconds until a worker that says nothing is given up
+    #[arg(long, value_name = "SECONDS")]
+    pub lease_seconds: Option<u64>,
+    /// How often a job is tried
+    #[arg(long, value_name = "TIMES")]
+    pub max_attempts: Option<u32>,
+    /// Seconds that an upload may pause
+    #[arg(long, value_name = "SECONDS")]
+    pub upload_timeout_seconds: Option<u64>,
+    /// Seconds after which bytes that nobody published are removed
+    #[arg(long, value_name = "SECONDS")]
+    pub abandoned_after_seconds: Option<u64>,
+    /// Whether to run a worker of its own
+    #[arg(long, value_name = "true|false")]
+    pub embedded_worker: Option<bool>,
+    /// Program of that worker [default: guardsplat-worker beside this program]
+    #[arg(long, value_name = "FILE")]
+    pub worker_binary: Option<PathBuf>,
+    /// What that worker computes on
+    #[arg(long, value_name = "DEVICE")]
+    pub worker_device: Option<WorkerDevice>,
+    /// File of the master key
+    #[arg(long, value_name = "FILE")]
+    pub master_key_file: Option<PathBuf>,
+    /// Seconds that work may take to end when the server stops
+    #[arg(long, value_name = "SECONDS")]
+    pub stop_seconds: Option<u64>,
+    /// How log lines are written
+    #[arg(long, value_name = "FORMAT")]
+    pub log_format: Option<LogFormat>,
+    /// What is logged, in the syntax of RUST_LOG
+    #[arg(long, value_name = "FILTER")]
+    pub log_filter: Option<String>,
+}
+
+impl Flags {
+    /// Sets what was given.
+    pub(super) fn apply(self, settings: &mut Settings) {
+        // Taken apart in full, so that a new flag can't be forgotten here.
+        let Self {
+            config: _,
+            listen,
+            data_dir,
+            max_artifact_bytes,
+            max_queued_jobs,
+            lease_seconds,
+            max_attempts,
+            upload_timeout_seconds,
+            abandoned_after_seconds,
+            embedded_worker,
+            worker_binary,
+            worker_device,
+            master_key_file,
+            stop_seconds,
+            log_format,
+            log_filter,
+        } = self;
+        set(&mut settings.listen, listen);
+        set(&mut settings.data_dir, data_dir);
+        set(&mut settings.max_artifact_bytes, max_artifact_bytes);
+        set(&mut settings.max_queued_jobs, max_queued_jobs);
+        set(&mut settings.lease_seconds, lease_seconds);
+        set(&mut settings.max_attempts, max_attempts);
+        set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
+        set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
+        set(&mut settings.embedded_worker, embedded_worker);
+        set(&mut settings.worker_binary, worker_binary.map(Some));
+        set(&mut settings.worker_device, worker_device);
+        set(&mut settings.master_key_file, master_key_file.map(Some));
+        set(&mut settings.stop_seconds, stop_seconds);
+        set(&mut settings.log_format, log_format);
+        set(&mut settings.log_filter, log_filter);
+    }
+}
+
+fn set<T>(setting: &mut T, given: Option<T>) {
+    if let Some(value) = given {
+        *setting = value;
+    }
+}

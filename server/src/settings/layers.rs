@@ -1,0 +1,58 @@
+//! Puts the layers together.
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use config::{Config, ConfigError, Environment, File, FileFormat};
+use secrecy::SecretString;
+
+use super::{Flags, Settings, SettingsError};
+use crate::secrets::MASTER_KEY_VARIABLE;
+
+/// Read when it is there and no other file is named.
+const USUAL_FILE: &str = "/etc/guardsplat/server.toml";
+/// What the names of environment variables begin with.
+const PREFIX: &str = "GUARDSPLAT_";
+/// Variables with this beginning that other programs of the project read, so that one environment serves them all.
+const OTHERS: &[&str] = &["CLIP", "CONFIG", "HOME", "MODELS", "SCENES", "SERVER"];
+
+/// Loads all layers and checks them. The environment is an argument so that tests can have their own.
+pub fn load(flags: Flags, environment: impl IntoIterator<Item = (String, String)>) -> Result<Settings, SettingsError> {
+    let mut master_key = None;
+    let mut variables = HashMap::new();
+    for (name, value) in environment {
+        // An empty variable is how one is unset in many places.
+        if value.trim().is_empty() {
+            continue;
+        }
+        if name == MASTER_KEY_VARIABLE {
+            master_key = Some(SecretString::from(value));
+        } else if let Some(setting) = name.strip_prefix(PREFIX).filter(|name| !is_of_others(name)) {
+            variables.insert(setting.to_lowercase(), value);
+        }
+    }
+    let mut builder = Config::builder();
+    if let Some(path) = flags.config.clone().or_else(usual_file) {
+        builder = builder.add_source(File::from(path).format(FileFormat::Toml));
+    }
+    let mut settings: Settings = builder
+        .add_source(Environment::default().source(Some(variables)))
+        .build()
+        .and_then(Config::try_deserialize)
+        .map_err(|error: ConfigError| SettingsError::Unreadable(error.to_string()))?;
+    flags.apply(&mut settings);
+    settings.master_key = master_key;
+    settings.check()?;
+    Ok(settings)
+}
+
+fn usual_file() -> Option<PathBuf> {
+    Some(PathBuf::from(USUAL_FILE)).filter(|path| path.exists())
+}
+
+/// Whether a variable is not meant for the server. Besides those of other programs, these are the ones that Kubernetes
+/// and Docker set for a service by the name of `guardsplat`, such as `GUARDSPLAT_SERVICE_HOST`.
+fn is_of_others(name: &str) -> bool {
+    let from_service = name.contains("SERVICE_HOST") || name.contains("SERVICE_PORT");
+    let from_port = name == "PORT" || name.starts_with("PORT_") || name.contains("_PORT_") || name.ends_with("_PORT");
+    OTHERS.contains(&name) || from_service || from_port
+}

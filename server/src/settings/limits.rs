@@ -1,0 +1,57 @@
+//! Checks that every setting is within its limits.
+use std::path::Path;
+
+use tracing_subscriber::EnvFilter;
+
+use super::{Settings, SettingsError};
+
+const DAY: u64 = 24 * 60 * 60;
+
+impl Settings {
+    /// Refuses values that could not work, and names the limits.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let numbers = [
+            ("max_artifact_bytes", self.max_artifact_bytes, 1, 1 << 40),
+            ("max_queued_jobs", self.max_queued_jobs, 1, 1_000_000),
+            ("lease_seconds", self.lease_seconds, 1, DAY),
+            ("max_attempts", self.max_attempts.into(), 1, 100),
+            ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),
+            ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
+            ("stop_seconds", self.stop_seconds, 1, 60 * 60),
+        ];
+        for (field, value, least, most) in numbers {
+            if !(least..=most).contains(&value) {
+                return Err(SettingsError::OutOfRange {
+                    field,
+                    value,
+                    least,
+                    most,
+                });
+            }
+        }
+        not_empty("data_dir", &self.data_dir)?;
+        for (field, path) in [
+            ("worker_binary", &self.worker_binary),
+            ("master_key_file", &self.master_key_file),
+        ] {
+            if let Some(path) = path {
+                not_empty(field, path)?;
+            }
+        }
+        EnvFilter::try_new(&self.log_filter).map_err(|error| SettingsError::Invalid {
+            field: "log_filter",
+            reason: error.to_string(),
+        })?;
+        Ok(())
+    }
+}
+
+fn not_empty(field: &'static str, path: &Path) -> Result<(), SettingsError> {
+    if path.as_os_str().is_empty() {
+        return Err(SettingsError::Invalid {
+            field,
+            reason: "an empty path".into(),
+        });
+    }
+    Ok(())
+}

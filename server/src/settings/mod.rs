@@ -1,0 +1,136 @@
+//! Settings, in layers: defaults, a file, the environment, flags. Each overrides the one before.
+mod error;
+mod flags;
+mod layers;
+mod limits;
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use secrecy::SecretString;
+use serde::{Deserialize, Serialize};
+
+pub use error::SettingsError;
+pub use flags::Flags;
+pub use layers::load;
+
+/// Everything that can be set. `deploy/guardsplat-server.toml` says what each is for.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Where the server listens.
+    pub listen: SocketAddr,
+    /// Folder of everything that is kept.
+    pub data_dir: PathBuf,
+    /// Most bytes of an artifact.
+    pub max_artifact_bytes: u64,
+    /// Most jobs that may wait.
+    pub max_queued_jobs: u64,
+    /// Seconds until a worker that says nothing is given up.
+    pub lease_seconds: u64,
+    /// How often a job is tried.
+    pub max_attempts: u32,
+    /// Seconds that an upload may pause.
+    pub upload_timeout_seconds: u64,
+    /// Seconds after which bytes that nobody published are removed.
+    pub abandoned_after_seconds: u64,
+    /// Whether the server runs a worker of its own.
+    pub embedded_worker: bool,
+    /// Program of that worker.
+    pub worker_binary: Option<PathBuf>,
+    /// What that worker computes on.
+    pub worker_device: WorkerDevice,
+    /// File of the master key.
+    pub master_key_file: Option<PathBuf>,
+    /// Seconds that work may take to end when the server stops.
+    pub stop_seconds: u64,
+    /// How log lines are written.
+    pub log_format: LogFormat,
+    /// What is logged.
+    pub log_filter: String,
+    /// The master key, from the environment only: neither a file of settings nor a flag is a place for a secret.
+    #[serde(skip)]
+    pub master_key: Option<SecretString>,
+}
+
+/// What the embedded worker computes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum WorkerDevice {
+    /// The GPU when there is one, else the CPU.
+    Auto,
+    /// wgpu, through Vulkan.
+    Wgpu,
+    /// The CPU.
+    Cpu,
+}
+
+impl WorkerDevice {
+    /// As the worker's `--device` takes it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Wgpu => "wgpu",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// How log lines are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
+            data_dir: "guardsplat-data".into(),
+            max_artifact_bytes: 4 << 30,
+            max_queued_jobs: 10_000,
+            lease_seconds: 30,
+            max_attempts: 3,
+            upload_timeout_seconds: 60,
+            abandoned_after_seconds: 24 * 60 * 60,
+            embedded_worker: true,
+            worker_binary: None,
+            worker_device: WorkerDevice::Auto,
+            master_key_file: None,
+            stop_seconds: 20,
+            log_format: LogFormat::Text,
+            log_filter: "info".into(),
+            master_key: None,
+        }
+    }
+}
+
+impl Settings {
+    /// When a worker that says nothing is given up.
+    pub fn lease(&self) -> Duration {
+        Duration::from_secs(self.lease_seconds)
+    }
+
+    /// How long an upload may pause.
+    pub fn upload_timeout(&self) -> Duration {
+        Duration::from_secs(self.upload_timeout_seconds)
+    }
+
+    /// When bytes that nobody published are removed.
+    pub fn abandoned_after(&self) -> Duration {
+        Duration::from_secs(self.abandoned_after_seconds)
+    }
+
+    /// How long work may take to end when the server stops.
+    pub fn stop_limit(&self) -> Duration {
+        Duration::from_secs(self.stop_seconds)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,225 @@
+//! Layers in their order, limits, and the file of defaults.
+use std::fs;
+use std::path::Path;
+
+use clap::{CommandFactory, Parser};
+use tempfile::NamedTempFile;
+
+use super::*;
+
+const SECRET: &str = "5ec2e75ec2e75ec2e75ec2e75ec2e75ec2e75ec2e75ec2e75ec2e75ec2e75ec2";
+
+/// Loads a file, variables and flags.
+fn layers(file: &str, variables: &[(&str, &str)], flags: &[&str]) -> Result<Settings, SettingsError> {
+    let path = NamedTempFile::with_suffix(".toml").unwrap();
+    fs::write(&path, file).unwrap();
+    let config = path.path().to_str().unwrap();
+    let flags = Flags::try_parse_from(["guardsplat-server", "--config", config].iter().chain(flags)).unwrap();
+    load(
+        flags,
+        variables
+            .iter()
+            .map(|(name, value)| (name.to_string(), value.to_string())),
+    )
+}
+
+fn error(file: &str, variables: &[(&str, &str)], flags: &[&str]) -> String {
+    layers(file, variables, flags).unwrap_err().to_string()
+}
+
+#[test]
+fn each_layer_overrides_the_one_before() {
+    let default = layers("", &[], &[]).unwrap();
+    assert_eq!(default.lease_seconds, 30);
+    let file = "lease_seconds = 31\nmax_attempts = 4\nembedded_worker = false\nworker_device = \"cpu\"";
+    let settings = layers(file, &[], &[]).unwrap();
+    assert_eq!(
+        (settings.lease_seconds, settings.max_attempts, settings.embedded_worker),
+        (31, 4, false)
+    );
+    assert_eq!(settings.worker_device, WorkerDevice::Cpu);
+    let variables = [
+        ("GUARDSPLAT_LEASE_SECONDS", "32"),
+        ("GUARDSPLAT_EMBEDDED_WORKER", "true"),
+    ];
+    let settings = layers(file, &variables, &[]).unwrap();
+    assert_eq!(
+        (settings.lease_seconds, settings.max_attempts, settings.embedded_worker),
+        (32, 4, true)
+    );
+    let settings = layers(
+        file,
+        &variables,
+        &["--lease-seconds", "33", "--embedded-worker", "false"],
+    )
+    .unwrap();
+    assert_eq!(
+        (settings.lease_seconds, settings.max_attempts, settings.embedded_worker),
+        (33, 4, false)
+    );
+}
+
+/// Every setting has a flag and a variable, and they mean the same.
+#[test]
+fn every_setting_can_be_set_everywhere() {
+    let values = [
+        ("listen", "[::1]:7000"),
+        ("data_dir", "/data"),
+        ("max_artifact_bytes", "1000"),
+        ("max_queued_jobs", "5"),
+        ("lease_seconds", "6"),
+        ("max_attempts", "7"),
+        ("upload_timeout_seconds", "8"),
+        ("abandoned_after_seconds", "9"),
+        ("embedded_worker", "false"),
+        ("worker_binary", "/bin/worker"),
+        ("worker_device", "wgpu"),
+        ("master_key_file", "/key"),
+        ("stop_seconds", "10"),
+        ("log_format", "json"),
+        ("log_filter", "debug,h2=warn"),
+    ];
+    let all = serde_json::to_value(Settings::default()).unwrap();
+    assert_eq!(
+        values.len(),
+        all.as_object().unwrap().len(),
+        "a setting is missing in this test"
+    );
+    let flags = Flags::command();
+    assert_eq!(
+        flags.get_arguments().filter(|a| a.get_id() != "config").count(),
+        values.len()
+    );
+    for (name, value) in values {
+        let variable = format!("GUARDSPLAT_{}", name.to_uppercase());
+        let flag = format!("--{}", name.replace('_', "-"));
+        let by_variable = layers("", &[(&variable, value)], &[]).unwrap();
+        let by_flag = layers("", &[], &[&flag, value]).unwrap();
+        let quoted = if value.parse::<u64>().is_ok() || value == "false" {
+            value.into()
+        } else {
+            format!("{value:?}")
+        };
+        let by_file = layers(&format!("{name} = {quoted}"), &[], &[]).unwrap();
+        let shown = |settings: &Settings| serde_json::to_value(settings).unwrap()[name].clone();
+        assert_ne!(shown(&by_flag), all[name], "{name} stays at its default");
+        assert_eq!(shown(&by_variable), shown(&by_flag), "{name}");
+        assert_eq!(shown(&by_file), shown(&by_flag), "{name}");
+    }
+}
+
+/// The file of defaults says what the defaults are: with every setting in it switched on, nothing changes.
+#[test]
+fn the_documented_file_equals_the_defaults() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/guardsplat-server.toml");
+    let text = fs::read_to_string(path).unwrap();
+    let as_json = |settings: &Settings| serde_json::to_value(settings).unwrap();
+    let defaults = as_json(&Settings::default());
+    assert_eq!(as_json(&layers(&text, &[], &[]).unwrap()), defaults);
+    for (name, value) in defaults.as_object().unwrap() {
+        // Settings without a default stand there as a comment, with an example.
+        let line = if value.is_null() {
+            format!("\n# {name} = ")
+        } else {
+            format!("\n{name} = ")
+        };
+        assert!(text.contains(&line), "{name} is not in the file of defaults");
+    }
+    let examples: String = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("# "))
+        .filter(|line| line.contains(" = "))
+        .fold(String::new(), |all, line| all + line + "\n");
+    layers(&examples, &[], &[]).unwrap();
+}
+
+#[test]
+fn unknown_settings_are_named() {
+    let text = error("max_atempts = 3", &[], &[]);
+    assert!(text.contains("unknown field `max_atempts`"), "{text}");
+    let text = error("", &[("GUARDSPLAT_MAX_ATEMPTS", "3")], &[]);
+    assert!(text.contains("unknown field `max_atempts`"), "{text}");
+    let text = error("[listen]\nport = 3", &[], &[]);
+    assert!(text.contains("listen"), "{text}");
+    // The master key is no setting.
+    assert!(error(&format!("master_key = \"{SECRET}\""), &[], &[]).contains("unknown field `master_key`"));
+}
+
+#[test]
+fn variables_of_others_do_not_matter() {
+    let variables = [
+        ("GUARDSPLAT_HOME", "/home"),
+        ("GUARDSPLAT_SERVER", "http://localhost:1"),
+        ("GUARDSPLAT_SERVICE_HOST", "10.0.0.1"),
+        ("GUARDSPLAT_PORT_50051_TCP_ADDR", "10.0.0.1"),
+        ("GUARDSPLAT_SERVER_PORT", "tcp://10.0.0.1:50051"),
+        ("GUARDSPLAT_LISTEN", ""),
+        ("LEASE_SECONDS", "1"),
+    ];
+    let settings = layers("", &variables, &[]).unwrap();
+    assert_eq!(
+        serde_json::to_value(settings).unwrap(),
+        serde_json::to_value(Settings::default()).unwrap()
+    );
+}
+
+#[test]
+fn bad_values_are_told_with_setting_and_limit() {
+    assert_eq!(
+        error("lease_seconds = 0", &[], &[]),
+        "setting lease_seconds: 0 is not between 1 and 86400"
+    );
+    assert_eq!(
+        error("", &[], &["--max-artifact-bytes", "0"]),
+        "setting max_artifact_bytes: 0 is not between 1 and 1099511627776"
+    );
+    assert_eq!(
+        error("", &[("GUARDSPLAT_MAX_ATTEMPTS", "101")], &[]),
+        "setting max_attempts: 101 is not between 1 and 100"
+    );
+    assert_eq!(error("data_dir = \"\"", &[], &[]), "setting data_dir: an empty path");
+    assert!(error("log_filter = \"info,=[\"", &[], &[]).starts_with("setting log_filter: "));
+    for (file, field) in [
+        ("max_attempts = -1", "max_attempts"),
+        ("max_attempts = 5000000000", "max_attempts"),
+        ("max_attempts = \"three\"", "max_attempts"),
+        ("listen = \"localhost\"", "listen"),
+        ("worker_device = \"gpu\"", "worker_device"),
+        ("log_format = \"xml\"", "log_format"),
+        ("embedded_worker = \"maybe\"", "embedded_worker"),
+    ] {
+        let text = error(file, &[], &[]);
+        assert!(text.contains(field), "{file}: {text}");
+    }
+}
+
+#[test]
+fn a_file_that_is_missing_or_no_toml_is_named() {
+    let flags = Flags {
+        config: Some("/nowhere/server.toml".into()),
+        ..Flags::default()
+    };
+    let text = load(flags, []).unwrap_err().to_string();
+    assert!(text.contains("/nowhere/server.toml"), "{text}");
+    let text = error("lease_seconds = ", &[], &[]);
+    assert!(text.contains("lease_seconds"), "{text}");
+}
+
+#[test]
+fn the_master_key_is_not_shown() {
+    let settings = layers("", &[("GUARDSPLAT_MASTER_KEY", SECRET)], &[]).unwrap();
+    assert!(settings.master_key.is_some());
+    assert!(!format!("{settings:?}").contains("5ec2e7"));
+    assert!(!serde_json::to_string(&settings).unwrap().contains("5ec2e7"));
+    assert!(
+        layers("", &[("GUARDSPLAT_MASTER_KEY", "")], &[])
+            .unwrap()
+            .master_key
+            .is_none()
+    );
+}
+
+#[test]
+fn the_command_line_is_sound() {
+    Flags::command().debug_assert();
+}
