@@ -1,1 +1,9 @@
-//! The GuardSplat server: API, job ledger, keys and claims. Empty so far: the engine in `worker` comes first.
+//! The GuardSplat server: API, job ledger, keys and claims. No GPU code.
+pub mod api;
+pub mod artifacts;
+pub mod embedded;
+pub mod error;
+pub mod ledger;
+pub mod run;
+pub mod secrets;
+pub mod settings;

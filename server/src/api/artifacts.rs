@@ -1,0 +1,110 @@
+//! `ArtifactService`: scenes and pictures, in and out.
+use futures::stream::{self, BoxStream, StreamExt};
+use guardsplat_proto::v1::artifact_service_server::ArtifactService;
+use guardsplat_proto::v1::{
+    Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, GetArtifactRequest,
+    UploadArtifactRequest, download_artifact_response,
+};
+use tonic::{Request, Response, Status, Streaming};
+use uuid::Uuid;
+
+use super::names::Kind;
+use super::status::chain;
+use super::upload::{self, Incoming};
+use super::{Api, clock, convert};
+use crate::artifacts::ArtifactPath;
+use crate::error::{Error, Result};
+use crate::ledger::{ArtifactRow, NewArtifact, Origin};
+
+#[tonic::async_trait]
+impl ArtifactService for Api {
+    async fn upload_artifact(
+        &self,
+        request: Request<Streaming<UploadArtifactRequest>>,
+    ) -> Result<Response<Artifact>, Status> {
+        let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
+        let row = self.within_upload_time(self.receive_upload(incoming)).await?;
+        Ok(Response::new(convert::artifact(row)))
+    }
+
+    type DownloadArtifactStream = BoxStream<'static, Result<DownloadArtifactResponse, Status>>;
+
+    async fn download_artifact(
+        &self,
+        request: Request<DownloadArtifactRequest>,
+    ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
+        let DownloadArtifactRequest { name, offset } = request.into_inner();
+        let row = self.artifact(&name).await?;
+        let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
+        let path = ArtifactPath::parse(&row.path).map_err(Error::from)?;
+        let bytes = self.store().read(&path, offset).await.map_err(Error::from)?;
+        let respond = |payload| DownloadArtifactResponse { payload: Some(payload) };
+        let first = respond(download_artifact_response::Payload::Artifact(convert::artifact(row)));
+        let rest = bytes.into_stream().map(move |chunk| match chunk {
+            Ok(chunk) => Ok(respond(download_artifact_response::Payload::Chunk(chunk.into()))),
+            Err(error) => Err(Error::from(error).into()),
+        });
+        Ok(Response::new(stream::iter([Ok(first)]).chain(rest).boxed()))
+    }
+
+    async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
+        let row = self.artifact(&request.get_ref().name).await?;
+        Ok(Response::new(convert::artifact(row)))
+    }
+
+    async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
+        let row = self.artifact(&request.get_ref().name).await?;
+        self.ledger()
+            .delete_artifact(row.id, clock::now())
+            .await
+            .map_err(Error::from)?;
+        // It is gone for everybody from here on. What is left of it is collected later if this fails.
+        if let Err(error) = self.remove_bytes(&row).await {
+            tracing::warn!(artifact = %row.id, error = %chain(&error), "the bytes of a deleted artifact are left for later");
+        }
+        Ok(Response::new(()))
+    }
+}
+
+impl Api {
+    /// A visible artifact by its name.
+    async fn artifact(&self, name: &str) -> Result<ArtifactRow> {
+        let id = Kind::Artifact.parse("name", name)?;
+        self.ledger()
+            .get_artifact(id)
+            .await?
+            .ok_or_else(|| Kind::Artifact.not_found(id))
+    }
+
+    async fn receive_upload(&self, mut incoming: Incoming<UploadArtifactRequest>) -> Result<ArtifactRow, Status> {
+        let metadata = incoming.metadata().await?;
+        let announced = upload::announced("metadata", &metadata)?;
+        let id = Uuid::now_v7();
+        let path = ArtifactPath::upload(id);
+        // The writer comes first: it refuses what is too large. It leaves nothing if it is dropped.
+        let mut writer = self.store().write(&path, announced).await.map_err(Error::from)?;
+        let new = NewArtifact {
+            id,
+            display_name: metadata.display_name,
+            size: metadata.size_bytes,
+            sha256: metadata.sha256,
+            origin: Origin::Upload,
+            secret: false,
+            path: path.to_string(),
+        };
+        // The row comes before the file does, so that no file is ever without one.
+        self.ledger()
+            .create_artifact(new, clock::now())
+            .await
+            .map_err(Error::from)?;
+        while let Some(chunk) = incoming.chunk().await? {
+            writer.chunk(chunk).await.map_err(Error::from)?;
+        }
+        writer.finish().await.map_err(Error::from)?;
+        Ok(self
+            .ledger()
+            .artifact_ready(id, None, clock::now())
+            .await
+            .map_err(Error::from)?)
+    }
+}

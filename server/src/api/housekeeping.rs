@@ -1,0 +1,80 @@
+//! What has to be done without anybody asking: ending leases that have expired, and deleting what nobody can want.
+use std::time::Duration;
+
+use tokio::time::{Instant, interval};
+
+use super::status::chain;
+use super::{Api, clock};
+use crate::artifacts::ArtifactPath;
+use crate::error::Result;
+use crate::ledger::ArtifactRow;
+
+/// How late an expired lease may be noticed.
+const REAP_EVERY: Duration = Duration::from_secs(1);
+/// How often abandoned bytes are looked for, at most.
+const COLLECT_EVERY: Duration = Duration::from_secs(10);
+/// Artifacts deleted at one go.
+const COLLECT_AT_ONCE: u32 = 100;
+
+/// Keeps house until the API is stopped. A failure is logged, and tried again the next time.
+pub async fn housekeeping(api: Api) {
+    let started = clock::now();
+    let mut stopping = api.changes().listen();
+    let mut ticks = interval(REAP_EVERY);
+    let collect_every = COLLECT_EVERY.min(api.limits().abandoned_after);
+    let mut collected: Option<Instant> = None;
+    loop {
+        tokio::select! {
+            () = stopping.stopped() => return,
+            _ = ticks.tick() => {}
+        }
+        if let Err(error) = api.reap().await {
+            tracing::error!(error = %chain(&error), "expired leases could not be ended");
+        }
+        if collected.is_none_or(|at| at.elapsed() >= collect_every) {
+            collected = Some(Instant::now());
+            if let Err(error) = api.collect(started).await {
+                tracing::error!(error = %chain(&error), "abandoned artifacts could not be deleted");
+            }
+        }
+    }
+}
+
+impl Api {
+    /// Ends attempts whose lease has expired.
+    pub(super) async fn reap(&self) -> Result<()> {
+        let ended = self.ledger().reap(clock::now()).await?;
+        for &job in &ended {
+            tracing::warn!(%job, "the lease has expired: its worker is gone");
+            self.reports().forget(job);
+            self.changes().job(job);
+        }
+        if !ended.is_empty() {
+            self.changes().queue_grew();
+            self.changes().queue_moved();
+        }
+        Ok(())
+    }
+
+    /// Deletes what uploads and attempts left behind. What was begun before this server was `started` is nobody's any
+    /// more, as a folder has one server; what was begun since may still be arriving for as long as that is allowed.
+    pub(super) async fn collect(&self, started: i64) -> Result<()> {
+        let longest = clock::micros(self.limits().abandoned_after);
+        let older_than = started.max(clock::now().saturating_sub(longest));
+        let abandoned = self.ledger().abandoned_artifacts(older_than, COLLECT_AT_ONCE).await?;
+        for artifact in &abandoned {
+            match self.remove_bytes(artifact).await {
+                Ok(()) => tracing::info!(artifact = %artifact.id, "deleted what was abandoned"),
+                // The others are not to wait for this one.
+                Err(error) => tracing::error!(artifact = %artifact.id, error = %chain(&error), "could not be deleted"),
+            }
+        }
+        Ok(())
+    }
+
+    /// Deletes the bytes of an artifact that the ledger no longer shows, then its row.
+    pub(super) async fn remove_bytes(&self, artifact: &ArtifactRow) -> Result<()> {
+        self.store().delete(&ArtifactPath::parse(&artifact.path)?).await?;
+        Ok(self.ledger().forget_artifact(artifact.id).await?)
+    }
+}

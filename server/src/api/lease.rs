@@ -1,0 +1,119 @@
+//! `LeaseJob` and `DownloadKey`: how a worker gets a job and the key that it needs.
+use std::time::Duration;
+
+use futures::stream::{self, BoxStream, StreamExt};
+use guardsplat_proto::v1::{DownloadKeyResponse, EmbedSpec, LeaseJobRequest, LeaseJobResponse, VerifySpec};
+use secrecy::ExposeSecret;
+use tokio::sync::oneshot;
+use tokio::time::Instant;
+use tonic::Status;
+
+use super::changes::For;
+use super::names::Kind;
+use super::status::chain;
+use super::{Api, clock, convert, text};
+use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
+use crate::error::{Error, Result};
+use crate::ledger::{JobKind, JobRow, KeyId, Lease};
+
+const MAX_WAIT: Duration = Duration::from_secs(60);
+/// How late a job is found that became ready by time alone, after a failed attempt.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
+
+impl Api {
+    /// Leases a job, waiting for one if need be.
+    pub(super) async fn lease(&self, request: LeaseJobRequest) -> Result<LeaseJobResponse> {
+        let LeaseJobRequest { worker, wait } = request;
+        if worker.is_empty() {
+            return Err(Error::invalid("worker", "is missing"));
+        }
+        text::display_name("worker", &worker)?;
+        let wait = clock::duration(wait.unwrap_or_default()).filter(|&wait| wait <= MAX_WAIT);
+        let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
+        let end = Instant::now() + wait;
+        let mut listener = self.changes().listen();
+        loop {
+            listener.check_running()?;
+            if let Some(lease) = self.claim(&worker).await? {
+                return Ok(LeaseJobResponse {
+                    job: Some(convert::job(lease.job)?),
+                    lease_token: lease.token,
+                    lease_duration: Some(clock::proto_duration(self.limits().lease)),
+                });
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(LeaseJobResponse::default());
+            }
+            listener.wait(For::Work, left.min(LOOK_AGAIN)).await?;
+        }
+    }
+
+    /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
+    /// attempt would be lost, and the time of a lease with it.
+    async fn claim(&self, worker: &str) -> Result<Option<Lease>> {
+        let (send, receive) = oneshot::channel();
+        let (api, worker) = (self.clone(), worker.to_owned());
+        tokio::spawn(async move {
+            let claimed = api.ledger().claim(&worker, api.limits().lease, clock::now()).await;
+            if let Ok(Some(lease)) = &claimed {
+                tracing::info!(job = %lease.job.id, worker, attempt = lease.job.attempt, "job given to a worker");
+                api.changes().job(lease.job.id);
+                api.changes().queue_moved();
+            }
+            if let Err(Ok(Some(lease))) = send.send(claimed) {
+                let id = lease.job.id;
+                match api.ledger().release(id, &lease.token, clock::now()).await {
+                    Ok(_) => api.changes().job(id),
+                    Err(error) => {
+                        tracing::warn!(job = %id, error = %chain(&error), "not taken back from a worker that left");
+                    }
+                }
+                api.changes().queue_grew();
+            }
+        });
+        let claimed = receive
+            .await
+            .map_err(|error| Error::internal("claiming a job", error))?;
+        Ok(claimed?)
+    }
+
+    /// The key file that a leased job needs, for whoever has the lease.
+    pub(super) async fn send_key(
+        &self,
+        job: &str,
+        token: &str,
+    ) -> Result<BoxStream<'static, Result<DownloadKeyResponse, Status>>> {
+        let id = Kind::Job.parse("job", job)?;
+        let job = self.ledger().leased_job(id, token).await?;
+        let id = needed_key(&job)?.ok_or_else(|| Error::invalid("job", "is the name of a job that needs no key"))?;
+        let key = self
+            .ledger()
+            .get_key(id)
+            .await?
+            .ok_or_else(|| Kind::Key.not_found(id))?;
+        let file = self.ledger().get_any_artifact(key.artifact).await?;
+        let file = file.ok_or_else(|| Error::internal("finding a key file", "the ledger has no such artifact"))?;
+        let secret = self
+            .store()
+            .read_sealed(&ArtifactPath::parse(&file.path)?, self.master())
+            .await?;
+        // Chunks are made when they are sent, and the whole is wiped when the stream ends.
+        let chunks = stream::unfold((secret, 0), |(secret, at)| async move {
+            let chunk = secret.expose_secret().get(at..).filter(|rest| !rest.is_empty())?;
+            let chunk = chunk[..chunk.len().min(CHUNK_BYTES)].to_vec();
+            let next = at + chunk.len();
+            Some((Ok(DownloadKeyResponse { chunk }), (secret, next)))
+        });
+        Ok(chunks.boxed())
+    }
+}
+
+fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
+    let name = match job.kind {
+        JobKind::Embed => convert::decode::<EmbedSpec>(&job.spec)?.key,
+        JobKind::Verify => convert::decode::<VerifySpec>(&job.spec)?.key,
+        JobKind::CreateKey => return Ok(None),
+    };
+    Kind::Key.parse("job.key", &name).map(Some)
+}

@@ -1,0 +1,33 @@
+//! The listener: the transport's settings, and calls until somebody says stop.
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+use tonic::service::Routes;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+
+use super::deadline::Deadlines;
+use crate::error::{Error, Result};
+
+/// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
+const KEEPALIVE: Duration = Duration::from_secs(30);
+const KEEPALIVE_ANSWER: Duration = Duration::from_secs(10);
+
+/// Calls of one connection at a time; more wait. Long answers, such as `WatchJob`'s, count until they end.
+const CALLS_AT_ONCE: u32 = 256;
+
+/// Answers calls until `shutdown`, then finishes those that have begun.
+pub async fn serve(routes: Routes, listener: TcpListener, shutdown: impl Future<Output = ()>) -> Result<()> {
+    // Set here because tonic's own setting is for listeners that it makes itself.
+    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+    Server::builder()
+        .max_concurrent_streams(CALLS_AT_ONCE)
+        .concurrency_limit_per_connection(CALLS_AT_ONCE as usize)
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
+        .layer(Deadlines)
+        .add_routes(routes)
+        .serve_with_incoming_shutdown(incoming, shutdown)
+        .await
+        .map_err(|error| Error::internal("the listener", error))
+}

@@ -1,0 +1,164 @@
+//! The API over gRPC: the four services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+use std::sync::Arc;
+use std::time::Duration;
+
+use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
+use guardsplat_proto::v1::job_service_server::JobServiceServer;
+use guardsplat_proto::v1::key_service_server::KeyServiceServer;
+use guardsplat_proto::v1::worker_service_server::WorkerServiceServer;
+use tonic::Status;
+use tonic::service::Routes;
+
+use crate::artifacts::ArtifactStore;
+use crate::error::{Error, Result};
+use crate::ledger::Ledger;
+use crate::secrets::MasterKey;
+
+mod artifacts;
+mod changes;
+mod clock;
+mod completion;
+mod convert;
+mod deadline;
+mod housekeeping;
+mod jobs;
+mod keys;
+mod lease;
+mod listen;
+mod message;
+mod names;
+mod output;
+mod page;
+mod problems;
+mod progress;
+mod refusals;
+mod status;
+mod submission;
+#[cfg(test)]
+mod tests;
+mod text;
+mod token;
+mod upload;
+mod watch;
+mod worker;
+
+pub use housekeeping::housekeeping;
+pub use listen::serve;
+
+/// Largest message that is read, as tonic has it by default: large things never travel in one message.
+const MAX_MESSAGE: usize = 4 << 20;
+
+/// What the API holds its callers to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// A lease ends when nothing was reported for so long.
+    pub lease: Duration,
+    /// Attempts of a job before it is given up.
+    pub max_attempts: i32,
+    /// Jobs that may wait; more are refused.
+    pub max_queued: u64,
+    /// An upload of which nothing arrives for so long is broken off.
+    pub upload_idle: Duration,
+    /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
+    pub abandoned_after: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            lease: Duration::from_secs(30),
+            max_attempts: 3,
+            max_queued: 10_000,
+            upload_idle: Duration::from_secs(60),
+            abandoned_after: Duration::from_secs(24 * 60 * 60),
+        }
+    }
+}
+
+/// What the four services share. Cheap to clone.
+#[derive(Clone)]
+pub struct Api {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    ledger: Arc<dyn Ledger>,
+    store: ArtifactStore,
+    master: MasterKey,
+    limits: Limits,
+    changes: changes::Changes,
+    reports: progress::Reports,
+}
+
+impl Api {
+    /// The API over a ledger, a store and the key that secrets are sealed with.
+    pub fn new(ledger: Arc<dyn Ledger>, store: ArtifactStore, master: MasterKey, limits: Limits) -> Self {
+        let shared = Shared {
+            ledger,
+            store,
+            master,
+            limits,
+            changes: changes::Changes::default(),
+            reports: progress::Reports::default(),
+        };
+        Self {
+            shared: Arc::new(shared),
+        }
+    }
+
+    /// The four services and reflection. Health, which knows more than the API, is added by the caller.
+    pub fn routes(&self) -> Result<Routes> {
+        let reflection = || {
+            tonic_reflection::server::Builder::configure()
+                .register_encoded_file_descriptor_set(guardsplat_proto::FILE_DESCRIPTORS)
+                .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+                .register_encoded_file_descriptor_set(tonic_types::pb::FILE_DESCRIPTOR_SET)
+        };
+        let failed = |error| Error::internal("setting up reflection", error);
+        Ok(
+            Routes::new(JobServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(reflection().build_v1().map_err(failed)?)
+                .add_service(reflection().build_v1alpha().map_err(failed)?),
+        )
+    }
+
+    /// Begins the end: no more jobs are leased, and calls that wait (`LeaseJob`, `WatchJob`) end with `UNAVAILABLE`.
+    /// Workers can still hand back and complete what they have.
+    pub fn stop(&self) {
+        self.shared.changes.stop();
+    }
+
+    fn ledger(&self) -> &dyn Ledger {
+        self.shared.ledger.as_ref()
+    }
+
+    fn store(&self) -> &ArtifactStore {
+        &self.shared.store
+    }
+
+    fn master(&self) -> &MasterKey {
+        &self.shared.master
+    }
+
+    fn limits(&self) -> &Limits {
+        &self.shared.limits
+    }
+
+    fn changes(&self) -> &changes::Changes {
+        &self.shared.changes
+    }
+
+    fn reports(&self) -> &progress::Reports {
+        &self.shared.reports
+    }
+
+    /// Breaks off an upload that takes so long that its bytes would count as abandoned.
+    async fn within_upload_time<T>(&self, upload: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+        let longest = self.limits().abandoned_after;
+        let done = tokio::time::timeout(longest, upload).await;
+        done.map_err(|_| Error::UploadTooSlow(longest))?
+    }
+}

@@ -1,0 +1,12 @@
+//! The API over a real socket, with a real ledger and a real folder, called through generated clients.
+mod artifacts;
+mod harness;
+mod housekeeping;
+mod jobs;
+mod keys;
+mod lists;
+mod submissions;
+mod transport;
+mod watch;
+mod worker;
+mod zombie;

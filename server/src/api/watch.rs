@@ -1,0 +1,156 @@
+//! `WatchJob`: a job as it stands, then again whenever it changes, until it is over.
+use std::time::Duration;
+
+use futures::stream::{self, BoxStream, StreamExt};
+use guardsplat_proto::v1::WatchJobResponse;
+use tonic::Status;
+
+use super::changes::{For, Heard, Listener};
+use super::names::Kind;
+use super::{Api, convert, token};
+use crate::error::{Error, Result};
+use crate::ledger::{JobId, JobRow, JobState};
+
+/// How late a change is heard of that was not announced in this process.
+const LOOK_AGAIN: Duration = Duration::from_secs(2);
+/// A queue that moves fast is told of so often at most.
+const POSITION_EVERY: Duration = Duration::from_millis(500);
+
+/// What of a job a watcher has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Seen {
+    revision: i64,
+    /// Changes without the job itself changing.
+    position: Option<i64>,
+}
+
+impl Seen {
+    fn of(row: &JobRow) -> Self {
+        let position = row.queue_position.filter(|_| row.state == JobState::Queued);
+        Self {
+            revision: row.revision,
+            position,
+        }
+    }
+
+    /// The cursor that resumes behind this, good for this job only.
+    fn cursor(self, id: JobId) -> String {
+        let mut payload = [0; 16];
+        payload[..8].copy_from_slice(&self.revision.to_be_bytes());
+        payload[8..].copy_from_slice(&self.position.unwrap_or(-1).to_be_bytes());
+        token::seal(&[b"watch", id.as_bytes()], &payload)
+    }
+
+    fn parse(id: JobId, cursor: &str) -> Result<Option<Self>> {
+        if cursor.is_empty() {
+            return Ok(None);
+        }
+        let payload: [u8; 16] = token::open(&[b"watch", id.as_bytes()], cursor)
+            .ok_or_else(|| Error::invalid("cursor", "is not a cursor of this job"))?;
+        let number = |at: usize| i64::from_be_bytes(std::array::from_fn(|i| payload[at + i]));
+        Ok(Some(Self {
+            revision: number(0),
+            position: Some(number(8)).filter(|&p| p >= 0),
+        }))
+    }
+}
+
+/// Begins to watch. The ledger is read when the stream is: one who reads slowly skips what happened in between, and
+/// holds up nobody.
+pub async fn watch(api: Api, name: &str, cursor: &str) -> Result<BoxStream<'static, Result<WatchJobResponse, Status>>> {
+    let id = Kind::Job.parse("name", name)?;
+    let seen = Seen::parse(id, cursor)?;
+    // From before the first look, so that no change falls in between.
+    let listener = api.changes().listen();
+    let watcher = Watcher {
+        api,
+        listener,
+        id,
+        seen,
+        over: false,
+    };
+    // A job that is not there is told at once, not from within the stream.
+    watcher.row().await?;
+    Ok(stream::unfold(Some(watcher), |watcher| async {
+        let mut watcher = watcher?;
+        match watcher.next().await {
+            Ok(Some(message)) => Some((Ok(message), Some(watcher))),
+            Ok(None) => None,
+            Err(error) => Some((Err(error.into()), None)),
+        }
+    })
+    .boxed())
+}
+
+struct Watcher {
+    api: Api,
+    listener: Listener,
+    id: JobId,
+    seen: Option<Seen>,
+    over: bool,
+}
+
+impl Watcher {
+    async fn row(&self) -> Result<JobRow> {
+        let row = self.api.ledger().get_job(self.id).await?;
+        row.ok_or_else(|| Kind::Job.not_found(self.id))
+    }
+
+    async fn next(&mut self) -> Result<Option<WatchJobResponse>> {
+        loop {
+            if self.over {
+                return Ok(None);
+            }
+            let row = self.row().await?;
+            let (seen, state) = (Seen::of(&row), row.state);
+            let before = self.seen.replace(seen);
+            self.over = state.is_over();
+            if before != Some(seen) {
+                let cursor = seen.cursor(self.id);
+                return Ok(Some(WatchJobResponse {
+                    job: Some(convert::job(row)?),
+                    cursor,
+                }));
+            }
+            if !self.over {
+                self.wait(state).await?;
+            }
+        }
+    }
+
+    async fn wait(&mut self, state: JobState) -> Result<()> {
+        if state != JobState::Queued {
+            self.listener.wait(For::Job(self.id), LOOK_AGAIN).await?;
+            return Ok(());
+        }
+        let heard = self.listener.wait(For::QueuedJob(self.id), LOOK_AGAIN).await?;
+        if heard == Heard::Moved {
+            // Others may leave the queue one upon the other; they are told of together.
+            self.listener.wait(For::Job(self.id), POSITION_EVERY).await?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use uuid::Uuid;
+
+    use super::*;
+
+    #[test]
+    fn cursors_belong_to_one_job() {
+        let (a, b) = (Uuid::now_v7(), Uuid::now_v7());
+        for position in [None, Some(0), Some(7)] {
+            let seen = Seen { revision: 3, position };
+            assert_eq!(Seen::parse(a, &seen.cursor(a)).unwrap(), Some(seen));
+            assert!(
+                Seen::parse(b, &seen.cursor(a))
+                    .unwrap_err()
+                    .to_string()
+                    .starts_with("cursor:")
+            );
+        }
+        assert_eq!(Seen::parse(a, "").unwrap(), None);
+    }
+}

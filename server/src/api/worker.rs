@@ -1,0 +1,172 @@
+//! `WorkerService`: what workers say to the server.
+use std::time::Instant;
+
+use futures::stream::BoxStream;
+use guardsplat_proto::v1::worker_service_server::WorkerService;
+use guardsplat_proto::v1::{
+    Artifact, CompleteJobRequest, CompleteJobResponse, DownloadKeyRequest, DownloadKeyResponse, FailJobRequest,
+    FailJobResponse, Failure, LeaseJobRequest, LeaseJobResponse, Progress, ReleaseJobRequest, ReleaseJobResponse,
+    ReportJobRequest, ReportJobResponse, UploadOutputRequest, failure, progress,
+};
+use prost::Message as _;
+use tonic::{Request, Response, Status, Streaming};
+
+use super::names::Kind;
+use super::problems::Problems;
+use super::upload::Incoming;
+use super::{Api, clock, completion, convert, text};
+use crate::error::{Error, Result};
+use crate::ledger;
+
+/// Most bytes of a failure's message; the rest is cut off.
+const MAX_FAILURE_BYTES: usize = 4 << 10;
+
+#[tonic::async_trait]
+impl WorkerService for Api {
+    async fn lease_job(&self, request: Request<LeaseJobRequest>) -> Result<Response<LeaseJobResponse>, Status> {
+        Ok(Response::new(self.lease(request.into_inner()).await?))
+    }
+
+    async fn report_job(&self, request: Request<ReportJobRequest>) -> Result<Response<ReportJobResponse>, Status> {
+        let cancel_requested = self.report(request.into_inner()).await?;
+        Ok(Response::new(ReportJobResponse { cancel_requested }))
+    }
+
+    async fn upload_output(
+        &self,
+        request: Request<Streaming<UploadOutputRequest>>,
+    ) -> Result<Response<Artifact>, Status> {
+        let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
+        let row = self.within_upload_time(self.receive_output(incoming)).await?;
+        Ok(Response::new(convert::artifact(row)))
+    }
+
+    type DownloadKeyStream = BoxStream<'static, Result<DownloadKeyResponse, Status>>;
+
+    async fn download_key(
+        &self,
+        request: Request<DownloadKeyRequest>,
+    ) -> Result<Response<Self::DownloadKeyStream>, Status> {
+        let DownloadKeyRequest { job, lease_token } = request.into_inner();
+        Ok(Response::new(self.send_key(&job, &lease_token).await?))
+    }
+
+    async fn complete_job(
+        &self,
+        request: Request<CompleteJobRequest>,
+    ) -> Result<Response<CompleteJobResponse>, Status> {
+        let CompleteJobRequest {
+            name,
+            lease_token,
+            result,
+        } = request.into_inner();
+        let id = Kind::Job.parse("name", &name)?;
+        let job = self.ledger().leased_job(id, &lease_token).await.map_err(Error::from)?;
+        let completion::Completion { result, outputs, key } = completion::check(&job, result)?;
+        let done = self
+            .ledger()
+            .complete(id, &lease_token, result, outputs, key, clock::now())
+            .await;
+        done.map_err(Error::from)?;
+        self.attempt_over(id);
+        Ok(Response::new(CompleteJobResponse {}))
+    }
+
+    async fn fail_job(&self, request: Request<FailJobRequest>) -> Result<Response<FailJobResponse>, Status> {
+        let FailJobRequest {
+            name,
+            lease_token,
+            failure,
+            retryable,
+            cancelled,
+        } = request.into_inner();
+        let id = Kind::Job.parse("name", &name)?;
+        let failure = if cancelled {
+            None
+        } else {
+            Some(checked_failure(failure)?)
+        };
+        let failed = self
+            .ledger()
+            .fail(id, &lease_token, failure, retryable, cancelled, clock::now())
+            .await;
+        failed.map_err(Error::from)?;
+        self.attempt_over(id);
+        Ok(Response::new(FailJobResponse {}))
+    }
+
+    async fn release_job(&self, request: Request<ReleaseJobRequest>) -> Result<Response<ReleaseJobResponse>, Status> {
+        let ReleaseJobRequest { name, lease_token } = request.into_inner();
+        let id = Kind::Job.parse("name", &name)?;
+        self.ledger()
+            .release(id, &lease_token, clock::now())
+            .await
+            .map_err(Error::from)?;
+        self.attempt_over(id);
+        Ok(Response::new(ReleaseJobResponse {}))
+    }
+}
+
+impl Api {
+    /// Writes a report, or holds it back for a moment; either way says whether the job is to end.
+    async fn report(&self, request: ReportJobRequest) -> Result<bool> {
+        let ReportJobRequest {
+            name,
+            lease_token: token,
+            progress,
+        } = request;
+        let id = Kind::Job.parse("name", &name)?;
+        let progress = progress.map(encoded_progress).transpose()?;
+        let (lease, now) = (self.limits().lease, Instant::now());
+        let Some(progress) = self.reports().due(id, &token, progress, lease, now) else {
+            return Ok(self.ledger().leased_job(id, &token).await?.cancel_requested);
+        };
+        let changed = progress.is_some();
+        let cancel_requested = self.ledger().report(id, &token, progress, lease, clock::now()).await?;
+        self.reports().written(id, &token, now);
+        if changed {
+            self.changes().job(id);
+        }
+        Ok(cancel_requested)
+    }
+
+    /// Tells those who wait that an attempt has ended, however it did: the job may be queued again.
+    fn attempt_over(&self, id: ledger::JobId) {
+        self.reports().forget(id);
+        self.changes().job(id);
+        self.changes().queue_grew();
+        self.changes().queue_moved();
+    }
+}
+
+fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
+    let mut problems = Problems::default();
+    let stage = progress::Stage::try_from(progress.stage).ok();
+    let known = stage.is_some_and(|stage| stage != progress::Stage::Unspecified);
+    problems.check(known, "progress.stage", "is missing or not known");
+    problems.check(progress.done >= 0, "progress.done", "is negative");
+    problems.check(progress.total >= 0, "progress.total", "is negative");
+    problems.finish()?;
+    Ok(progress.encode_to_vec())
+}
+
+fn checked_failure(failure: Option<Failure>) -> Result<ledger::Failure> {
+    use failure::Reason;
+    let failure = failure.ok_or_else(|| Error::invalid("failure", "is missing, and the job was not cancelled"))?;
+    match Reason::try_from(failure.reason) {
+        Ok(Reason::InvalidInput | Reason::TargetMissed | Reason::WorkerLost | Reason::Internal) => {}
+        Ok(Reason::AttemptsExhausted) => {
+            return Err(Error::invalid(
+                "failure.reason",
+                "only the server knows that attempts are used up",
+            ));
+        }
+        Ok(Reason::Unspecified) | Err(_) => {
+            return Err(Error::invalid("failure.reason", "is missing or not known"));
+        }
+    }
+    Ok(ledger::Failure {
+        reason: failure.reason,
+        message: text::shortened(failure.message, MAX_FAILURE_BYTES),
+    })
+}

@@ -1,0 +1,134 @@
+//! The server's one error type: what happened, told so that the caller can do something about it.
+//! What it becomes on the wire is decided in one place, `api::status`.
+use std::error::Error as StdError;
+use std::time::Duration;
+
+use uuid::Uuid;
+
+/// A result of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// A field of a request that is not what it must be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Violation {
+    /// Path of the field in the request, such as `job.embed.message`.
+    pub field: String,
+    /// What is wrong with it, and the limit.
+    pub description: String,
+}
+
+/// What went wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A request that can't be carried out as it is, whoever sends it and whenever.
+    #[error("{}", list(.0))]
+    Invalid(Vec<Violation>),
+    /// A resource that is not there.
+    #[error("{name} does not exist")]
+    NotFound {
+        /// Its kind: `job`, `artifact` or `key`.
+        kind: &'static str,
+        /// Its full name.
+        name: String,
+    },
+    /// A request id that stands for another request.
+    #[error("request_id {request_id} was used for another job")]
+    RequestIdReused {
+        /// The id.
+        request_id: Uuid,
+    },
+    /// A job that is over, and so stays as it is.
+    #[error("{name} is finished")]
+    Finished {
+        /// The job's full name.
+        name: String,
+    },
+    /// A job that nobody asked to end, reported as cancelled.
+    #[error("nobody asked for {name} to be cancelled")]
+    NotCancelled {
+        /// The job's full name.
+        name: String,
+    },
+    /// An artifact that a waiting or running job needs.
+    #[error("{name} is needed by a job that is not finished")]
+    InUse {
+        /// The artifact's full name.
+        name: String,
+    },
+    /// A lease token that is not, or no longer, the job's.
+    #[error("the lease of {name} is lost: its token is not the one that the job was given out with last")]
+    LeaseLost {
+        /// The job's full name.
+        name: String,
+    },
+    /// Too many jobs wait already.
+    #[error("{limit} jobs are waiting, and no more are taken")]
+    QueueFull {
+        /// Most jobs that may wait.
+        limit: u64,
+        /// When to try again.
+        retry_after: Duration,
+    },
+    /// The server is going down.
+    #[error("the server is stopping")]
+    Stopping,
+    /// An upload whose sender fell silent.
+    #[error("nothing of the upload arrived for {} s", .0.as_secs())]
+    UploadStalled(Duration),
+    /// An upload that took longer than bytes are kept that nobody finished.
+    #[error("the upload was not finished after {} s", .0.as_secs())]
+    UploadTooSlow(Duration),
+    /// The deadline that the caller set has passed.
+    #[error("the deadline has passed")]
+    DeadlineExceeded,
+    /// There is no room to store something.
+    #[error("no space is left to store artifacts")]
+    NoSpace,
+    /// The ledger or the store can't be reached now.
+    #[error("{what} is not available")]
+    Unavailable {
+        /// What is not.
+        what: &'static str,
+        /// Why, for the log.
+        #[source]
+        source: Box<dyn StdError + Send + Sync>,
+    },
+    /// Something that no caller can help.
+    #[error("{what} failed")]
+    Internal {
+        /// What was tried.
+        what: &'static str,
+        /// Why, for the log.
+        #[source]
+        source: Box<dyn StdError + Send + Sync>,
+    },
+    /// The server can't start or go on: a setting, a folder, an address.
+    #[error("{0}")]
+    Startup(String),
+}
+
+impl Error {
+    /// One field is wrong.
+    pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
+        Self::Invalid(vec![Violation {
+            field: field.into(),
+            description: description.into(),
+        }])
+    }
+
+    /// Something failed that no caller can help.
+    pub fn internal(what: &'static str, source: impl Into<Box<dyn StdError + Send + Sync>>) -> Self {
+        Self::Internal {
+            what,
+            source: source.into(),
+        }
+    }
+}
+
+fn list(violations: &[Violation]) -> String {
+    let each: Vec<_> = violations
+        .iter()
+        .map(|v| format!("{}: {}", v.field, v.description))
+        .collect();
+    each.join("; ")
+}

@@ -1,0 +1,174 @@
+//! The server as a whole: opens what it keeps, answers calls, looks after its worker, and stops in good order.
+mod folder;
+mod health;
+
+use std::io::Write as _;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, timeout, timeout_at};
+
+use crate::api::{self, Api, Limits};
+use crate::artifacts::ArtifactStore;
+use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
+use crate::error::{Error, Result};
+use crate::ledger::SqliteLedger;
+use crate::secrets::{self, KeySource};
+use crate::settings::Settings;
+use folder::DataFolder;
+use health::Health;
+
+/// Calls that have begun get at least so long to end, even if the worker took all the time there was.
+const LEAST_DRAIN: Duration = Duration::from_secs(1);
+
+/// Runs a server until `shutdown`. Says on standard output where it listens, once it does.
+pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Result<()> {
+    let server = Server::open(settings).await?;
+    // Nobody may be reading, which is no reason to stop.
+    let _ = writeln!(std::io::stdout(), "listening on http://{}", server.address());
+    server.run(shutdown).await
+}
+
+/// A server that listens, and does not answer yet.
+pub struct Server {
+    settings: Settings,
+    listener: TcpListener,
+    address: SocketAddr,
+    worker: Option<WorkerProcess>,
+    ledger: Arc<SqliteLedger>,
+    api: Api,
+    /// Held until the end, so that no other server uses the folder.
+    _folder: DataFolder,
+}
+
+impl Server {
+    /// Opens the data folder, the master key, the store, the ledger and the listener.
+    pub async fn open(settings: Settings) -> Result<Self> {
+        let folder = DataFolder::open(&settings.data_dir)?;
+        let source = match (&settings.master_key, &settings.master_key_file) {
+            (Some(digits), _) => KeySource::Environment(digits),
+            (None, Some(file)) => KeySource::File(file),
+            (None, None) => KeySource::DataFolder,
+        };
+        let master = secrets::load(source, folder.path()).map_err(startup)?;
+        let store =
+            ArtifactStore::open(&folder.path().join("artifacts"), settings.max_artifact_bytes).map_err(startup)?;
+        let ledger = Arc::new(
+            SqliteLedger::open(&folder.path().join("ledger.sqlite"))
+                .await
+                .map_err(startup)?,
+        );
+        let listener = TcpListener::bind(settings.listen)
+            .await
+            .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
+        let address = listener.local_addr().map_err(startup)?;
+        let worker = match settings.embedded_worker {
+            true => Some(WorkerProcess::new(&settings, address)?),
+            false => None,
+        };
+        let api = Api::new(ledger.clone(), store, master, limits(&settings));
+        tracing::info!(data_dir = %folder.path().display(), %address, "opened");
+        Ok(Self {
+            settings,
+            listener,
+            address,
+            worker,
+            ledger,
+            api,
+            _folder: folder,
+        })
+    }
+
+    /// Where it listens; with the port that it got, if any would do.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Answers calls until `shutdown`, then stops: says so to whoever asks for its health, takes no more work, has the
+    /// worker hand back what it has, lets calls end, and closes the ledger.
+    pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<()> {
+        let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
+        let routes = self.api.routes()?.add_service(health_service);
+        let (drain, drained) = oneshot::channel();
+        let mut calls = tokio::spawn(api::serve(routes, self.listener, async {
+            // A sender that is gone says the same.
+            let _ = drained.await;
+        }));
+        let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
+        let worker = self
+            .worker
+            .map(|worker| EmbeddedWorker::start(worker, Backoff::default()));
+
+        let broken = tokio::select! {
+            () = shutdown => None,
+            ended = &mut calls => Some(ended),
+        };
+        tracing::info!("stopping");
+        let limit = Instant::now() + self.settings.stop_limit();
+        health.not_serving().await;
+        self.api.stop();
+        if let Some(worker) = worker {
+            worker.stop(self.settings.stop_limit()).await;
+        }
+        health.end().await;
+        let ended = match broken {
+            Some(ended) => Some(ended),
+            None => {
+                let _ = drain.send(());
+                drain_until(calls, limit.max(Instant::now() + LEAST_DRAIN)).await
+            }
+        };
+        if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
+            tracing::warn!("housekeeping is cut off");
+        }
+        if timeout(LEAST_DRAIN, self.ledger.close()).await.is_err() {
+            tracing::warn!("the ledger is cut off; what it acknowledged is on disk all the same");
+        }
+        tracing::info!("stopped");
+        match ended {
+            Some(ended) => ended.map_err(|error| Error::internal("answering calls", error))?,
+            None => Ok(()),
+        }
+    }
+}
+
+type Calls = JoinHandle<Result<()>>;
+
+/// Waits for calls to end, and cuts them off when the time is over.
+async fn drain_until(mut calls: Calls, limit: Instant) -> Option<Result<Result<()>, tokio::task::JoinError>> {
+    let ended = timeout_at(limit, &mut calls).await;
+    if ended.is_err() {
+        tracing::warn!("calls that did not end are cut off");
+        calls.abort();
+    }
+    ended.ok()
+}
+
+fn limits(settings: &Settings) -> Limits {
+    Limits {
+        lease: settings.lease(),
+        // Its limit is far below.
+        max_attempts: i32::try_from(settings.max_attempts).unwrap_or(i32::MAX),
+        max_queued: settings.max_queued_jobs,
+        upload_idle: settings.upload_timeout(),
+        abandoned_after: settings.abandoned_after(),
+    }
+}
+
+/// Why the server can't start, with all causes that are not part of the text before.
+fn startup(error: impl std::error::Error) -> Error {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let more = error.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
+        cause = error.source();
+    }
+    Error::Startup(text)
+}
