@@ -1,0 +1,122 @@
+//! The command line: what there is to say.
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use uuid::Uuid;
+
+use crate::commands;
+
+/// Marks 3D Gaussian Splatting scenes with a message and reads it back, through a GuardSplat server.
+///
+/// Exit codes: 0 done or match, 1 error, 2 no match, 3 inconclusive or target missed.
+#[derive(Parser)]
+#[command(name = "guardsplat", version)]
+pub struct Arguments {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What every command understands.
+#[derive(Args)]
+pub struct Global {
+    /// Address of the server [default: http://127.0.0.1:50051]
+    #[arg(long, global = true, value_name = "URL", env = "GUARDSPLAT_SERVER")]
+    pub server: Option<String>,
+    /// Configuration file [default: ~/.config/guardsplat/client.toml, where there is one]
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// How long a server that is silent or was lost is waited for, in seconds [default: 60]
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub timeout: Option<u64>,
+    /// Prints JSON on standard output
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// The commands.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Keys: secrets that messages are written and read with; they stay with the server
+    #[command(subcommand)]
+    Key(commands::key::Command),
+    /// Has a scene marked with a message and fetches it
+    Embed(commands::embed::Arguments),
+    /// Reads the message of a scene, or of pictures of one
+    Verify(commands::verify::Arguments),
+    /// Work that is waiting, under way or over
+    #[command(subcommand)]
+    Jobs(commands::jobs::Command),
+    /// Scenes and pictures that the server keeps
+    #[command(subcommand)]
+    Artifact(commands::artifact::Command),
+    /// Prints a script that completes commands and options in a shell
+    Completions(commands::completions::Arguments),
+}
+
+/// What all commands understand that create a job.
+#[derive(Args)]
+pub struct Submission {
+    /// What people call the job, at most 63 characters; the name of the file unless given
+    #[arg(long, value_name = "TEXT")]
+    pub display_name: Option<String>,
+    /// Names this request, so that sending it again gives the same job; drawn at random unless given
+    #[arg(long, value_name = "UUID")]
+    pub request_id: Option<Uuid>,
+    /// Ends as soon as the job is queued, and prints it
+    #[arg(long)]
+    pub no_wait: bool,
+    /// Ctrl-C while waiting cancels the job; without this, it goes on
+    #[arg(long, conflicts_with = "no_wait")]
+    pub cancel_on_interrupt: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn parse(line: &str) -> Result<Arguments, clap::Error> {
+        Arguments::try_parse_from(std::iter::once("guardsplat").chain(line.split(' ')))
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn the_promised_commands_parse() {
+        for line in [
+            "key create --bits 32 --seed 7 --display-name T",
+            "key list --json",
+            "--json --server http://h:1 --config F --timeout 5 embed IN -o OUT --key K --message c0ffee42",
+            "embed IN -o OUT --key K --message 0 --preset draft --seed 1 --size 128 --force --comparison C --json",
+            "embed IN --key K --message 0 --no-wait --request-id 5f0c54a6-6b0d-4d6f-9a80-6a7a0b1f4f11",
+            "embed IN -o OUT --key K --message 0 --cancel-on-interrupt",
+            "verify A B C --key K --message 0 --views 5 --size 64 --seed 3",
+            "jobs list --state queued --state running --limit 5",
+            "jobs get J",
+            "jobs watch J --cursor C",
+            "jobs cancel J",
+            "artifact put F",
+            "artifact get A -o F",
+            "artifact delete A",
+            "completions bash",
+        ] {
+            assert!(parse(line).is_ok(), "{line}");
+        }
+    }
+
+    #[test]
+    fn wrong_usage_is_told() {
+        let wrong = |line: &str| parse(line).err().unwrap().to_string();
+        assert!(wrong("embed IN --key K --message 0").contains("--output"));
+        assert!(wrong("verify --key K").contains("PATH"));
+        assert!(wrong("verify A --key K --views 0").contains("1..=10000"));
+        assert!(wrong("key create --bits 76").contains("1..=75"));
+        assert!(wrong("key list --timeout 0").contains("--timeout"));
+        assert!(wrong("embed IN -o O --key K --message 0 --request-id 7").contains("--request-id"));
+    }
+}

@@ -1,0 +1,208 @@
+//! `embed`.
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use guardsplat_proto::v1::job::{Result as Outcome, Spec};
+use guardsplat_proto::v1::{EmbedSpec, Job, Key, embed_spec};
+use serde::Serialize;
+
+use super::{key, suspects};
+use crate::arguments::Submission;
+use crate::context::Context;
+use crate::create::{create, leave, missed_target, no_result, succeeded, wait};
+use crate::error::Result;
+use crate::interrupt::Stage;
+use crate::output::{Exit, print_json, print_line, printable};
+use crate::report::{EmbedReport, FailureReport};
+use crate::transfer::{Destination, discard, download};
+
+/// How much work is spent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// A mark to try things with
+    Draft,
+    /// What is recommended
+    Standard,
+    /// Steps, views and sizes of the paper
+    Paper,
+}
+
+impl From<Preset> for embed_spec::Preset {
+    fn from(preset: Preset) -> Self {
+        match preset {
+            Preset::Draft => Self::Draft,
+            Preset::Standard => Self::Standard,
+            Preset::Paper => Self::Paper,
+        }
+    }
+}
+
+/// Arguments of `embed`.
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene to mark, a 3DGS PLY; or one that is there already, artifacts/ID
+    #[arg(value_name = "IN")]
+    input: String,
+    /// Where to write the marked scene
+    #[arg(short, long, value_name = "OUT", required_unless_present = "no_wait")]
+    output: Option<PathBuf>,
+    /// The key: keys/ID, its id, or its display name where no other key has the same
+    #[arg(long, value_name = "KEY")]
+    key: String,
+    /// The message in hexadecimal, as many bits as the key has
+    #[arg(long, value_name = "HEX")]
+    message: String,
+    /// How much work is spent
+    #[arg(long, value_enum, default_value = "standard")]
+    preset: Preset,
+    /// Decides views, backgrounds and augmentation
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Side of training views and of those of the verification, in pixels
+    #[arg(long, value_name = "PX")]
+    size: Option<u32>,
+    /// Writes the scene even when it misses its target
+    #[arg(long)]
+    force: bool,
+    /// Where to write a picture of original, marked and ten times their difference
+    #[arg(long, value_name = "FILE")]
+    comparison: Option<PathBuf>,
+    #[command(flatten)]
+    submission: Submission,
+}
+
+/// What stands beside the figures.
+#[derive(Serialize)]
+struct Report<'a> {
+    job: &'a str,
+    key: &'a str,
+    bits: u32,
+    preset: String,
+    seed: u64,
+    written: bool,
+    output: Option<&'a Path>,
+    #[serde(flatten)]
+    result: Option<EmbedReport>,
+    /// Of a job that failed; a result has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target_missed: Option<Vec<String>>,
+    failure: Option<FailureReport>,
+}
+
+/// Marks a scene.
+pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
+    // What can't be written, or is not there, is better known before the work.
+    if !arguments.submission.no_wait {
+        for path in arguments.output.iter().chain(&arguments.comparison) {
+            Destination::check(path)?;
+        }
+    }
+    let key = key::find(context, &arguments.key).await?;
+    key::check_message(&key, &arguments.message)?;
+    let inputs = suspects::send(context, &[suspects::Input::scene(&arguments.input)]).await?;
+    let job = match create(
+        context,
+        &arguments.submission,
+        &inputs.title,
+        spec(arguments, &key, &inputs),
+    )
+    .await
+    {
+        Ok(job) => job,
+        Err(error) => {
+            discard(context, &inputs.sent).await;
+            return Err(error);
+        }
+    };
+    if arguments.submission.no_wait {
+        leave(context, &job);
+        return Ok(Exit::Done);
+    }
+    let job = wait(context, &arguments.submission, &job).await?;
+    match missed_target(&job) {
+        Some(missed) => Ok(tell_missed(context, &job, &key, missed)),
+        None => finish(context, arguments, succeeded(job)?, &key).await,
+    }
+}
+
+fn spec(arguments: &Arguments, key: &Key, inputs: &suspects::Inputs) -> Spec {
+    let mut spec = EmbedSpec {
+        // One input was given, and one name came back.
+        scene: inputs.names.first().cloned().unwrap_or_default(),
+        key: key.name.clone(),
+        message: arguments.message.to_ascii_lowercase(),
+        seed: arguments.seed,
+        size: arguments.size.unwrap_or_default(),
+        force: arguments.force,
+        ..EmbedSpec::default()
+    };
+    spec.set_preset(arguments.preset.into());
+    Spec::Embed(spec)
+}
+
+async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -> Result<Exit> {
+    let Some(Outcome::EmbedResult(result)) = &job.result else {
+        return Err(no_result(&job));
+    };
+    context.enter(Stage::Fetching { job: job.name.clone() });
+    if let Some(path) = &arguments.comparison {
+        download(context, &result.comparison, path).await?;
+    }
+    // The scene comes last: where it is, all is.
+    if let Some(path) = &arguments.output {
+        download(context, &result.scene, path).await?;
+    }
+    context.enter(Stage::Nothing);
+    context.console.clear();
+    let report = EmbedReport::from(result);
+    let missed = report.missed().to_vec();
+    if context.json {
+        print_json(&Report {
+            written: arguments.output.is_some(),
+            output: arguments.output.as_deref(),
+            result: Some(report),
+            target_missed: None,
+            ..facts(&job, key)
+        });
+    } else {
+        print_line(&report.line());
+        if let Some(path) = &arguments.output {
+            print_line(&format!("written to {}", path.display()));
+        }
+    }
+    if missed.is_empty() {
+        return Ok(Exit::Done);
+    }
+    eprintln!("target missed: {}; written all the same", printable(&missed.join(", ")));
+    Ok(Exit::Inconclusive)
+}
+
+fn tell_missed(context: &Context, job: &Job, key: &Key, missed: &str) -> Exit {
+    if context.json {
+        print_json(&Report {
+            target_missed: Some(vec![missed.to_owned()]),
+            ..facts(job, key)
+        });
+    }
+    eprintln!("target missed: {}; nothing was written", printable(missed));
+    Exit::Inconclusive
+}
+
+fn facts<'a>(job: &'a Job, key: &'a Key) -> Report<'a> {
+    let (preset, seed) = match &job.spec {
+        Some(Spec::Embed(spec)) => (crate::report::preset(spec), spec.seed),
+        _ => Default::default(),
+    };
+    Report {
+        job: &job.name,
+        key: &key.name,
+        bits: key.bits,
+        preset,
+        seed,
+        written: false,
+        output: None,
+        result: None,
+        target_missed: None,
+        failure: job.failure.as_ref().map(Into::into),
+    }
+}

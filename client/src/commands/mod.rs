@@ -1,0 +1,25 @@
+//! The commands, one a file.
+pub mod artifact;
+pub mod completions;
+pub mod embed;
+pub mod jobs;
+pub mod key;
+pub mod suspects;
+pub mod verify;
+
+use crate::arguments::Command;
+use crate::context::Context;
+use crate::error::Result;
+use crate::output::Exit;
+
+/// Carries out a command that needs the server.
+pub async fn run(context: &Context, command: Command) -> Result<Exit> {
+    match command {
+        Command::Key(command) => key::run(context, &command).await,
+        Command::Embed(arguments) => embed::run(context, &arguments).await,
+        Command::Verify(arguments) => verify::run(context, &arguments).await,
+        Command::Jobs(command) => jobs::run(context, &command).await,
+        Command::Artifact(command) => artifact::run(context, &command).await,
+        Command::Completions(arguments) => Ok(completions::run(&arguments)),
+    }
+}

@@ -1,0 +1,71 @@
+//! `guardsplat`: marks scenes and verifies suspects through a GuardSplat server.
+mod arguments;
+mod backoff;
+mod commands;
+mod console;
+mod context;
+mod create;
+mod details;
+mod error;
+mod interrupt;
+mod names;
+mod output;
+mod report;
+mod server;
+mod settings;
+mod show;
+mod transfer;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::Arguments;
+use context::Context;
+use error::{Error, Result};
+use output::Exit;
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors. clap's own code for wrong usage, 2, means no match here.
+            let code = u8::from(error.use_stderr());
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    let json = arguments.global.json;
+    match run(arguments) {
+        Ok(exit) => ExitCode::from(exit.code()),
+        Err(error) => {
+            error.tell(json);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Carries out one command; an interrupt ends it at any time.
+fn run(arguments: Arguments) -> Result<Exit> {
+    let Arguments { global, command } = arguments;
+    if let arguments::Command::Completions(which) = &command {
+        return Ok(commands::completions::run(which));
+    }
+    let context = Context::new(&global)?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|source| Error::Runtime { source })?;
+    let result = runtime.block_on(async {
+        tokio::select! {
+            biased;
+            () = interrupt::heard() => Err(interrupt::answer(&context).await),
+            result = commands::run(&context, command) => result,
+        }
+    });
+    context.console.clear();
+    // An interrupted command may have left a file being read; the process does not wait for it.
+    runtime.shutdown_background();
+    result
+}

@@ -1,0 +1,82 @@
+//! How a mark came out.
+use guardsplat_proto::v1::EmbedResult;
+use serde::Serialize;
+
+use super::seconds;
+use crate::output::printable;
+
+/// What came of a job that marked a scene.
+#[derive(Debug, Serialize)]
+pub struct EmbedReport {
+    scene: String,
+    comparison: String,
+    bit_accuracy: f64,
+    bit_accuracy_worst_view: f64,
+    message: String,
+    message_recovered: bool,
+    /// Null when the views are identical.
+    psnr_db: Option<f64>,
+    identical: bool,
+    ssim: f64,
+    lpips: Option<f64>,
+    steps: u32,
+    view_steps: u64,
+    seconds: f64,
+    device: String,
+    clip: String,
+    gaussians: u64,
+    changed_gaussians: u64,
+    target_missed: Vec<String>,
+}
+
+impl From<&EmbedResult> for EmbedReport {
+    fn from(result: &EmbedResult) -> Self {
+        Self {
+            scene: result.scene.clone(),
+            comparison: result.comparison.clone(),
+            bit_accuracy: result.bit_accuracy,
+            bit_accuracy_worst_view: result.bit_accuracy_worst_view,
+            message: result.message.clone(),
+            message_recovered: result.message_recovered,
+            psnr_db: result.psnr_db,
+            identical: result.psnr_db.is_none(),
+            ssim: result.ssim,
+            lpips: result.lpips,
+            steps: result.steps,
+            view_steps: result.view_steps,
+            seconds: seconds(result.duration),
+            device: result.device.clone(),
+            clip: result.clip.clone(),
+            gaussians: result.gaussians,
+            changed_gaussians: result.changed_gaussians,
+            target_missed: result.target_missed.clone(),
+        }
+    }
+}
+
+impl EmbedReport {
+    /// What missed the target.
+    pub fn missed(&self) -> &[String] {
+        &self.target_missed
+    }
+
+    /// For people.
+    pub fn line(&self) -> String {
+        let psnr = self.psnr_db.map_or("identical".into(), |db| format!("{db:.2} dB"));
+        format!(
+            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
+            100.0 * self.bit_accuracy,
+            100.0 * self.bit_accuracy_worst_view,
+            printable(&self.message),
+            if self.message_recovered {
+                "recovered"
+            } else {
+                "not recovered"
+            },
+            self.ssim,
+            self.steps,
+            self.seconds,
+            printable(&self.device)
+        )
+    }
+}

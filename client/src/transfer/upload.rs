@@ -1,0 +1,128 @@
+//! Sends files in chunks.
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
+use guardsplat_proto::v1::upload_artifact_request::Payload;
+use guardsplat_proto::v1::{Artifact, DeleteArtifactRequest, UploadArtifactRequest, UploadMetadata};
+use tokio::fs::File;
+use tokio::io::AsyncReadExt;
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::Status;
+
+use super::source::{CHUNK, Source};
+use crate::console::Unit;
+use crate::context::{Context, refused, silent};
+use crate::error::{Error, Result};
+use crate::server::is_lost;
+
+const DOING: &str = "sending the file";
+/// Chunks read ahead of the network.
+const AHEAD: usize = 4;
+/// Between two looks at how far it is.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Sends a file, from the beginning again if the connection is lost; `before` of `total` bytes went with other files.
+pub async fn upload(context: &Context, source: &Source, before: u64, total: u64) -> Result<Artifact> {
+    let mut backoff = context.backoff();
+    loop {
+        match attempt(context, source, before, total).await? {
+            Ok(artifact) => {
+                return Ok(artifact);
+            }
+            Err(status) if is_lost(&status) => context.pause(&mut backoff, DOING, &status, "").await?,
+            Err(status) => return Err(refused(DOING, status)),
+        }
+    }
+}
+
+/// Deletes what was sent for nothing, as far as that works.
+pub async fn discard(context: &Context, names: &[String]) {
+    for name in names {
+        let request = DeleteArtifactRequest { name: name.clone() };
+        // The error that led here is what the user has to hear of.
+        let _ = context
+            .once("deleting the upload", request, async |channel, request| {
+                ArtifactServiceClient::new(channel).delete_artifact(request).await
+            })
+            .await;
+    }
+}
+
+async fn attempt(context: &Context, source: &Source, before: u64, total: u64) -> Result<Result<Artifact, Status>> {
+    let mut client = ArtifactServiceClient::new(context.server.channel().await?);
+    let file = File::open(&source.path).await.map_err(Error::io(&source.path))?;
+    let sent = Arc::new(AtomicU64::new(0));
+    let (sender, receiver) = mpsc::channel(AHEAD);
+    let reading = tokio::spawn(read(file, metadata(source), sender, Arc::clone(&sent)));
+    let answer = client.upload_artifact(ReceiverStream::new(receiver));
+    tokio::pin!(answer);
+    let mut look = tokio::time::interval(LOOK);
+    let (mut last, mut moved) = (0, Instant::now());
+    let answer = loop {
+        tokio::select! {
+            answer = &mut answer => break answer,
+            _ = look.tick() => {
+                let now = sent.load(Ordering::Relaxed);
+                context.console.show("upload", Unit::Bytes, before + now, total, "");
+                if now != last {
+                    (last, moved) = (now, Instant::now());
+                } else if moved.elapsed() > context.server.timeout {
+                    break Err(silent(context.server.timeout));
+                }
+            }
+        }
+    };
+    match answer {
+        Ok(artifact) => {
+            context
+                .console
+                .show("upload", Unit::Bytes, before + source.size, total, "");
+            Ok(Ok(artifact.into_inner()))
+        }
+        Err(status) => {
+            reading.abort();
+            match reading.await {
+                // The file, not the server, is why it was cut short.
+                Ok(Err(error)) => Err(Error::io(&source.path)(error)),
+                _ => Ok(Err(status)),
+            }
+        }
+    }
+}
+
+fn metadata(source: &Source) -> UploadArtifactRequest {
+    UploadArtifactRequest {
+        payload: Some(Payload::Metadata(UploadMetadata {
+            display_name: source.display_name.clone(),
+            // No file is longer than this.
+            size_bytes: i64::try_from(source.size).unwrap_or(i64::MAX),
+            sha256: source.sha256.clone(),
+        })),
+    }
+}
+
+async fn read(
+    mut file: File,
+    first: UploadArtifactRequest,
+    sender: mpsc::Sender<UploadArtifactRequest>,
+    sent: Arc<AtomicU64>,
+) -> std::io::Result<()> {
+    // Nobody receives any more when the server has answered, which then says why.
+    if sender.send(first).await.is_err() {
+        return Ok(());
+    }
+    loop {
+        let mut chunk = Vec::with_capacity(CHUNK);
+        (&mut file).take(CHUNK as u64).read_to_end(&mut chunk).await?;
+        let length = chunk.len() as u64;
+        let payload = Some(Payload::Chunk(chunk));
+        if length == 0 || sender.send(UploadArtifactRequest { payload }).await.is_err() {
+            return Ok(());
+        }
+        sent.fetch_add(length, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,127 @@
+//! `jobs` and `artifact`.
+use guardsplat_proto::v1::failure::Reason;
+use guardsplat_proto::v1::job::State;
+use serde_json::Value;
+
+use super::fake::{failure, job, send};
+use super::run::Bench;
+
+/// A bench with jobs 1 to 5 of which the odd ones are running.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    for n in 1..=5 {
+        let name = name(n);
+        let state = if n % 2 == 1 { State::Running } else { State::Queued };
+        let job = guardsplat_proto::v1::Job {
+            name: name.clone(),
+            ..job(state)
+        };
+        bench.fake.state().jobs.insert(name, job);
+    }
+    bench
+}
+
+fn name(n: u32) -> String {
+    format!("jobs/00000000-0000-7000-8000-00000000000{n}")
+}
+
+fn listed(json: &Value) -> Vec<&str> {
+    json["jobs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|job| job["name"].as_str().unwrap())
+        .collect()
+}
+
+#[test]
+fn lists_go_over_pages() {
+    let bench = bench();
+    let json = bench.run("jobs list --json").json();
+    assert_eq!(listed(&json), [5, 4, 3, 2, 1].map(name));
+    assert_eq!(json["more"], false);
+    let json = bench.run("jobs list --limit 3 --json").json();
+    assert_eq!((listed(&json).len(), &json["more"]), (3, &true.into()));
+    let json = bench.run("jobs list --state running --json").json();
+    assert_eq!(listed(&json), [5, 3, 1].map(name));
+    let text = bench.run("jobs list").out;
+    assert_eq!(text.lines().count(), 5);
+    assert!(
+        text.lines()
+            .next()
+            .unwrap()
+            .starts_with(&format!("{}  running", name(5))),
+        "{text}"
+    );
+}
+
+#[test]
+fn one_job_is_told_by_name_or_id() {
+    let bench = bench();
+    let name = name(2);
+    for text in [name.as_str(), name.strip_prefix("jobs/").unwrap()] {
+        let json = bench.run(&format!("jobs get {text} --json")).json();
+        assert_eq!(
+            (&json["name"], &json["state"]),
+            (&name.clone().into(), &"queued".into())
+        );
+    }
+}
+
+#[test]
+fn a_job_is_cancelled() {
+    let bench = bench();
+    let ran = bench.run(&format!("jobs cancel {} --json", name(1)));
+    assert_eq!((ran.code, &ran.json()["state"]), (0, &"cancelled".into()));
+    assert_eq!(bench.fake.state().cancelled, [name(1)]);
+}
+
+#[test]
+fn a_watch_prints_one_line_a_message_and_exits_as_the_job() {
+    let bench = bench();
+    bench.fake.plan([
+        send(job(State::Queued)),
+        send(job(State::Running)),
+        failure(Reason::Internal, "broken"),
+    ]);
+    let ran = bench.run(&format!("jobs watch {} --cursor 7 --json", name(1)));
+    assert_eq!(ran.code, 1);
+    let lines: Vec<Value> = ran
+        .out
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let states: Vec<&Value> = lines.iter().map(|line| &line["job"]["state"]).collect();
+    assert_eq!(states, ["queued", "running", "failed"]);
+    assert_eq!(lines[1]["cursor"], "0.1");
+    assert_eq!(lines[2]["job"]["failure"]["reason"], "internal");
+    assert_eq!(bench.fake.state().watched[0].cursor, "7");
+    assert!(ran.err.contains("failed: broken (internal)"), "{}", ran.err);
+}
+
+#[test]
+fn a_watched_job_that_missed_its_target_exits_with_3() {
+    let bench = bench();
+    bench.fake.plan([failure(Reason::TargetMissed, "bits 91 %")]);
+    let ran = bench.run(&format!("jobs watch {}", name(1)));
+    assert_eq!(ran.code, 3, "{}", ran.err);
+    bench.fake.plan([send(job(State::Cancelled))]);
+    let ran = bench.run(&format!("jobs watch {}", name(1)));
+    assert_eq!(ran.code, 1);
+    assert!(ran.err.contains("was cancelled"), "{}", ran.err);
+}
+
+#[test]
+fn artifacts_are_put_and_deleted() {
+    let bench = Bench::new();
+    bench.file("a.ply", b"ply");
+    let json = bench.run("artifact put a.ply --json").json();
+    assert_eq!(
+        (&json["display_name"], &json["size_bytes"]),
+        (&"a.ply".into(), &3.into())
+    );
+    let name = json["name"].as_str().unwrap();
+    let json = bench.run(&format!("artifact delete {name} --json")).json();
+    assert_eq!((&json["name"], &json["deleted"]), (&name.into(), &true.into()));
+    assert!(bench.fake.state().artifacts.is_empty());
+}

@@ -1,0 +1,229 @@
+//! The three services that clients use, over the state of the tests.
+use std::pin::Pin;
+
+use guardsplat_proto::v1::artifact_service_server::ArtifactService;
+use guardsplat_proto::v1::job::State as JobState;
+use guardsplat_proto::v1::job_service_server::JobService;
+use guardsplat_proto::v1::key_service_server::KeyService;
+use guardsplat_proto::v1::{
+    Artifact, CancelJobRequest, CreateJobRequest, DeleteArtifactRequest, DownloadArtifactRequest,
+    DownloadArtifactResponse, GetArtifactRequest, GetJobRequest, GetKeyRequest, Job, Key, ListJobsRequest,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, UploadArtifactRequest, WatchJobRequest, WatchJobResponse,
+    download_artifact_response, upload_artifact_request,
+};
+use sha2::{Digest, Sha256};
+use tokio::sync::mpsc;
+use tokio_stream::Stream;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Request, Response, Status, Streaming};
+use tonic_types::{ErrorDetails, StatusExt};
+use uuid::Uuid;
+
+use super::fake::{Fake, Step};
+
+type Replies<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+fn replies<T: Send + 'static>(items: Vec<Result<T, Status>>) -> Replies<T> {
+    Box::pin(tokio_stream::iter(items))
+}
+
+/// That a resource is not there, told as the server tells it.
+pub fn not_found(name: &str) -> Status {
+    let mut details = ErrorDetails::new();
+    details
+        .set_error_info("NOT_FOUND", "guardsplat", [("name".to_owned(), name.to_owned())])
+        .set_resource_info("guardsplat.v1/thing", name, "", "");
+    Status::with_error_details(Code::NotFound, format!("{name} does not exist"), details)
+}
+
+#[tonic::async_trait]
+impl ArtifactService for Fake {
+    async fn upload_artifact(
+        &self,
+        request: Request<Streaming<UploadArtifactRequest>>,
+    ) -> Result<Response<Artifact>, Status> {
+        self.state().uploads += 1;
+        let mut stream = request.into_inner();
+        let first = stream.message().await?.and_then(|message| message.payload);
+        let Some(upload_artifact_request::Payload::Metadata(metadata)) = first else {
+            return Err(Status::invalid_argument("metadata must come first"));
+        };
+        let error = self.state().upload_errors.pop_front();
+        if let Some(error) = error {
+            return Err(error);
+        }
+        let (mut bytes, mut chunks) = (Vec::new(), Vec::new());
+        while let Some(message) = stream.message().await? {
+            let Some(upload_artifact_request::Payload::Chunk(chunk)) = message.payload else {
+                return Err(Status::invalid_argument("a chunk must come"));
+            };
+            chunks.push(chunk.len());
+            bytes.extend(chunk);
+        }
+        if metadata.size_bytes != bytes.len() as i64 || metadata.sha256 != hex::encode(Sha256::digest(&bytes)) {
+            return Err(Status::invalid_argument("these are other bytes"));
+        }
+        let name = self.store(&metadata.display_name, &bytes);
+        let mut state = self.state();
+        state.chunks = chunks;
+        Ok(Response::new(state.artifacts[&name].0.clone()))
+    }
+
+    type DownloadArtifactStream = Replies<DownloadArtifactResponse>;
+
+    async fn download_artifact(
+        &self,
+        request: Request<DownloadArtifactRequest>,
+    ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
+        let request = request.into_inner();
+        let mut state = self.state();
+        state.offsets.push(request.offset);
+        let found = state.artifacts.get(&request.name).cloned();
+        let (artifact, mut bytes) = found.ok_or_else(|| not_found(&request.name))?;
+        if state.damage {
+            bytes[0] ^= 1;
+        }
+        let mut rest = bytes.split_off(request.offset as usize);
+        let end = state.download_ends.pop_front();
+        if let Some(end) = end {
+            rest.truncate(end);
+        }
+        use download_artifact_response::Payload;
+        let respond = |payload| Ok(DownloadArtifactResponse { payload: Some(payload) });
+        let mut items = vec![respond(Payload::Artifact(artifact))];
+        items.extend(
+            rest.chunks(100_000)
+                .map(|chunk| respond(Payload::Chunk(chunk.to_vec()))),
+        );
+        if end.is_some() {
+            items.push(Err(Status::unavailable("going down")));
+        }
+        Ok(Response::new(replies(items)))
+    }
+
+    async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
+        Err(Status::unimplemented(request.into_inner().name))
+    }
+
+    async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
+        let name = request.into_inner().name;
+        let mut state = self.state();
+        state.deleted.push(name.clone());
+        state
+            .artifacts
+            .remove(&name)
+            .map(|_| Response::new(()))
+            .ok_or_else(|| not_found(&name))
+    }
+}
+
+#[tonic::async_trait]
+impl JobService for Fake {
+    async fn create_job(&self, request: Request<CreateJobRequest>) -> Result<Response<Job>, Status> {
+        let request = request.into_inner();
+        let mut state = self.state();
+        state.created.push(request.clone());
+        let error = state.create_errors.pop_front();
+        if let Some(error) = error.as_ref().filter(|error| error.code() != Code::Unavailable) {
+            return Err(error.clone());
+        }
+        let known = state.requests.get(&request.request_id).cloned();
+        let name = known.unwrap_or_else(|| format!("jobs/{}", Uuid::new_v4()));
+        state.requests.insert(request.request_id, name.clone());
+        let mut job = request.job.unwrap();
+        job.name = name.clone();
+        job.max_attempts = 3;
+        job.set_state(JobState::Queued);
+        state.jobs.insert(name, job.clone());
+        error.map_or(Ok(Response::new(job)), Err)
+    }
+
+    async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
+        let name = request.into_inner().name;
+        let job = self.state().jobs.get(&name).cloned();
+        job.map(Response::new).ok_or_else(|| not_found(&name))
+    }
+
+    async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
+        let request = request.into_inner();
+        let state = self.state();
+        let from: usize = request.page_token.parse().unwrap_or(0);
+        let wanted = |job: &&Job| request.states.is_empty() || request.states.contains(&job.state);
+        let all: Vec<Job> = state.jobs.values().rev().filter(wanted).cloned().collect();
+        // Pages are smaller than asked for, which a server may do.
+        let to = (from + 2).min(all.len());
+        Ok(Response::new(ListJobsResponse {
+            jobs: all[from..to].to_vec(),
+            next_page_token: if to < all.len() { to.to_string() } else { String::new() },
+        }))
+    }
+
+    async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<Job>, Status> {
+        let name = request.into_inner().name;
+        let mut state = self.state();
+        state.cancelled.push(name.clone());
+        let job = state.jobs.get_mut(&name).ok_or_else(|| not_found(&name))?;
+        job.set_state(JobState::Cancelled);
+        Ok(Response::new(job.clone()))
+    }
+
+    type WatchJobStream = Replies<WatchJobResponse>;
+
+    async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
+        let request = request.into_inner();
+        let mut state = self.state();
+        let stream = state.watched.len();
+        state.watched.push(request.clone());
+        let known = state
+            .jobs
+            .get(&request.name)
+            .cloned()
+            .ok_or_else(|| not_found(&request.name))?;
+        let steps = state.watch.pop_front().unwrap_or_else(|| vec![Step::Hang]);
+        drop(state);
+        let (sender, receiver) = mpsc::channel(1);
+        tokio::spawn(async move {
+            for (index, step) in steps.into_iter().enumerate() {
+                let sent = match step {
+                    Step::Send(job) => {
+                        let job = Job {
+                            name: known.name.clone(),
+                            spec: known.spec.clone(),
+                            ..*job
+                        };
+                        let cursor = format!("{stream}.{index}");
+                        sender.send(Ok(WatchJobResponse { job: Some(job), cursor })).await
+                    }
+                    Step::Fail(status) => sender.send(Err(status)).await,
+                    Step::Hang => {
+                        sender.closed().await;
+                        return;
+                    }
+                };
+                if sent.is_err() {
+                    return;
+                }
+            }
+        });
+        Ok(Response::new(Box::pin(ReceiverStream::new(receiver))))
+    }
+}
+
+#[tonic::async_trait]
+impl KeyService for Fake {
+    async fn get_key(&self, request: Request<GetKeyRequest>) -> Result<Response<Key>, Status> {
+        let name = request.into_inner().name;
+        let key = self.state().keys.iter().find(|key| key.name == name).cloned();
+        key.map(Response::new).ok_or_else(|| not_found(&name))
+    }
+
+    async fn list_keys(&self, request: Request<ListKeysRequest>) -> Result<Response<ListKeysResponse>, Status> {
+        let from: usize = request.into_inner().page_token.parse().unwrap_or(0);
+        let keys = &self.state().keys;
+        let to = (from + 2).min(keys.len());
+        Ok(Response::new(ListKeysResponse {
+            keys: keys[from..to].to_vec(),
+            next_page_token: if to < keys.len() { to.to_string() } else { String::new() },
+        }))
+    }
+}
