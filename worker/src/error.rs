@@ -82,6 +82,9 @@ pub enum Error {
         /// Its value.
         value: f32,
     },
+    /// Somebody asked for the end ([`crate::stop::Stop`]).
+    #[error("stopped before it was done; nothing was written")]
+    Stopped,
 }
 
 impl Error {

@@ -11,6 +11,7 @@ pub mod quality;
 pub mod sample;
 pub mod scene;
 pub mod splat;
+pub mod stop;
 #[doc(hidden)]
 pub mod testing;
 pub mod train;

@@ -1,5 +1,7 @@
-//! `guardsplat-worker`: marks Gaussian Splatting scenes and reads marks back, on one machine.
+//! `guardsplat-worker`: marks Gaussian Splatting scenes and reads marks back, on one machine or for a server.
 mod cli;
+mod jobs;
+mod work;
 
 fn main() -> std::process::ExitCode {
     cli::run()

@@ -3,18 +3,17 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use guardsplat_worker::device::DeviceChoice;
+use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verification, embed};
 use guardsplat_worker::message::Key;
-use guardsplat_worker::quality::{Quality, contact_sheet, write_picture};
+use guardsplat_worker::quality::{Quality, write_picture};
 use guardsplat_worker::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Exit, load, print_json, print_line};
-
-/// Name of the report's picture.
-const SHEET: &str = "comparison.png";
+use super::{Exit, print_json, print_line};
+use crate::work::settings::chosen;
+use crate::work::{load, sheet};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -87,7 +86,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let settings = settings(arguments)?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;
-    let engine = load::engine(&arguments.key, &key, arguments.clip.as_deref(), arguments.device, true)?;
+    let engine = load::engine(
+        &arguments.key,
+        &key,
+        arguments.clip.as_deref(),
+        open(arguments.device)?,
+        true,
+    )?;
     if settings.lambda.lpips > 0.0 && engine.lpips.is_none() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
     }
@@ -122,13 +127,7 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
         let json = std::fs::read_to_string(path).map_err(Error::io(path))?;
         settings = settings.overridden(&json)?;
     }
-    settings.seed = arguments.seed;
-    if let Some(size) = arguments.size {
-        settings.size = size;
-        settings.verify.size = Some(size);
-    }
-    settings.check()?;
-    Ok(settings)
+    chosen(settings, arguments.seed, arguments.size)
 }
 
 fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {
@@ -162,7 +161,7 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
 
 fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    write_picture(&folder.join(SHEET), &contact_sheet(&verification.pairs)?)
+    write_picture(&folder.join(sheet::NAME), &sheet::of(&verification.pairs)?)
 }
 
 fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {

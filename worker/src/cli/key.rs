@@ -4,15 +4,16 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use guardsplat_worker::Result;
-use guardsplat_worker::clip::Parts;
 use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{NewKey, create_key, natural};
+use guardsplat_worker::embed::NewKey;
 use guardsplat_worker::message::training::Progress;
-use guardsplat_worker::message::{FitOptions, KeyOptions, TrainingOptions};
+use guardsplat_worker::message::{KeyOptions, TrainingOptions};
+use guardsplat_worker::stop::Stop;
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Exit, load, print_json, print_line};
+use super::{Exit, print_json, print_line};
+use crate::work::keys;
 
 #[derive(Subcommand)]
 pub enum Command {
@@ -66,10 +67,8 @@ pub fn run(command: Command) -> Result<Exit> {
     let Command::Create(arguments) = command;
     let start = Instant::now();
     let compute = open(arguments.device)?;
-    let (clip, identity) = load::clip(arguments.clip.as_deref(), &compute, Parts::Both)?;
-    let default = FitOptions::default();
-    let projection = FitOptions {
-        remove: arguments.remove.unwrap_or(default.remove.min(clip.dim() / 8)),
+    let kept = keys::Kept {
+        remove: arguments.remove,
         keep: arguments.keep,
     };
     let options = KeyOptions {
@@ -80,7 +79,6 @@ pub fn run(command: Command) -> Result<Exit> {
             ..TrainingOptions::default()
         },
     };
-    let pictures = natural::pictures(&compute, clip.config.vision.image_size as u32)?;
     let mut display = Display::new("pictures");
     let mut stage = 0;
     let mut show = |number: usize, title: &'static str, done: usize, total: usize| {
@@ -90,13 +88,13 @@ pub fn run(command: Command) -> Result<Exit> {
         }
         display.set(done, total, String::new);
     };
-    let key = create_key(
+    let clip = arguments.clip.as_deref();
+    let key = keys::create(
         &options,
-        projection,
-        &clip,
-        identity,
+        kept,
+        clip,
         &compute,
-        pictures,
+        &Stop::default(),
         |progress| match progress {
             NewKey::Pictures(done, total) => show(0, "pictures", done, total),
             NewKey::Decoder(Progress::Encoding(done, total)) => show(1, "messages", done, total),

@@ -2,9 +2,9 @@
 mod display;
 mod embed;
 mod key;
-mod load;
 mod models;
 mod render;
+mod run;
 mod sample;
 mod verify;
 
@@ -14,6 +14,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use guardsplat_worker::{Error, Result};
+use tracing_subscriber::EnvFilter;
 
 /// What a command that could be carried out found; errors exit with 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,12 +25,15 @@ enum Exit {
     NoMatch,
     /// Nothing could be decided, or a target was missed.
     Inconclusive,
+    /// An error that was told already.
+    Failed,
 }
 
 impl Exit {
     fn code(self) -> u8 {
         match self {
             Self::Done => 0,
+            Self::Failed => 1,
             Self::NoMatch => 2,
             Self::Inconclusive => 3,
         }
@@ -62,6 +66,8 @@ enum Command {
     /// Weights of other CLIP models and of LPIPS
     #[command(subcommand)]
     Models(models::Command),
+    /// Carries out the jobs of a server, until SIGTERM or SIGINT
+    Run(run::Arguments),
 }
 
 /// What is behind a scene.
@@ -92,7 +98,7 @@ pub fn run() -> ExitCode {
         }
     };
     tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
+        .with_env_filter(filter(&arguments.command))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .init();
@@ -105,6 +111,15 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// What is logged: what `RUST_LOG` says, else errors; and of a worker for a server also what it does.
+fn filter(command: &Command) -> EnvFilter {
+    let default = match command {
+        Command::Run(_) => "warn,guardsplat_worker=info",
+        _ => "error",
+    };
+    EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default))
+}
+
 fn carry_out(command: Command) -> Result<Exit> {
     match command {
         Command::Key(command) => key::run(command),
@@ -113,6 +128,7 @@ fn carry_out(command: Command) -> Result<Exit> {
         Command::Render(arguments) => render::run(&arguments),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Models(command) => models::run(command),
+        Command::Run(arguments) => Ok(run::run(arguments)),
     }
 }
 
@@ -165,6 +181,7 @@ mod tests {
             "verify A B C --key K --message 0123abcd --json",
             "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
+            "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D",
             "models list",
             "models verify",
         ] {

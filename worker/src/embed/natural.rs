@@ -7,6 +7,7 @@ use crate::picture::Picture;
 use crate::quality::batch;
 use crate::sample::sample;
 use crate::splat::{WeightCache, prepare, sh};
+use crate::stop::Stop;
 use crate::view::{Split, ViewSampler};
 
 /// Pictures given to CLIP at once.
@@ -51,11 +52,12 @@ pub fn count() -> usize {
 /// CLIP features of pictures of one size, `[n][dim]` row-major. `done` hears how many are.
 ///
 /// # Errors
-/// The first of the pictures', or a failing device.
+/// The first of the pictures', a failing device, or [`Error::Stopped`].
 pub fn features(
     clip: &Clip,
     compute: &Compute,
     pictures: impl Iterator<Item = Result<Picture>>,
+    stop: &Stop,
     mut done: impl FnMut(usize),
 ) -> Result<Vec<f32>> {
     let mut features = Vec::new();
@@ -75,6 +77,7 @@ pub fn features(
         Ok(())
     };
     for picture in pictures {
+        stop.check()?;
         waiting.push(picture?);
         if waiting.len() == BATCH {
             read(&mut waiting)?;

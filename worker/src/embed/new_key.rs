@@ -13,6 +13,7 @@ use crate::message::{
     CONTEXT, ClipIdentity, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit, train, training,
 };
 use crate::picture::Picture;
+use crate::stop::Stop;
 
 /// Random messages whose text features the projection is fitted to.
 const FITTED_MESSAGES: usize = 512;
@@ -34,8 +35,8 @@ pub enum NewKey {
 /// image features must be centred alike to be read by the same decoder. `projection` decides what it drops.
 ///
 /// # Errors
-/// A length outside 1 to 75, a CLIP without room for the key's sequences, too few pictures, those of the pictures, and
-/// those of [`train`].
+/// A length outside 1 to 75, a CLIP without room for the key's sequences, too few pictures, those of the pictures, those
+/// of [`train`], and [`Error::Stopped`].
 pub fn create_key(
     options: &KeyOptions,
     projection: FitOptions,
@@ -43,6 +44,7 @@ pub fn create_key(
     identity: ClipIdentity,
     compute: &Compute,
     pictures: impl Iterator<Item = Result<Picture>>,
+    stop: &Stop,
     mut progress: impl FnMut(NewKey),
 ) -> Result<Key> {
     crate::message::bits::check_bits(options.bits)?;
@@ -52,9 +54,12 @@ pub fn create_key(
         None => Secret::random()?,
     };
     let table = TokenTable::new(secret.expose(), options.bits)?;
-    let mut encode = |sequences: &[[i64; CONTEXT]]| text_features(clip, compute, options.bits, sequences);
+    let mut encode = |sequences: &[[i64; CONTEXT]]| {
+        stop.check()?;
+        text_features(clip, compute, options.bits, sequences)
+    };
 
-    let images = natural::features(clip, compute, pictures, |done| {
+    let images = natural::features(clip, compute, pictures, stop, |done| {
         progress(NewKey::Pictures(done, natural::count()));
     })?;
     let projection = fit_projection(&secret, &table, &images, clip.dim(), projection, &mut encode)?;
@@ -65,7 +70,7 @@ pub fn create_key(
         seed: u64::from_le_bytes([a, b, c, d, e, f, g, h]),
         ..options.training.clone()
     };
-    let trained = train(&table, &projection, encode, &training, &compute.device, |p| {
+    let trained = train(&table, &projection, encode, &training, &compute.device, stop, |p| {
         progress(NewKey::Decoder(p))
     })?;
     Ok(Key {

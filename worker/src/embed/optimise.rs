@@ -52,7 +52,7 @@ impl Optimised {
 ///
 /// # Errors
 /// Settings out of range, a message of another length than the key's, a scene without Gaussians,
-/// [`Error::NotFinite`] when a term stops being a number, or a failing device.
+/// [`Error::NotFinite`] when a term stops being a number, [`Error::Stopped`], or a failing device.
 pub fn optimise(
     engine: &Engine,
     gaussians: &Gaussians,
@@ -76,6 +76,7 @@ pub fn optimise(
     let mut timing = Timing::new();
     let mut steps = 0;
     while steps < settings.steps {
+        engine.stop.check()?;
         timing.start();
         steps += 1;
         progress(Progress::Step(run.step(steps, &mut timing)?));

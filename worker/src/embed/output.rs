@@ -48,19 +48,25 @@ pub struct Outcome {
 /// Marks a scene file. A result that misses its target is not written, unless the job forces it.
 ///
 /// # Errors
-/// Whatever reading, optimising, verifying and writing may fail with; the output is then as it was before.
+/// Whatever reading, optimising, verifying and writing may fail with, [`Error::Stopped`] when the engine is asked to
+/// stop; the output is then as it was before.
 pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     job.settings.check()?;
+    let stop = &engine.stop;
+    stop.check()?;
     let scene = Scene::read(job.input)?;
+    stop.check()?;
     let aside = reserve(job, &scene)?;
     let optimised = optimise(engine, &scene.gaussians, job.message, job.settings, progress)?;
 
+    stop.check()?;
     progress(Progress::Writing);
     let colours = optimised.colours(&scene.gaussians.sh);
     // The new file is complete before it replaces the reserved one, so free that one's space first.
     std::fs::write(&aside, []).map_err(Error::io(job.output))?;
     scene.write(&aside, &colours).map_err(|e| named(e, job.output))?;
     drop(colours);
+    stop.check()?;
     let marked = Scene::read(&aside).map_err(|e| named(e, job.output))?.gaussians;
     check_geometry(job.output, &scene, &marked)?;
 

@@ -33,7 +33,7 @@ pub struct Verification {
 /// Renders held-out views of both scenes over white, compares and reads them.
 ///
 /// # Errors
-/// An empty scene or a failing device.
+/// An empty scene, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn verify(
     engine: &Engine,
     original: &Gaussians,
@@ -55,7 +55,7 @@ pub fn verify(
         pairs.push((before?, after));
         done(index + 1);
     }
-    let quality = measure(&pairs, engine.lpips.as_ref(), &engine.compute.device)?;
+    let quality = measure(&pairs, engine.lpips.as_ref(), &engine.compute.device, &engine.stop)?;
     pairs.truncate(KEPT_PAIRS);
     let reading = Reading::new(logits)?;
     let read = reading.of_first(settings.verify.message_views)?.message()?;

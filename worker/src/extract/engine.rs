@@ -10,6 +10,7 @@ use crate::picture::Picture;
 use crate::quality::{Lpips, batch};
 use crate::scene::Gaussians;
 use crate::splat::{CpuRasterizer, GpuRasterizer, PreparedView, Rasterizer, WeightCache, prepare, sh};
+use crate::stop::Stop;
 use crate::view::Camera;
 
 /// Pictures given to CLIP at once when no gradient is needed.
@@ -47,6 +48,8 @@ pub struct Engine {
     pub rasterizer: Box<dyn Rasterizer>,
     /// Perceptual distance, where its weights are.
     pub lpips: Option<Lpips>,
+    /// Ends whatever is being computed, with [`Error::Stopped`](crate::Error::Stopped).
+    pub stop: Stop,
 }
 
 impl Engine {
@@ -73,6 +76,7 @@ impl Engine {
             compute,
             clip,
             lpips,
+            stop: Stop::default(),
         })
     }
 
@@ -84,11 +88,12 @@ impl Engine {
     /// Logits of each picture, `bits` numbers a picture. Sizes may differ.
     ///
     /// # Errors
-    /// Pictures without pixels, or a failing device.
+    /// Pictures without pixels, a failing device, or [`Error::Stopped`].
     pub fn read_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
         let mut rows = Vec::with_capacity(pictures.len());
         for same in pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
             for chunk in same.chunks(READ_BATCH) {
+                self.stop.check()?;
                 let chunk: Vec<&Picture> = chunk.iter().collect();
                 let logits = self.logits(batch(&chunk, &self.compute.device)?);
                 rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
@@ -120,8 +125,9 @@ impl Engine {
     /// The 8-bit picture of a view that is drawn once.
     ///
     /// # Errors
-    /// Those of [`prepare`] and of the renderer.
+    /// Those of [`prepare`] and of the renderer; [`Error::Stopped`].
     pub fn picture(&self, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
+        self.stop.check()?;
         let view = prepare(gaussians, camera, WeightCache::None)?;
         let colours = sh::colours(&gaussians.sh, None, &view);
         Ok(self.rasterizer.render(&view, &colours, background)?.to_8_bit())
@@ -131,8 +137,12 @@ impl Engine {
     /// the threads of a pool could block them all.
     ///
     /// # Errors
-    /// The first of `work`.
+    /// The first of `work`; [`Error::Stopped`], which is looked at before each item.
     pub fn each<I: Sync, O: Send>(&self, items: &[I], work: impl Fn(&I) -> Result<O> + Send + Sync) -> Result<Vec<O>> {
+        let work = |item: &I| {
+            self.stop.check()?;
+            work(item)
+        };
         if on_cpu(&self.compute) {
             items.par_iter().map(work).collect()
         } else {

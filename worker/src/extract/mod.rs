@@ -33,7 +33,7 @@ pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<Reading> {
 /// view.
 ///
 /// # Errors
-/// An empty scene, a size out of range, or a failing device.
+/// An empty scene, a size out of range, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn read_scene(
     engine: &Engine,
     gaussians: &Gaussians,

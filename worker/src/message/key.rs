@@ -15,6 +15,7 @@ use super::reader::Reader;
 use super::tokens::{CONTEXT, TokenTable, hmac_sha256};
 use super::training::{Progress, TrainingOptions, train};
 use crate::error::{Error, Result};
+use crate::stop::Stop;
 
 /// Which CLIP a key belongs to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -102,6 +103,7 @@ impl Key {
         projection: Projection,
         encode: impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
         device: &Device,
+        stop: &Stop,
         progress: impl FnMut(Progress),
     ) -> Result<Self> {
         check_bits(options.bits)?;
@@ -121,7 +123,7 @@ impl Key {
             seed,
             ..options.training.clone()
         };
-        let trained = train(&table, &projection, encode, &training, device, progress)?;
+        let trained = train(&table, &projection, encode, &training, device, stop, progress)?;
         Ok(Self {
             secret,
             seed: options.seed,
@@ -192,6 +194,22 @@ impl Key {
     pub fn read(path: &Path) -> Result<Self> {
         key_file::read(path)
     }
+
+    /// The bytes of the key file. They hold the secret.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        key_file::serialize(self).map_err(|reason| Error::BadKey {
+            path: self.id().into(),
+            reason,
+        })
+    }
+
+    /// A key from the bytes of its file, checked as [`Key::read`] does; `name` is for messages.
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
+        key_file::deserialize(bytes).map_err(|reason| Error::BadKey {
+            path: name.into(),
+            reason,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -220,7 +238,16 @@ mod tests {
             seed,
             training,
         };
-        Key::create(&options, clip, Projection::identity(8), encode, &Device::flex(), |_| {}).unwrap()
+        Key::create(
+            &options,
+            clip,
+            Projection::identity(8),
+            encode,
+            &Device::flex(),
+            &Stop::default(),
+            |_| {},
+        )
+        .unwrap()
     }
 
     #[test]

@@ -17,8 +17,8 @@ use crate::error::{Error, Result};
 const VERSION: u32 = 1;
 /// Where the JSON text lies in the metadata.
 const HEADER: &str = "guardsplat_key";
-/// Largest file that is read; the widest key of a CLIP of 1024 dimensions has 13 MiB.
-const MAX_BYTES: u64 = 256 << 20;
+/// Largest file that is read, here and by whoever has it sent; the widest key of a CLIP of 1024 dimensions has 13 MiB.
+pub const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -90,7 +90,8 @@ pub(super) fn write(key: &Key, path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn serialize(key: &Key) -> Result<Vec<u8>, String> {
+/// The file's bytes.
+pub(super) fn serialize(key: &Key) -> Result<Vec<u8>, String> {
     let header = Header {
         version: VERSION,
         id: key.id(),
@@ -136,7 +137,8 @@ pub(super) fn read(path: &Path) -> Result<Key> {
     })
 }
 
-fn deserialize(bytes: &[u8]) -> Result<Key, String> {
+/// A key from the file's bytes, checked against its id.
+pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     let not_a_key = |e: safetensors::SafeTensorError| format!("not a key file, or a truncated one ({e})");
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(not_a_key)?;
     let json = metadata.metadata().as_ref().and_then(|m| m.get(HEADER));
@@ -258,7 +260,10 @@ mod tests {
         let key = key();
         key.write(&path).unwrap();
         assert_eq!(Key::read(&path).unwrap(), key);
-        assert_eq!(std::fs::read(&path).unwrap(), serialize(&key).unwrap());
+        assert_eq!(std::fs::read(&path).unwrap(), key.to_bytes().unwrap());
+        assert_eq!(Key::from_bytes("k", &key.to_bytes().unwrap()).unwrap(), key);
+        let error = Key::from_bytes("k", b"nothing").unwrap_err().to_string();
+        assert!(error.starts_with("key k: not a key file"), "{error}");
         assert_eq!(serialize(&key).unwrap(), serialize(&key.clone()).unwrap());
         key.write(&path).unwrap(); // replaces
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);

@@ -16,6 +16,7 @@ pub use bits::{MAX_BITS, Message};
 pub use decoder::{Decoder, DecoderWeights, bce_from_logits};
 pub use fit::{FitOptions, fit};
 pub use key::{ClipIdentity, Key, KeyOptions};
+pub use key_file::MAX_BYTES as MAX_KEY_BYTES;
 pub use projection::Projection;
 pub use reader::Reader;
 pub use significance::{Decision, FALSE_POSITIVE_RATE, Verdict, decide};

@@ -11,6 +11,7 @@ use super::projection::Projection;
 use super::samples::{Samples, distinct_messages, noise_pool, shuffle};
 use super::tokens::{CONTEXT, TokenTable};
 use crate::error::{Error, Result};
+use crate::stop::Stop;
 
 /// Sequences given to the text tower at once.
 const ENCODE_BATCH: usize = 64;
@@ -78,13 +79,14 @@ pub enum Progress {
 /// called with at most 64 sequences at a time. On the CPU the same seed gives the same weights.
 ///
 /// # Errors
-/// Those of `encode`, features of another size or not finite, and a loss that stops being a number.
+/// Those of `encode`, features of another size or not finite, a loss that stops being a number, and [`Error::Stopped`].
 pub fn train(
     table: &TokenTable,
     projection: &Projection,
     mut encode: impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
     options: &TrainingOptions,
     device: &Device,
+    stop: &Stop,
     mut progress: impl FnMut(Progress),
 ) -> Result<Trained> {
     check(options)?;
@@ -131,6 +133,7 @@ pub fn train(
     for _ in 0..epochs {
         shuffle(&mut order, &mut rng);
         for rows in order.chunks(options.batch) {
+            stop.check()?;
             let (features, targets) = seen.batch(rows, Some((&noise, &mut rng)), &tracking);
             let loss = bce_from_logits(decoder.forward(features), targets);
             if step % 64 == 0 {
@@ -267,7 +270,16 @@ mod tests {
         let projection = projection(&table, 0.1);
         let run = |seed| {
             let options = TrainingOptions { seed, ..options() };
-            train(&table, &projection, tower, &options, &Device::flex(), |_| {}).unwrap()
+            train(
+                &table,
+                &projection,
+                tower,
+                &options,
+                &Device::flex(),
+                &Stop::default(),
+                |_| {},
+            )
+            .unwrap()
         };
         let first = run(3);
         assert_eq!(first.steps, 160);
@@ -292,6 +304,7 @@ mod tests {
                 tower,
                 &options(),
                 &Device::flex(),
+                &Stop::default(),
                 |_| {},
             )
             .unwrap()
@@ -315,6 +328,7 @@ mod tests {
             tower,
             &options(),
             &Device::flex(),
+            &Stop::default(),
             |_| {},
         )
         .unwrap();
@@ -327,7 +341,7 @@ mod tests {
         let table = TokenTable::new(&[9; 32], 8).unwrap();
         let p = Projection::identity(WIDTH);
         let run = |encode: fn(&[[i64; CONTEXT]]) -> Result<Vec<f32>>, options: &TrainingOptions| {
-            train(&table, &p, encode, options, &Device::flex(), |_| {})
+            train(&table, &p, encode, options, &Device::flex(), &Stop::default(), |_| {})
                 .unwrap_err()
                 .to_string()
         };
@@ -356,6 +370,7 @@ mod tests {
             tower,
             &options,
             &Device::flex(),
+            &Stop::default(),
             |p| told.push(p),
         )
         .unwrap();

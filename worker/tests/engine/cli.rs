@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 use guardsplat_worker::clip::Precision;
 use serde_json::Value;
 
-use super::{TINY, cpu, files, model};
+use super::{cpu, files, model, tiny};
 
 /// A folder with a tiny CLIP in it.
 struct Bench(tempfile::TempDir);
@@ -13,11 +13,7 @@ struct Bench(tempfile::TempDir);
 impl Bench {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let clip = folder.path().join("clip");
-        std::fs::create_dir(&clip).unwrap();
-        std::fs::write(clip.join("config.json"), TINY).unwrap();
-        let (_, model) = model(&cpu());
-        model.save(&clip.join("model.safetensors"), Precision::F32).unwrap();
+        tiny::write(&folder.path().join("clip"));
         Self(folder)
     }
 

@@ -1,9 +1,9 @@
-//! Loads what commands have in common: key, CLIP, device and LPIPS.
+//! Loads what embedding and verifying need: CLIP, LPIPS, and the engine for a key.
 use std::path::Path;
 
 use guardsplat_worker::Result;
 use guardsplat_worker::clip::{Clip, Parts};
-use guardsplat_worker::device::{Compute, DeviceChoice, open};
+use guardsplat_worker::device::Compute;
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::{ClipIdentity, Key};
 use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
@@ -40,15 +40,9 @@ pub fn lpips(compute: &Compute) -> Result<Option<Lpips>> {
     }
 }
 
-/// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names.
-pub fn engine(
-    path: &Path,
-    key: &Key,
-    clip_name: Option<&str>,
-    device: DeviceChoice,
-    with_lpips: bool,
-) -> Result<Engine> {
-    let compute = open(device)?;
+/// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names. `path` names the
+/// key in messages.
+pub fn engine(path: &Path, key: &Key, clip_name: Option<&str>, compute: Compute, with_lpips: bool) -> Result<Engine> {
     let name = clip_name.unwrap_or(&key.clip.name);
     let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
     key.require_clip(path, &identity)?;

@@ -1,0 +1,142 @@
+//! One attempt at a leased job: what all kinds of jobs need on the way from inputs to outputs.
+use std::path::{Path, PathBuf};
+
+use guardsplat_proto::v1::job::Spec;
+use guardsplat_proto::v1::progress::Stage;
+use guardsplat_proto::v1::{Job, complete_job_request};
+use guardsplat_worker::Error as EngineError;
+use guardsplat_worker::stop::Stop;
+
+use super::accelerator::Accelerator;
+use super::bench::Bench;
+use super::convert;
+use super::error::{Error, Result};
+use super::lease::{Lease, Reporter};
+use super::server::Server;
+use super::transfer::{self, Content};
+use super::{embedding, new_key, verifying};
+
+/// An attempt under way.
+pub struct Attempt<'a> {
+    /// Where inputs come from and outputs go.
+    pub server: &'a Server,
+    /// Where to compute.
+    pub accelerator: &'a Accelerator,
+    /// The right to it.
+    pub lease: &'a Lease,
+    /// For the job's files.
+    pub folder: &'a Path,
+    /// Ends the computing.
+    pub stop: &'a Stop,
+    /// Hears of progress.
+    pub reporter: Reporter,
+    /// What users know the downloaded files as.
+    pub known_as: Vec<(PathBuf, String)>,
+}
+
+impl Attempt<'_> {
+    /// Does all that the job asks for.
+    ///
+    /// # Errors
+    /// Whatever goes wrong, with files called as users know them.
+    pub async fn carry_out(&mut self, job: &Job) -> Result<()> {
+        self.reporter.tell(convert::stage(Stage::Preparing, 0, 0));
+        let result = self.compute_and_store(job).await;
+        let result = result.map_err(|error| match error {
+            Error::Engine(error) => Error::Engine(renamed(error, &self.known_as)),
+            other => other,
+        })?;
+        self.lease.complete(result).await
+    }
+
+    async fn compute_and_store(&mut self, job: &Job) -> Result<complete_job_request::Result> {
+        match &job.spec {
+            Some(Spec::Embed(spec)) => embedding::carry_out(self, spec).await,
+            Some(Spec::Verify(spec)) => verifying::carry_out(self, spec).await,
+            Some(Spec::CreateKey(spec)) => new_key::carry_out(self, spec).await,
+            None => Err(Error::Damaged {
+                what: job.name.clone(),
+                reason: "a kind of job that this worker does not know".into(),
+            }),
+        }
+    }
+
+    /// Fetches artifacts; the files are in their order.
+    pub async fn download(&mut self, names: &[&str]) -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::with_capacity(names.len());
+        for (index, name) in names.iter().enumerate() {
+            let path = self.folder.join(format!("input-{index}"));
+            let artifact = transfer::download(self.server, name, &path).await?;
+            let known_as = match artifact.display_name.as_str() {
+                "" => (*name).to_owned(),
+                display_name => format!("{display_name} ({name})"),
+            };
+            self.known_as.push((path.clone(), known_as));
+            paths.push(path);
+            let (done, total) = (index + 1, names.len());
+            self.reporter.tell(convert::stage(Stage::Preparing, done, total));
+        }
+        Ok(paths)
+    }
+
+    /// Fetches the bytes of the job's key.
+    pub async fn download_key(&self) -> Result<Vec<u8>> {
+        transfer::download_key(self.server, self.lease).await
+    }
+
+    /// Does `work` with the engine.
+    pub async fn compute<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Bench, &Stop, &Reporter) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        self.reporter.tell(convert::stage(Stage::Preparing, 0, 0));
+        let (stop, reporter) = (self.stop.clone(), self.reporter.clone());
+        self.accelerator.run(move |bench| work(bench, &stop, &reporter)).await?
+    }
+
+    /// Stores an output under a name for people, and gives its artifact's.
+    pub async fn upload(&self, name: &str, content: Content, secret: bool) -> Result<String> {
+        self.reporter.tell(convert::stage(Stage::Storing, 0, 0));
+        transfer::upload(self.server, self.lease, name, &content, secret).await
+    }
+}
+
+/// The error of a downloaded file, told of what users know it as.
+fn renamed(error: EngineError, known_as: &[(PathBuf, String)]) -> EngineError {
+    let name = |path: PathBuf| match known_as.iter().find(|(known, _)| *known == path) {
+        Some((_, name)) => name.into(),
+        None => path,
+    };
+    match error {
+        EngineError::BadScene { path, reason } => EngineError::BadScene {
+            path: name(path),
+            reason,
+        },
+        EngineError::BadPicture { path, reason } => EngineError::BadPicture {
+            path: name(path),
+            reason,
+        },
+        EngineError::Io { path, source } => EngineError::Io {
+            path: name(path),
+            source,
+        },
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn users_hear_of_their_own_files() {
+        let known_as = [(PathBuf::from("/tmp/job/input-0"), "robot.ply (artifacts/7)".to_owned())];
+        let bad = |path: &str| EngineError::BadScene {
+            path: path.into(),
+            reason: "row 3".into(),
+        };
+        let told = |path: &str| renamed(bad(path), &known_as).to_string();
+        assert_eq!(told("/tmp/job/input-0"), "robot.ply (artifacts/7): row 3");
+        assert_eq!(told("/tmp/job/marked.ply"), "/tmp/job/marked.ply: row 3");
+    }
+}

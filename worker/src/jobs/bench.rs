@@ -1,0 +1,52 @@
+//! What the engine's thread keeps between jobs: the device, and the engine of the key that was used last.
+use std::path::Path;
+
+use guardsplat_worker::Result;
+use guardsplat_worker::device::{Compute, DeviceChoice, open};
+use guardsplat_worker::extract::Engine;
+use guardsplat_worker::message::Key;
+use guardsplat_worker::stop::Stop;
+
+use crate::work::load;
+
+/// A device with an engine on it.
+pub struct Bench {
+    compute: Compute,
+    /// The key's id, and its engine.
+    loaded: Option<(String, Engine)>,
+}
+
+impl Bench {
+    /// Opens the device.
+    pub fn open(device: DeviceChoice) -> Result<Self> {
+        Ok(Self {
+            compute: open(device)?,
+            loaded: None,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        &self.compute.name
+    }
+
+    /// The device.
+    pub fn compute(&self) -> &Compute {
+        &self.compute
+    }
+
+    /// The engine for `key`, the one from before if it is the same key's; it heeds `stop`. `name` is the key's, for
+    /// messages.
+    pub fn engine(&mut self, name: &str, key: &Key, stop: &Stop) -> Result<&Engine> {
+        stop.check()?;
+        let id = key.id();
+        let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
+        let engine = match kept {
+            Some((_, engine)) => engine,
+            None => load::engine(Path::new(name), key, None, self.compute.clone(), true)?,
+        };
+        let (_, engine) = self.loaded.insert((id, engine));
+        engine.stop = stop.clone();
+        Ok(engine)
+    }
+}

@@ -1,0 +1,170 @@
+//! Between the API's messages and the engine's types.
+use std::time::Duration;
+
+use guardsplat_proto::v1::embed_spec::Preset as ApiPreset;
+use guardsplat_proto::v1::failure::Reason;
+use guardsplat_proto::v1::progress::Stage;
+use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
+use guardsplat_proto::v1::{self as api};
+use guardsplat_worker::Error as EngineError;
+use guardsplat_worker::embed::{self, NewKey, Outcome, Preset, Settings};
+use guardsplat_worker::extract::DEFAULT_VIEWS;
+use guardsplat_worker::message::training::Progress as Training;
+use guardsplat_worker::message::{Key, Verdict};
+
+use super::error::{Error, Result};
+use crate::work::findings::{Findings, Views};
+use crate::work::settings::chosen;
+
+/// What is behind scenes, and behind pictures with transparent pixels.
+const WHITE: [f32; 3] = [1.0; 3];
+
+/// The settings that an embedding asks for.
+pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
+    let preset = match ApiPreset::try_from(spec.preset) {
+        Ok(ApiPreset::Unspecified | ApiPreset::Standard) => Preset::Standard,
+        Ok(ApiPreset::Draft) => Preset::Draft,
+        Ok(ApiPreset::Paper) => Preset::Paper,
+        Err(_) => return Err(Error::BadJob(format!("preset: {} is none", spec.preset))),
+    };
+    let size = Some(spec.size).filter(|size| *size > 0);
+    Ok(chosen(preset.settings(), spec.seed, size)?)
+}
+
+/// The views that a verification asks for.
+pub fn views(spec: &api::VerifySpec) -> Result<Views> {
+    let within = |field: &str, value: u32, low: u32, high: u32| match value {
+        0 => Ok(None),
+        value if (low..=high).contains(&value) => Ok(Some(value)),
+        value => Err(Error::BadJob(format!("{field}: {value} is outside {low} to {high}"))),
+    };
+    Ok(Views {
+        count: within("views", spec.views, 1, 10_000)?.map_or(DEFAULT_VIEWS, |views| views as usize),
+        size: within("size", spec.size, 16, 4096)?,
+        background: WHITE,
+        seed: spec.seed,
+    })
+}
+
+/// Progress without figures.
+pub fn stage(stage: Stage, done: usize, total: usize) -> api::Progress {
+    api::Progress {
+        stage: stage.into(),
+        done: done as i64,
+        total: total as i64,
+        bit_accuracy: None,
+        psnr_db: None,
+    }
+}
+
+/// What is new of an embedding, if it is for the API.
+pub fn embedding_progress(progress: &embed::Progress) -> Option<api::Progress> {
+    match progress {
+        embed::Progress::Step(step) => Some(api::Progress {
+            bit_accuracy: Some(step.bit_accuracy),
+            psnr_db: Some(step.psnr_db).filter(|db| db.is_finite()),
+            ..stage(Stage::Optimising, step.step, step.total)
+        }),
+        embed::Progress::Verifying { done, total } => Some(stage(Stage::Reading, *done, *total)),
+        embed::Progress::Check(_) | embed::Progress::Stopped { .. } | embed::Progress::Writing => None,
+    }
+}
+
+/// How far a key has come.
+pub fn key_progress(progress: NewKey) -> api::Progress {
+    match progress {
+        NewKey::Pictures(done, total) | NewKey::Decoder(Training::Encoding(done, total)) => {
+            stage(Stage::Preparing, done, total)
+        }
+        NewKey::Decoder(Training::Training(done, total)) => stage(Stage::Optimising, done, total),
+    }
+}
+
+/// The figures of an embedding.
+pub fn embed_result(outcome: &Outcome) -> api::EmbedResult {
+    let found = &outcome.verification;
+    api::EmbedResult {
+        bit_accuracy: found.comparison.bit_accuracy,
+        bit_accuracy_worst_view: found.comparison.bit_accuracy_worst_view,
+        message: found.message.to_string(),
+        message_recovered: found.message_recovered,
+        psnr_db: found.quality.psnr.psnr_db,
+        ssim: found.quality.ssim,
+        lpips: found.quality.lpips,
+        steps: outcome.steps as u32,
+        view_steps: outcome.view_steps as u64,
+        target_missed: outcome.missed.clone(),
+        gaussians: outcome.gaussians as u64,
+        changed_gaussians: outcome.changed as u64,
+        ..api::EmbedResult::default()
+    }
+}
+
+/// The figures of a verification.
+pub fn verify_result(found: Findings) -> api::VerifyResult {
+    let verdict = match found.verdict {
+        Verdict::Match => ApiVerdict::Match,
+        Verdict::NoMatch => ApiVerdict::NoMatch,
+        Verdict::Inconclusive => ApiVerdict::Inconclusive,
+    };
+    api::VerifyResult {
+        verdict: verdict.into(),
+        p_value: found.p_value,
+        threshold: found.threshold,
+        matched_bits: found.matched_bits,
+        needed_bits: found.needed_bits,
+        bits: found.bits as u32,
+        views: found.views as u32,
+        message: found.message,
+        bit_accuracy: found.bit_accuracy,
+        bit_accuracy_worst_view: found.bit_accuracy_worst_view,
+        mean_abs_logit: found.mean_abs_logit,
+        view_agreement: found.view_agreement,
+        reason: found.reason.unwrap_or_default(),
+        ..api::VerifyResult::default()
+    }
+}
+
+/// What may be known of a key.
+pub fn key(key: &Key) -> api::Key {
+    api::Key {
+        bits: key.bits() as u32,
+        clip: key.clip.name.clone(),
+        clip_sha256: key.clip.hash.clone(),
+        seeded: key.seed.is_some(),
+        ..api::Key::default()
+    }
+}
+
+/// A duration; absent were it longer than the API can say.
+pub fn duration(duration: Duration) -> Option<prost_types::Duration> {
+    duration.try_into().ok()
+}
+
+/// What users are told of a failed attempt, and whether another one may succeed.
+pub fn failure(error: &Error) -> (api::Failure, bool) {
+    let (reason, retryable) = match error {
+        Error::TargetMissed(_) => (Reason::TargetMissed, false),
+        Error::BadJob(_) => (Reason::InvalidInput, false),
+        Error::Panicked(_) | Error::Stuck(_) => (Reason::Internal, true),
+        Error::Engine(error) => match error {
+            EngineError::BadScene { .. } | EngineError::BadPicture { .. } | EngineError::BadOption { .. } => {
+                (Reason::InvalidInput, false)
+            }
+            EngineError::Device { .. } => (Reason::WorkerLost, true),
+            // The same numbers come out next time.
+            EngineError::NotFinite { .. } => (Reason::Internal, false),
+            // A full disk, or a key whose CLIP only other workers have.
+            _ => (Reason::Internal, true),
+        },
+        _ => (Reason::Internal, true),
+    };
+    let failure = api::Failure {
+        reason: reason.into(),
+        message: error.to_string(),
+    };
+    (failure, retryable)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,80 @@
+//! `embed` jobs: the same bytes as the command's for the same seed.
+use std::time::{Duration, Instant};
+
+use guardsplat_proto::v1::complete_job_request::Result as Done;
+use guardsplat_proto::v1::{EmbedResult, EmbedSpec};
+use guardsplat_worker::Error as EngineError;
+use guardsplat_worker::embed::{Job, Outcome, embed};
+use guardsplat_worker::message::Key;
+use guardsplat_worker::quality::{PictureFormat, encode_picture};
+
+use super::attempt::Attempt;
+use super::convert;
+use super::error::{Error, Result};
+use super::transfer::Content;
+use crate::work::sheet;
+
+/// A scene that was marked.
+struct Marked {
+    outcome: Outcome,
+    sheet: Vec<u8>,
+    device: String,
+    clip: String,
+    duration: Duration,
+}
+
+/// Fetches scene and key, marks, stores the marked scene and a picture of what changed.
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Done> {
+    let settings = convert::settings(spec)?;
+    let input = attempt.download(&[&spec.scene]).await?.swap_remove(0);
+    let key_file = attempt.download_key().await?;
+    let output = attempt.folder.join("marked.ply");
+    let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
+    let marked_file = Content::File(output.clone());
+    let work = attempt.compute(move |bench, stop, reporter| {
+        let start = Instant::now();
+        let key = Key::from_bytes(&name, &key_file)?;
+        drop(key_file);
+        let message = key.message(&message)?;
+        let device = bench.device().to_owned();
+        let engine = bench.engine(&name, &key, stop)?;
+        let job = Job {
+            input: &input,
+            output: &output,
+            message: &message,
+            settings: &settings,
+            force,
+        };
+        let outcome = embed(engine, &job, &mut |progress| {
+            if let Some(progress) = convert::embedding_progress(&progress) {
+                reporter.tell(progress);
+            }
+        })?;
+        if !outcome.written {
+            return Err(Error::TargetMissed(outcome.missed.join(", ")));
+        }
+        let sheet = sheet::of(&outcome.verification.pairs)?;
+        let sheet = encode_picture(&sheet, PictureFormat::Png).map_err(|reason| EngineError::BadPicture {
+            path: sheet::NAME.into(),
+            reason,
+        })?;
+        Ok(Marked {
+            outcome,
+            sheet,
+            device,
+            clip: key.clip.name.clone(),
+            duration: start.elapsed(),
+        })
+    });
+    let marked = work.await?;
+    let scene = attempt.upload("marked.ply", marked_file, false).await?;
+    let comparison = attempt.upload(sheet::NAME, Content::Bytes(marked.sheet), false).await?;
+    Ok(Done::EmbedResult(EmbedResult {
+        scene,
+        comparison,
+        duration: convert::duration(marked.duration),
+        device: marked.device,
+        clip: marked.clip,
+        ..convert::embed_result(&marked.outcome)
+    }))
+}

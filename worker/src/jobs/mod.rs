@@ -1,0 +1,86 @@
+//! The worker of a server: leases jobs, carries them out with the engine, and hands back what came out.
+//!
+//! One task talks to the server, a thread of its own computes ([`accelerator`]). Heartbeats go on meanwhile
+//! ([`lease`]), and bring word when a job was cancelled or given to another worker.
+mod accelerator;
+mod attempt;
+mod backoff;
+mod bench;
+mod convert;
+mod embedding;
+mod error;
+mod folder;
+mod lease;
+mod new_key;
+mod server;
+mod signals;
+mod transfer;
+mod verifying;
+mod worker;
+
+use std::path::PathBuf;
+
+use guardsplat_worker::device::DeviceChoice;
+
+use accelerator::Accelerator;
+pub use error::{Error, Result};
+use folder::Folder;
+use server::Server;
+use worker::Worker;
+
+/// Most characters of a machine's name in a worker's.
+const HOST_CHARACTERS: usize = 40;
+
+/// What a worker is started with.
+pub struct Options {
+    /// The server's address.
+    pub server: String,
+    /// Where to compute.
+    pub device: DeviceChoice,
+    /// What the worker calls itself.
+    pub name: Option<String>,
+    /// Whether the end of standard input asks the worker to leave.
+    pub stop_with_stdin: bool,
+    /// Where the files of jobs are kept for as long as these last.
+    pub work_dir: Option<PathBuf>,
+}
+
+/// Works until it is asked to leave.
+///
+/// # Errors
+/// Bad options, a device that can't be opened or is lost, an engine that panics, and a server that will have nothing to
+/// do with this worker.
+pub fn run(options: &Options) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(Error::io("the worker's event loop"))?;
+    let result = runtime.block_on(work(options));
+    // Whatever still reads or writes a file is of no use any more.
+    runtime.shutdown_background();
+    result
+}
+
+async fn work(options: &Options) -> Result<()> {
+    let server = Server::new(&options.server)?;
+    let leaving = signals::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
+    let parent = options.work_dir.clone().unwrap_or_else(std::env::temp_dir);
+    let folder = Folder::new(&parent)?;
+    let (accelerator, device) = Accelerator::start(options.device).await?;
+    let name = options.name.clone().unwrap_or_else(default_name);
+    tracing::info!(worker = name, device, server = options.server, "ready for jobs");
+    let mut worker = Worker {
+        server,
+        leaving,
+        folder,
+        accelerator,
+        name,
+    };
+    worker.serve().await
+}
+
+/// The machine's name and the process's number.
+fn default_name() -> String {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let host: String = host.trim().chars().take(HOST_CHARACTERS).collect();
+    let host = if host.is_empty() { "worker" } else { &host };
+    format!("{host}-{}", std::process::id())
+}

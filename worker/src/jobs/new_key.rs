@@ -1,0 +1,57 @@
+//! `create_key` jobs: the key file goes to the server as a secret, and is never on this machine's disk.
+use std::time::{Duration, Instant};
+
+use guardsplat_proto::v1::complete_job_request::Result as Done;
+use guardsplat_proto::v1::{KeyOutput, KeyResult, KeySpec};
+use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
+
+use super::attempt::Attempt;
+use super::convert;
+use super::error::Result;
+use super::transfer::Content;
+use crate::work::keys::{self, Kept};
+
+/// A key, before it is stored.
+struct Made {
+    key: Key,
+    file: Vec<u8>,
+    device: String,
+    duration: Duration,
+}
+
+/// Makes the key and stores it.
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done> {
+    let options = KeyOptions {
+        bits: spec.bits as usize,
+        seed: spec.seed,
+        training: TrainingOptions::default(),
+    };
+    let work = attempt.compute(move |bench, stop, reporter| {
+        let start = Instant::now();
+        let compute = bench.compute();
+        let key = keys::create(&options, Kept::default(), None, compute, stop, |progress| {
+            reporter.tell(convert::key_progress(progress));
+        })?;
+        Ok(Made {
+            file: key.to_bytes()?,
+            key,
+            device: compute.name.clone(),
+            duration: start.elapsed(),
+        })
+    });
+    let made = work.await?;
+    let key_file = attempt
+        .upload("guardsplat.key", Content::Bytes(made.file), true)
+        .await?;
+    Ok(Done::KeyOutput(KeyOutput {
+        key_file,
+        key: Some(convert::key(&made.key)),
+        result: Some(KeyResult {
+            key: String::new(),
+            bit_accuracy_unseen: made.key.accuracy_unseen,
+            bit_accuracy_unseen_noisy: made.key.accuracy_unseen_noisy,
+            duration: convert::duration(made.duration),
+            device: made.device,
+        }),
+    }))
+}

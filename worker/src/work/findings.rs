@@ -1,0 +1,114 @@
+//! What a verification finds: reads a scene or pictures, and says whether the message is there.
+use guardsplat_worker::Result;
+use guardsplat_worker::extract::{Comparison, Engine, Reading, Source, default_size, read_scene};
+use guardsplat_worker::message::Verdict;
+use guardsplat_worker::quality::read_picture;
+use guardsplat_worker::scene::Scene;
+use serde::Serialize;
+
+/// Why a reading that has nothing to be compared with decides nothing.
+const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
+
+/// From where a scene is read.
+pub struct Views {
+    /// How many views.
+    pub count: usize,
+    /// Their side in pixels; what CLIP takes in unless given.
+    pub size: Option<u32>,
+    /// What is behind the scene, or shows through transparent pixels of pictures.
+    pub background: [f32; 3],
+    /// Decides them.
+    pub seed: u64,
+}
+
+/// Reads `source`; `progress` hears how many views or pictures are done, and of how many.
+pub fn read(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Reading> {
+    match source {
+        Source::Scene(path) => {
+            let scene = Scene::read(path)?.gaussians;
+            let size = views.size.unwrap_or_else(|| default_size(engine));
+            read_scene(
+                engine,
+                &scene,
+                views.count,
+                size,
+                views.background,
+                views.seed,
+                |done| {
+                    progress(done, views.count);
+                },
+            )
+        }
+        Source::Pictures(paths) => {
+            let mut read = Vec::with_capacity(paths.len());
+            // One at a time: thousands of large pictures need not fit in memory.
+            for (index, path) in paths.iter().enumerate() {
+                let picture = read_picture(path, views.background)?;
+                read.extend(engine.read_logits(&[picture])?);
+                progress(index + 1, paths.len());
+            }
+            Reading::new(read)
+        }
+    }
+}
+
+/// The outcome, with the names of the program's JSON.
+#[derive(Serialize)]
+pub struct Findings {
+    /// Whether the message is there.
+    pub verdict: Verdict,
+    /// Probability that as many bits match by chance.
+    pub p_value: Option<f64>,
+    /// A match needs a p-value at or below this.
+    pub threshold: Option<f64>,
+    /// Bits that match.
+    pub matched_bits: Option<u32>,
+    /// Matches that the verdict needs.
+    pub needed_bits: Option<u32>,
+    /// Bits compared.
+    pub bits: usize,
+    /// Views or pictures read.
+    pub views: usize,
+    /// The message read.
+    pub message: String,
+    /// Mean share of bits of a view that match.
+    pub bit_accuracy: Option<f64>,
+    /// The same of the worst view.
+    pub bit_accuracy_worst_view: Option<f64>,
+    /// Mean distance of the bits' logits from the threshold.
+    pub mean_abs_logit: f64,
+    /// Mean share of views that agree with the decision on a bit.
+    pub view_agreement: f64,
+    /// Why nothing could be decided.
+    pub reason: Option<String>,
+}
+
+impl Findings {
+    /// What a reading and its comparison with a claimed message, if there was one, say.
+    pub fn new(reading: &Reading, comparison: Option<&Comparison>) -> Result<Self> {
+        let decision = comparison.map(|c| &c.decision);
+        Ok(Self {
+            verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
+            p_value: decision.map(|d| d.p_value),
+            threshold: decision.map(|d| d.threshold),
+            matched_bits: decision.map(|d| d.matched_bits),
+            needed_bits: decision.and_then(|d| d.needed_bits),
+            bits: reading.summed.len(),
+            views: reading.views.len(),
+            message: reading.message()?.to_string(),
+            bit_accuracy: comparison.map(|c| c.bit_accuracy),
+            bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
+            mean_abs_logit: reading.mean_abs_logit(),
+            view_agreement: reading.agreement(),
+            reason: match decision {
+                Some(decision) => decision.reason.clone(),
+                None => Some(NOTHING_TO_COMPARE.into()),
+            },
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! Makes a key for the CLIP of a name.
+use guardsplat_worker::Result;
+use guardsplat_worker::clip::Parts;
+use guardsplat_worker::device::Compute;
+use guardsplat_worker::embed::{NewKey, create_key, natural};
+use guardsplat_worker::message::{FitOptions, Key, KeyOptions};
+use guardsplat_worker::stop::Stop;
+
+use super::load;
+
+/// What the projection ignores and keeps of CLIP's features, where experiments ask for something else than usual.
+#[derive(Clone, Copy, Default)]
+pub struct Kept {
+    /// Directions of strongest natural variation to drop; 64 unless given, at most an eighth of all.
+    pub remove: Option<usize>,
+    /// Dimensions to keep of the rest; all unless given.
+    pub keep: Option<usize>,
+}
+
+/// Makes a key for the CLIP called `clip`, the shipped one without a name.
+pub fn create(
+    options: &KeyOptions,
+    kept: Kept,
+    clip: Option<&str>,
+    compute: &Compute,
+    stop: &Stop,
+    progress: impl FnMut(NewKey),
+) -> Result<Key> {
+    let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
+    let projection = FitOptions {
+        remove: kept.remove.unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
+        keep: kept.keep,
+    };
+    stop.check()?;
+    let pictures = natural::pictures(compute, clip.config.vision.image_size as u32)?;
+    create_key(options, projection, &clip, identity, compute, pictures, stop, progress)
+}
