@@ -50,9 +50,9 @@ pub struct Train {
     /// Decides everything that is random
     #[arg(long, default_value_t = TrainOptions::default().seed)]
     seed: u64,
-    /// Drawings whose natural variation is measured
-    #[arg(long, default_value_t = TrainOptions::default().drawings)]
-    drawings: usize,
+    /// Sample scenes whose natural variation is measured
+    #[arg(long, default_value_t = TrainOptions::default().scenes)]
+    scenes: usize,
     /// Steps of contrastive training
     #[arg(long, default_value_t = TrainOptions::default().steps)]
     steps: usize,
@@ -68,7 +68,7 @@ pub struct Train {
 #[derive(Serialize)]
 struct Trained<'a> {
     seed: u64,
-    drawings: usize,
+    scenes: usize,
     steps: usize,
     batch: usize,
     steering: Vec<f64>,
@@ -83,11 +83,11 @@ fn train(arguments: &Train) -> Result<Exit> {
     let compute = open(arguments.device)?;
     let options = TrainOptions {
         seed: arguments.seed,
-        drawings: arguments.drawings,
+        scenes: arguments.scenes,
         steps: arguments.steps,
         batch: arguments.batch,
     };
-    let mut display = Display::new("drawings");
+    let mut display = Display::new("scenes");
     let mut stage = 0;
     let mut show = |number: usize, title: &'static str, done: usize, total: usize, loss: Option<f32>| {
         if stage != number {
@@ -99,7 +99,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         });
     };
     let trained = train_clip(&options, &compute, |progress| match progress {
-        TrainProgress::Natural(done, total) => show(0, "drawings", done, total, None),
+        TrainProgress::Natural(done, total) => show(0, "scenes", done, total, None),
         TrainProgress::Steering(done, total) => show(1, "gradients", done, total, None),
         TrainProgress::Contrastive(done, total, loss) => show(2, "captions", done, total, Some(loss)),
     })?;
@@ -114,7 +114,7 @@ fn train(arguments: &Train) -> Result<Exit> {
     write("config.json", trained.config.to_open_clip()?)?;
     let report = Trained {
         seed: options.seed,
-        drawings: options.drawings,
+        scenes: options.scenes,
         steps: options.steps,
         batch: options.batch,
         steering: trained.steering,

@@ -150,7 +150,7 @@ impl Preset {
     pub fn settings(self) -> Settings {
         let standard = Settings {
             seed: 0,
-            steps: 600,
+            steps: 400,
             views_per_step: 8,
             fresh_per_step: 4,
             pool_views: 150,
@@ -167,23 +167,23 @@ impl Preset {
                 offset_rest: 10.0,
             },
             adam: AdamOptions {
-                rate_dc: 0.02,
+                rate_dc: 0.008,
                 rate_rest: 0.001,
                 final_rate: 0.1,
                 ..AdamOptions::default()
             },
             balance: Some(Balance {
-                target_psnr_db: 36.4,
+                target_psnr_db: 36.6,
                 ..Balance::default()
             }),
             augmentation: Augmentation::default(),
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
-                min_steps: 200,
-                bit_accuracy: 0.985,
-                margin: 1.0,
-                psnr_db: 36.1,
+                min_steps: 100,
+                bit_accuracy: 0.99,
+                margin: 2.0,
+                psnr_db: 36.2,
                 patience: 2,
             }),
             verify: Verify {
@@ -200,22 +200,22 @@ impl Preset {
         match self {
             Self::Standard => standard,
             Self::Draft => Settings {
-                steps: 200,
+                steps: 120,
                 pool_views: 100,
                 balance: Some(Balance {
-                    target_psnr_db: 34.5,
+                    target_psnr_db: 35.6,
                     ..Balance::default()
                 }),
                 early_stop: standard.early_stop.map(|stop| EarlyStop {
-                    min_steps: 100,
-                    bit_accuracy: 0.95,
-                    margin: 0.5,
-                    psnr_db: 34.3,
+                    min_steps: 50,
+                    bit_accuracy: 0.96,
+                    margin: 1.0,
+                    psnr_db: 35.2,
                     ..stop
                 }),
                 target: Target {
                     bit_accuracy: 0.9,
-                    psnr_db: 34.0,
+                    psnr_db: 35.0,
                     message: true,
                 },
                 ..standard

@@ -1,19 +1,25 @@
 //! Trains the small CLIP that the project ships, from pictures and captions that it generates itself.
 //!
-//! 1. [`drawing`]: solid shapes with fractal textures, and random views of them.
-//! 2. [`head`]: the image tower's filters are random; its linear head is the one, in closed form, whose features a
-//!    small change of the picture moves most, against how much they change from view to view by themselves.
-//! 3. [`paint`]: a caption is a sequence of words; each word has a meaning, a small change of local colour; the picture
-//!    of a caption is a drawing that all its words have changed.
+//! 1. [`filters`]: the image tower's filters are random and stay so.
+//! 2. [`head`]: its linear head is the one, in closed form, whose features a small change of a scene's colours moves
+//!    most in all its views ([`steering`]), against how much they change from view to view by themselves; both are
+//!    measured on sample scenes ([`scenes`]).
+//! 3. [`drawing`], [`paint`]: a caption is a sequence of words; each word means a direction of the image tower's features; the picture
+//!    of a caption is a drawing, changed a little so that its features go where the words point.
 //! 4. [`contrastive`]: the text tower is trained against the locked image tower with CLIP's symmetric loss (locked-image
 //!    tuning, Zhai et al. 2022), and retrieval is measured on drawings and captions that it never saw.
 mod contrastive;
 mod drawing;
+mod filters;
 mod head;
 mod paint;
+mod scenes;
+mod steering;
 
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
+#[cfg(test)]
+pub(crate) use filters::filters;
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
@@ -26,8 +32,8 @@ use burn::tensor::Tensor;
 pub struct TrainOptions {
     /// Decides everything that is random.
     pub seed: u64,
-    /// Drawings whose natural variation is measured; each is seen from two views.
-    pub drawings: usize,
+    /// Sample scenes whose natural variation is measured.
+    pub scenes: usize,
     /// Steps of contrastive training.
     pub steps: usize,
     /// Pairs a step.
@@ -38,8 +44,8 @@ impl Default for TrainOptions {
     fn default() -> Self {
         Self {
             seed: 1,
-            drawings: 1024,
-            steps: 300,
+            scenes: 40,
+            steps: 200,
             batch: 64,
         }
     }
@@ -48,9 +54,9 @@ impl Default for TrainOptions {
 /// What training is doing, for a progress display: the stage, done, of so many, and what is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrainProgress {
-    /// Drawings whose features were measured.
+    /// Scenes whose features were measured.
     Natural(usize, usize),
-    /// Drawings whose gradients were measured.
+    /// Scenes whose gradients were measured.
     Steering(usize, usize),
     /// Steps of contrastive training, and the loss.
     Contrastive(usize, usize, f32),
@@ -63,8 +69,8 @@ pub struct TrainedClip {
     pub config: ClipConfig,
     /// Its weights.
     pub model: ClipModel,
-    /// Per kept direction, strongest first: how far a change of the picture of length 1 moves the feature, in
-    /// standard deviations of its natural variation.
+    /// Per kept direction, strongest first: how far a change of a scene that changes its pictures by length 1 moves
+    /// the feature in views that it was not fitted to, in standard deviations of its natural variation.
     pub steering: Vec<f64>,
     /// On drawings and captions that training never saw.
     pub retrieval: Retrieval,
@@ -74,6 +80,8 @@ pub struct TrainedClip {
 const IMAGE_SIZE: usize = 160;
 /// Filters a scale.
 const FILTERS: usize = 64;
+/// Sides of the squares that are averaged into one pixel of a scale.
+const SCALES: [usize; 3] = [1, 2, 4];
 /// Width of the features.
 const EMBED_DIM: usize = 96;
 
@@ -92,8 +100,8 @@ pub fn config() -> ClipConfig {
             image_size: IMAGE_SIZE,
             width: FILTERS,
             tower: VisionTower::Statistics {
-                scales: vec![1, 2, 4],
-                kernel: head::KERNEL,
+                scales: SCALES.to_vec(),
+                kernel: filters::KERNEL,
             },
         },
         text: TextConfig {
@@ -119,8 +127,8 @@ pub fn train_clip(
     check(options)?;
     let config = config();
     let model = ClipModel::init(&config, Parts::Both, &compute.device, options.seed);
-    let (filters, biases) = head::filters(FILTERS, options.seed);
-    let tower = tower(&model)?.with_filters(&filters, &biases);
+    let (filters, phases) = filters::filters(FILTERS * SCALES.len(), options.seed);
+    let tower = tower(&model)?.with_filters(&filters, &phases);
     let head = head::fit(&tower, &config, options, compute, &mut progress)?;
     let tower = tower.with_head(head.matrix, head.bias);
     let model = ClipModel {
@@ -148,7 +156,7 @@ fn tower(model: &ClipModel) -> Result<StatisticsTower> {
 
 fn check(options: &TrainOptions) -> Result<()> {
     for (field, value, least, most) in [
-        ("--drawings", options.drawings, 256, 1 << 20),
+        ("--scenes", options.scenes, 8, 1 << 16),
         ("--steps", options.steps, 1, 1 << 20),
         ("--batch", options.batch, 2, 1024),
     ] {
