@@ -23,9 +23,9 @@ pub struct Augmentation {
 impl Default for Augmentation {
     fn default() -> Self {
         Self {
-            brightness: 0.03,
-            scale: 0.03,
-            shift: 0.02,
+            brightness: 0.005,
+            scale: 0.0,
+            shift: 0.0,
         }
     }
 }

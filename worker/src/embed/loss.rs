@@ -1,6 +1,7 @@
 //! The part of the loss that is computed on pictures: reconstruction and message, and its gradient to the pictures.
 //!
-//! `reconstruction * (l1 * L1 + ssim * (1 - SSIM) + lpips * LPIPS) + message * BCE`, means over the views of a step.
+//! `reconstruction * (l1 * L1 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
+//! of a step.
 use burn::tensor::{Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 
@@ -78,7 +79,8 @@ impl<'a> Loss<'a> {
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, device);
-        let message = bce_from_logits(logits.clone(), Tensor::from_inner(targets));
+        let softened = logits.clone() / lambda.temperature;
+        let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
         let total = reconstruction * (lambda.reconstruction * factor) + message.clone() * lambda.message;
 
         // One transfer for all terms.
