@@ -36,6 +36,19 @@ install_packages() {
         "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
 
+# What only the tests need: npm for the check of the protos, and Python for a client of another language. Without them
+# those checks are skipped, unless CI is set.
+setup_tests() {
+    local missing=()
+    command -v npm >/dev/null || missing+=(npm)
+    # The interpreter may be there without what makes an environment of its own.
+    python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
+    if [ "${#missing[@]}" -gt 0 ] && ! install_packages "${missing[@]}"; then
+        echo "setup: could not install what some tests need (Debian's packages: ${missing[*]})" >&2
+        [ -z "${CI:-}" ]
+    fi
+}
+
 setup() {
     local missing=()
     command -v cc >/dev/null || missing+=(build-essential pkg-config ca-certificates)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, lints and all tests. About 25 minutes on two cores from nothing, most of it building.
+# Checks everything: formatting, protos, lints and all tests. About 25 minutes on two cores from nothing, most of it building.
 # Scenes for the tests that want real ones are taken from $GUARDSPLAT_SCENES or ../shared/scenes; without them those
 # tests are skipped, unless CI is set.
 set -euo pipefail
@@ -30,6 +30,7 @@ run_tests() {
 }
 
 stage setup setup
+stage "setup of tests" setup_tests
 for tool in fmt clippy; do
     if ! cargo "$tool" --version >/dev/null 2>&1; then
         echo "cargo $tool was not found; rustup component add rustfmt clippy" >&2
@@ -39,6 +40,7 @@ done
 # What fails fastest comes first. Lints share build scripts and macros with the build, and nothing else; one profile
 # serves the tests and the quickstart, so that no dependency is built twice.
 stage formatting cargo fmt --all --check
+stage protos bash deploy/check-api.sh
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked --no-run
 stage tests run_tests

@@ -78,7 +78,7 @@ impl Bench {
 
     /// Runs the worker in the folder; `line` is split at spaces.
     pub fn run(&self, line: &str) -> Output {
-        self.output(Command::new(crate::worker()).args(line.split_whitespace()))
+        self.output(self.command(&crate::worker()).args(line.split_whitespace()))
     }
 
     /// Runs the worker where no file may grow beyond `blocks` of 512 bytes: what a full disk looks like.
@@ -86,19 +86,32 @@ impl Bench {
     pub fn run_on_a_full_disk(&self, blocks: u32, line: &str) -> Output {
         // The signal of the limit is ignored, so that writes fail as they do on a disk without space.
         let script = format!("ulimit -f {blocks}; trap '' XFSZ; exec \"$0\" \"$@\"");
-        let mut command = Command::new("sh");
+        let mut command = self.command("sh".as_ref());
         command.args(["-c".as_ref(), script.as_ref(), crate::worker().as_os_str()]);
         self.output(command.args(line.split_whitespace().map(OsStr::new)))
     }
 
-    fn output(&self, command: &mut Command) -> Output {
+    /// A program to be run in the folder, which finds nothing of the user's own.
+    pub fn command(&self, program: &Path) -> Command {
+        let mut command = Command::new(program);
+        // What tells the tests where things are is for the programs too; all else is left out.
+        for (name, _) in std::env::vars_os() {
+            let text = name.to_string_lossy();
+            if text.starts_with("GUARDSPLAT_") && text != "GUARDSPLAT_CLIP" {
+                command.env_remove(name);
+            }
+        }
         command
             .current_dir(self.folder.path())
             .env("GUARDSPLAT_HOME", self.path("home"))
+            .env("XDG_CONFIG_HOME", self.path("config"))
             .env_remove("RUST_LOG")
-            .envs(self.variables.iter().map(|(name, value)| (name, value)))
-            .output()
-            .expect("the worker starts")
+            .envs(self.variables.iter().map(|(name, value)| (name, value)));
+        command
+    }
+
+    fn output(&self, command: &mut Command) -> Output {
+        command.output().expect("the program starts")
     }
 
     /// Standard output of a command that must exit with `code`.

@@ -1,29 +1,40 @@
-//! Helpers of the end-to-end tests: the worker's binary, a folder to run it in, and the scenes to run it on.
+//! Helpers of the end-to-end tests: the programs, a folder to run them in, and the scenes to run them on.
 pub mod bench;
 pub mod ply;
+pub mod process;
+pub mod python;
+pub mod service;
 
 use std::path::PathBuf;
 
 pub use bench::Bench;
+pub use process::Process;
+pub use service::Service;
 
-/// The worker's binary, from the same build as the tests.
+/// A program of the project, from the same build as the tests.
 ///
 /// # Panics
 /// When it was not built: Cargo builds binaries of other packages only when all of the workspace is tested.
-pub fn worker() -> PathBuf {
+pub fn program(name: &str) -> PathBuf {
+    let running = std::env::current_exe().expect("a running program has a path");
+    let mut profile = running.parent().expect("a program lies in a folder");
     // Tests lie in target/PROFILE/deps, binaries in target/PROFILE.
-    let test = std::env::current_exe().expect("a running test has a path");
-    let profile = test.parent().and_then(|deps| deps.parent());
-    let worker = profile
-        .expect("tests lie in target/PROFILE/deps")
-        .join(format!("guardsplat-worker{}", std::env::consts::EXE_SUFFIX));
+    if profile.ends_with("deps") {
+        profile = profile.parent().expect("deps lies in target/PROFILE");
+    }
+    let program = profile.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     assert!(
-        worker.is_file(),
+        program.is_file(),
         "{} is missing: run all tests of the workspace (cargo test --release --workspace), or build it first \
-         (cargo build --release -p guardsplat-worker)",
-        worker.display()
+         (cargo build --release --workspace)",
+        program.display()
     );
-    worker
+    program
+}
+
+/// The worker's program.
+pub fn worker() -> PathBuf {
+    program("guardsplat-worker")
 }
 
 /// The folder of the CLIP that the worker ships with, or the one that stands in for it.

@@ -161,7 +161,11 @@ pub fn failure(error: &Error) -> (api::Failure, bool) {
     };
     let failure = api::Failure {
         reason: reason.into(),
-        message: error.to_string(),
+        message: match error {
+            // The reason says the rest.
+            Error::TargetMissed(missed) => missed.clone(),
+            other => other.to_string(),
+        },
     };
     (failure, retryable)
 }

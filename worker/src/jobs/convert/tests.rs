@@ -158,5 +158,5 @@ fn failures_say_whose_fault_it_is() {
     assert_eq!(told(Error::BadJob("views".into())), (Reason::InvalidInput, false));
     let (missed, retryable) = failure(&Error::TargetMissed("PSNR 33.10 dB is below 34 dB".into()));
     assert_eq!((missed.reason(), retryable), (Reason::TargetMissed, false));
-    assert_eq!(missed.message, "target missed: PSNR 33.10 dB is below 34 dB");
+    assert_eq!(missed.message, "PSNR 33.10 dB is below 34 dB");
 }

@@ -1,0 +1,39 @@
+//! The service as its users have it: the real server, workers and client, as processes. Most tests use a tiny CLIP with
+//! random weights, with which a mark is hardly read, but made and read as with any other.
+mod bad_input;
+mod crashes;
+mod languages;
+mod main_job;
+mod queue;
+mod restarts;
+#[path = "../../../worker/tests/support/tiny.rs"]
+mod tiny;
+
+use guardsplat_tests::Bench;
+use serde_json::Value;
+
+/// Marks like the embed jobs of these tests, offline.
+const OFFLINE: &str = "embed in.ply expected.ply --key k.key --message c0ffee42 --seed 5 --size 32 --device cpu --force \
+    --report report --json --preset";
+/// The same through the service.
+const EMBED: &str = "embed in.ply --key site --message c0ffee42 --seed 5 --size 32 --force --preset";
+/// A key as in `k.key`.
+const KEY: &str = "key create --bits 32 --seed 7 --display-name site";
+/// `embed --force` with the tiny CLIP, which sees too little for any target.
+const MISSED: i32 = 3;
+
+/// A folder with a tiny CLIP, and a scene.
+fn bench() -> Bench {
+    let mut bench = Bench::new();
+    tiny::write(&bench.path("clip"));
+    bench.set("GUARDSPLAT_CLIP", bench.path("clip"));
+    bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
+    bench
+}
+
+/// What the worker makes of the scene without a server: a key, and the marked scene `expected.ply`, whose figures come
+/// back.
+fn offline(bench: &Bench, preset: &str) -> Value {
+    bench.exits("key create --bits 32 --seed 7 -o k.key --device cpu", 0);
+    bench.json(&format!("{OFFLINE} {preset}"), MISSED)
+}
