@@ -6,9 +6,9 @@ use std::f32::consts::TAU;
 /// Side of a filter: one pixel of its scale. What a wider filter sees depends on how a surface lies in the picture, and
 /// a scene cannot move that alike in all views.
 pub(crate) const KERNEL: usize = 1;
-/// Least and largest norm of a filter, for pictures of unit deviation: a change of colour by 1 / norm turns the sine by
-/// 1. Below, colours that differ from view to view and from scene to scene weigh more than what a mark adds; above,
-/// the shading of a surface from view to view turns the sine too far.
+/// Least and largest norm of a filter, for pictures of unit deviation: a change of colour by its inverse turns the sine
+/// by a radian. With weaker filters, colours that differ from view to view and from scene to scene weigh more than
+/// what a mark adds; with stronger ones, the shading of a surface from view to view turns the sine too far.
 const NORM: [f32; 2] = [11.0, 23.0];
 
 /// Filters `[count][3][KERNEL][KERNEL]` and phases `[count]`.
