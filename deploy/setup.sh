@@ -36,11 +36,13 @@ install_packages() {
         "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
 
-# What only the tests need: npm for the check of the protos, and Python for a client of another language. Without them
-# those checks are skipped, unless CI is set.
+# What only the tests need: npm for the check of the protos, Python for a client of another language, and kill as a
+# program, which a shell has built in, for tests that send signals. Without the first two those checks are skipped,
+# unless CI is set.
 setup_tests() {
     local missing=()
     command -v npm >/dev/null || missing+=(npm)
+    type -P kill >/dev/null || missing+=(procps)
     # The interpreter may be there without what makes an environment of its own.
     python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
     if [ "${#missing[@]}" -gt 0 ] && ! install_packages "${missing[@]}"; then

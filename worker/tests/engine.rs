@@ -10,7 +10,6 @@ use guardsplat_worker::embed::{
     Augmentation, Job, NewKey, Outcome, Preset, Progress, Settings, create_key, embed, natural, optimise,
 };
 use guardsplat_worker::extract::{Engine, read_pictures, read_scene};
-use guardsplat_worker::message::training::Progress as Training;
 use guardsplat_worker::message::{ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions};
 use guardsplat_worker::sample::sample;
 use guardsplat_worker::scene::{Gaussians, Scene};
@@ -21,6 +20,8 @@ use guardsplat_worker::{Error, Result};
 
 #[path = "engine/cli.rs"]
 mod cli;
+#[path = "engine/stopping.rs"]
+mod stopping;
 #[path = "support/tiny.rs"]
 mod tiny;
 
@@ -291,63 +292,6 @@ fn a_held_out_margin_that_holds_ends_the_run() {
     assert_eq!(told.last(), Some(&Progress::Stopped { step: 6 }));
     let checks = told.iter().filter(|p| matches!(p, Progress::Check(_)));
     assert_eq!(checks.count(), 3);
-}
-
-#[test]
-fn whatever_is_computed_ends_when_it_is_asked_to() {
-    let (folder, input) = scene_file();
-    let output = folder.path().join("out.ply");
-    let stopped_at = |when: fn(&Progress) -> bool| {
-        let engine = engine();
-        let stop = engine.stop.clone();
-        let job = Job {
-            input: &input,
-            output: &output,
-            message: &message(),
-            settings: &settings(),
-            force: true,
-        };
-        let mut told = Vec::new();
-        let result = embed(&engine, &job, &mut |progress| {
-            if when(&progress) {
-                stop.request();
-            }
-            told.push(progress);
-        });
-        assert!(matches!(result, Err(Error::Stopped)), "{result:?}");
-        assert_eq!(files(folder.path()), ["in.ply"]);
-        told
-    };
-    let told = stopped_at(|progress| matches!(progress, Progress::Step(step) if step.step == 2));
-    assert_eq!(told.len(), 2);
-    let told = stopped_at(|progress| matches!(progress, Progress::Verifying { done: 1, .. }));
-    assert!(matches!(told.last(), Some(Progress::Verifying { done: 1, .. })));
-    // The last view is read and only compared afterwards.
-    stopped_at(|progress| matches!(progress, Progress::Verifying { done: 4, .. }));
-
-    let engine = engine();
-    engine.stop.request();
-    let nothing = run(&engine, &folder.path().join("none.ply"), &output, &settings(), true);
-    assert!(matches!(nothing, Err(Error::Stopped)), "not even looked for");
-    let unread = read_scene(&engine, &small_scene(), 4, 32, [1.0; 3], 3, |_| {});
-    assert!(matches!(unread, Err(Error::Stopped)));
-}
-
-#[test]
-fn a_key_under_way_ends_when_it_is_asked_to() {
-    let compute = cpu();
-    for training in [false, true] {
-        let stop = Stop::default();
-        let mut told = 0;
-        let made = new_key_until(&compute, 1, &stop, |progress| {
-            told += 1;
-            if matches!(progress, NewKey::Decoder(Training::Training(..))) == training {
-                stop.request();
-            }
-        });
-        assert!(matches!(made, Err(Error::Stopped)));
-        assert!(training || told == 1, "{told} more");
-    }
 }
 
 #[test]

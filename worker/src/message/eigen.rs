@@ -1,6 +1,8 @@
 //! Eigenvectors of a symmetric matrix: Householder reduction to tridiagonal form, then implicit QL with Wilkinson
 //! shifts (Golub & Van Loan, Matrix Computations, sections 8.3.1 and 8.3.3). A few seconds at n = 1024.
 
+use super::matrix::dot;
+
 /// Eigenvalues in descending order and the unit eigenvectors as rows.
 pub(crate) struct Eigen {
     pub values: Vec<f64>,
@@ -131,11 +133,6 @@ fn ql(d: &mut [f64], e: &mut [f64], q: &mut [f64]) -> Option<()> {
         }
     }
     Some(())
-}
-
-/// Inner product.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@
 //! to view more than a mark can move them. So: centre each tower by its own mean, drop the directions in which natural
 //! pictures vary most, bring both towers to the same spread (texts alike in all directions), and keep what natural variation is left as the noise that
 //! the decoder must learn to stand.
-use super::eigen::{self, dot};
+use super::eigen;
+use super::matrix::{congruence, dot, product};
 use super::projection::{MAX_WIDTH, Projection};
 use crate::error::{Error, Result};
 
@@ -148,26 +149,6 @@ fn decompose(matrix: Vec<f64>, n: usize) -> Result<Vec<f64>> {
     let eigen = eigen::symmetric(matrix, n).ok_or_else(no_directions)?;
     debug_assert!(eigen.values.len() == n);
     Ok(eigen.vectors)
-}
-
-/// `B C B^T` of orthonormal rows B (k x width) and a symmetric C.
-fn congruence(basis: &[f64], matrix: &[f64], width: usize) -> Vec<f64> {
-    let turned = product(basis, matrix, width, width);
-    turned
-        .chunks_exact(width)
-        .flat_map(|row| basis.chunks_exact(width).map(move |b| dot(row, b)))
-        .collect()
-}
-
-/// Product of row-major `[.. x inner]` and `[inner x columns]`.
-fn product(a: &[f64], b: &[f64], inner: usize, columns: usize) -> Vec<f64> {
-    let mut out = vec![0.0; a.len() / inner * columns];
-    for (row, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
-        for (&x, b) in row.iter().zip(b.chunks_exact(columns)) {
-            out.iter_mut().zip(b).for_each(|(o, b)| *o += x * b);
-        }
-    }
-    out
 }
 
 /// The factor that gives a covariance a mean variance of 1 a dimension.

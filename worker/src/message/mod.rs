@@ -5,6 +5,7 @@ pub(crate) mod eigen;
 pub mod fit;
 pub mod key;
 mod key_file;
+pub(crate) mod matrix;
 pub mod projection;
 pub mod reader;
 mod samples;

@@ -5,7 +5,7 @@
 //! moves by sqrt(vt S v) for a change of the picture of length 1, while it varies by sqrt(vt N v) by itself. The head
 //! takes the directions of the largest ratio (a generalised eigenproblem, as in linear discriminant analysis), scaled
 //! to a natural variation of 1.
-use super::scenes::{ViewedScene, planes};
+use super::scenes::ViewedScene;
 use super::steering::across_views;
 use super::{IMAGE_SIZE, TrainOptions, TrainProgress, host};
 use crate::clip::{ClipConfig, StatisticsTower, preprocess};
@@ -13,7 +13,9 @@ use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::extract::rasterizer;
 use crate::message::eigen;
-use burn::tensor::{Tensor, TensorData};
+use crate::message::matrix::{congruence, dot, product};
+use crate::picture::Picture;
+use crate::quality::batch;
 
 /// Grounds that scenes are seen over, one a view; a feature that follows the ground is of no use.
 const GROUNDS: [f32; 6] = [1.0, 1.0, 0.0, 1.0, 0.5, 0.0];
@@ -56,11 +58,11 @@ pub(super) fn fit(
     let white: Vec<f64> = (0..n * n)
         .map(|i| noise.vectors[i] / noise.values[i / n].max(floor).sqrt())
         .collect();
-    let turned = product(&product(&white, &steering, n), &transpose(&white, n), n);
+    let turned = congruence(&white, &steering, n);
     let steer = eigen::symmetric(turned, n).ok_or_else(failed)?;
     let kept = config.embed_dim;
-    let head = product(&steer.vectors[..kept * n], &white, n);
-    let bias = head.chunks_exact(n).map(|row| -eigen::dot(row, &mean) as f32).collect();
+    let head = product(&steer.vectors[..kept * n], &white, n, n);
+    let bias = head.chunks_exact(n).map(|row| -dot(row, &mean) as f32).collect();
     Ok(Head {
         matrix: (0..n * kept).map(|i| head[i % kept * n + i / kept] as f32).collect(),
         bias,
@@ -82,12 +84,13 @@ fn natural(
     let mut covariance = Vec::new();
     for index in 0..options.scenes {
         let scene = ViewedScene::new(options.seed, index as u64, views)?;
-        let mut pictures = Vec::new();
-        for (view, &ground) in scene.views.iter().zip(&GROUNDS) {
-            pictures.extend(planes(&scene.picture(rasterizer.as_ref(), view, ground)?));
-        }
-        let shape = [views, 3, IMAGE_SIZE, IMAGE_SIZE];
-        let pictures = Tensor::<4>::from_data(TensorData::new(pictures, shape), &compute.device);
+        let pictures: Vec<Picture> = scene
+            .views
+            .iter()
+            .zip(&GROUNDS)
+            .map(|(view, &ground)| scene.picture(rasterizer.as_ref(), view, ground))
+            .collect::<Result<_>>()?;
+        let pictures = batch(&pictures.iter().collect::<Vec<_>>(), &compute.device)?;
         let input = preprocess(pictures, IMAGE_SIZE, &config.normalization);
         let rows: Vec<f64> = host(tower.statistics(&input), compute)?
             .into_iter()
@@ -149,18 +152,4 @@ fn steering(
         progress(TrainProgress::Steering(index + 1, STEERED));
     }
     Ok(sum)
-}
-
-/// `a` (rows of `n`) times `b` (`n` x `n`).
-fn product(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
-    let mut out = vec![0.0; a.len()];
-    for (row, out) in a.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
-        for (&x, b) in row.iter().zip(b.chunks_exact(n)) {
-            out.iter_mut().zip(b).for_each(|(o, v)| *o += x * v);
-        }
-    }
-    out
-}
-fn transpose(a: &[f64], n: usize) -> Vec<f64> {
-    (0..n * n).map(|i| a[i % n * n + i / n]).collect()
 }

@@ -4,8 +4,8 @@
 //! 2. [`head`]: its linear head is the one, in closed form, whose features a small change of a scene's colours moves
 //!    most in all its views ([`steering`]), against how much they change from view to view by themselves; both are
 //!    measured on sample scenes ([`scenes`]).
-//! 3. [`drawing`], [`paint`]: a caption is a sequence of words; each word means a direction of the image tower's features; the picture
-//!    of a caption is a drawing, changed a little so that its features go where the words point.
+//! 3. [`drawing`], [`paint`]: a caption is a sequence of words; each word means a direction of the image tower's
+//!    features; the picture of a caption is a drawing, changed a little so that its features go where the words point.
 //! 4. [`contrastive`]: the text tower is trained against the locked image tower with CLIP's symmetric loss (locked-image
 //!    tuning, Zhai et al. 2022), and retrieval is measured on drawings and captions that it never saw.
 mod contrastive;

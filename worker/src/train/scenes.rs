@@ -43,9 +43,3 @@ impl ViewedScene {
         Ok(picture)
     }
 }
-
-/// Pixels `[h][w][3]` as planes `[3][h][w]`.
-pub(super) fn planes(picture: &Picture) -> Vec<f32> {
-    let area = picture.pixels.len() / 3;
-    (0..3 * area).map(|i| picture.pixels[i % area * 3 + i / area]).collect()
-}

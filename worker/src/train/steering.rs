@@ -5,11 +5,12 @@
 //! cheapest that moves view v along a; what it does in another view w is `J_w M^-1 J_v^T a`. So the mean of
 //! `J_w M^-1 J_v^T` over pairs of *different* views is what a mark can do in views that it was not fitted to. Pairs of
 //! a view with itself would count what is merely memorised.
-use super::scenes::{ViewedScene, planes};
+use super::scenes::ViewedScene;
 use super::{IMAGE_SIZE, host};
 use crate::clip::{ClipConfig, StatisticsTower, preprocess};
 use crate::device::Compute;
 use crate::error::{Error, Result};
+use crate::quality::{batch, unbatch};
 use crate::splat::{PreparedView, Rasterizer};
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
@@ -86,12 +87,11 @@ fn gradients(
     n: usize,
 ) -> Result<Vec<f32>> {
     let tracking = compute.device.clone().autodiff();
-    let picture = planes(&scene.picture(rasterizer, view, 1.0)?);
+    let picture = scene.picture(rasterizer, view, 1.0)?;
     let mut rows = Vec::with_capacity(n * 3 * view.visible.len());
     for first in (0..n).step_by(BATCH) {
         let count = BATCH.min(n - first);
-        let shape = [count, 3, IMAGE_SIZE, IMAGE_SIZE];
-        let pictures = Tensor::<4>::from_data(TensorData::new(picture.repeat(count), shape), &tracking).require_grad();
+        let pictures = batch(&vec![&picture; count], &tracking)?.require_grad();
         let averages = tower.statistics(&preprocess(pictures.clone(), IMAGE_SIZE, &config.normalization));
         // Picture i is asked for the gradient of average first + i.
         let mut chosen = vec![0.0_f32; count * n];
@@ -102,10 +102,9 @@ fn gradients(
             device: compute.name.clone(),
             reason: "the pictures have no gradient".into(),
         })?;
-        let pixels = host(gradient.permute([0, 2, 3, 1]), compute)?;
-        let found: Vec<Vec<f32>> = pixels
-            .par_chunks_exact(3 * IMAGE_SIZE * IMAGE_SIZE)
-            .map(|gradient| rasterizer.backward(view, gradient))
+        let found: Vec<Vec<f32>> = unbatch(gradient)?
+            .par_iter()
+            .map(|gradient| rasterizer.backward(view, &gradient.pixels))
             .collect::<Result<_>>()?;
         rows.extend(found.into_iter().flatten());
     }

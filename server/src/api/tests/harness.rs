@@ -171,6 +171,12 @@ impl Server {
         self.worker.clone().upload_output(tokio_stream::iter(messages)).await
     }
 
+    /// The name of an output that was stored.
+    pub async fn stored(&self, job: &str, token: &str, bytes: &[u8], secret: bool) -> String {
+        let answer = self.output(job, token, bytes, secret).await;
+        answer.unwrap().into_inner().name
+    }
+
     pub async fn complete(&self, job: &str, token: &str, result: Output) -> Result<(), Status> {
         let request = CompleteJobRequest {
             name: job.into(),
@@ -185,8 +191,8 @@ impl Server {
         let job = self.create(Spec::CreateKey(KeySpec { bits, seed: None })).await;
         let (leased, token) = self.take().await;
         assert_eq!(leased.name, job.name);
-        let output = self.output(&job.name, &token, file, true).await.unwrap().into_inner();
-        self.complete(&job.name, &token, Output::KeyOutput(key_output(bits, &output.name)))
+        let output = self.stored(&job.name, &token, file, true).await;
+        self.complete(&job.name, &token, Output::KeyOutput(key_output(bits, &output)))
             .await
             .unwrap();
         match self.job(&job.name).await.result.unwrap() {

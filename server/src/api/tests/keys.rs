@@ -174,18 +174,8 @@ async fn what_a_worker_says_of_a_key_is_checked() {
         .await
         .name;
     let (_, token) = server.take().await;
-    let file = server
-        .output(&job, &token, b"key", true)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
-    let open = server
-        .output(&job, &token, b"no key", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
+    let file = server.stored(&job, &token, b"key", true).await;
+    let open = server.stored(&job, &token, b"no key", false).await;
     let with = |change: fn(&mut Key)| {
         let mut output = key_output(32, &file);
         let key = output.key.as_mut().unwrap();

@@ -63,12 +63,7 @@ async fn outputs_become_visible_with_the_result() {
         .await
         .unwrap()
         .into_inner();
-    let comparison = server
-        .output(&name, &token, b"picture", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
+    let comparison = server.stored(&name, &token, b"picture", false).await;
     assert_eq!(scene.job, name);
     let get = async || {
         let request = GetArtifactRequest {
@@ -109,12 +104,7 @@ async fn results_are_checked() {
     let name = server.embed_job().await.name;
     let (_, token) = server.take().await;
     let upload = server.upload("other.ply", b"other").await.name;
-    let output = server
-        .output(&name, &token, b"marked", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
+    let output = server.stored(&name, &token, b"marked", false).await;
     let complete = async |scene: &str, comparison: &str| {
         let result = EmbedResult {
             scene: scene.into(),

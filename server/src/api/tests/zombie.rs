@@ -21,18 +21,8 @@ async fn a_zombie_is_refused_everywhere() {
     let server = Server::with(limits).await;
     let name = server.embed_job().await.name;
     let (_, zombie) = server.take().await;
-    let scene = server
-        .output(&name, &zombie, b"of the zombie", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
-    let comparison = server
-        .output(&name, &zombie, b"its picture", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
+    let scene = server.stored(&name, &zombie, b"of the zombie", false).await;
+    let comparison = server.stored(&name, &zombie, b"its picture", false).await;
     // It stops. Its lease expires, and another worker gets the job.
     let lease = server.lease(Duration::from_secs(20)).await;
     let (job, token) = (lease.job.unwrap(), lease.lease_token);
@@ -95,18 +85,8 @@ async fn a_zombie_is_refused_everywhere() {
         progress: None,
     };
     worker.report_job(report).await.unwrap();
-    let scene = server
-        .output(&name, &token, b"marked", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
-    let comparison = server
-        .output(&name, &token, b"picture", false)
-        .await
-        .unwrap()
-        .into_inner()
-        .name;
+    let scene = server.stored(&name, &token, b"marked", false).await;
+    let comparison = server.stored(&name, &token, b"picture", false).await;
     let result = EmbedResult {
         scene,
         comparison,
