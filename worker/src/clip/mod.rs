@@ -10,6 +10,7 @@ mod names;
 mod params;
 mod preprocess;
 mod resnet;
+mod sines;
 mod statistics;
 mod tensor_file;
 mod text;

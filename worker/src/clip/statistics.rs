@@ -9,11 +9,12 @@
 //! Wornell 2001, rejects the interference of its host in the same way.)
 use super::config::VisionConfig;
 use super::params::param;
+use super::sines::mean_sines;
 use super::weights::set;
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::module::{avg_pool2d, conv2d};
-use burn::tensor::ops::{AvgPoolOptions, ConvOptions};
+use burn::tensor::module::avg_pool2d;
+use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
 
 /// Image tower of the statistics kind.
@@ -88,11 +89,10 @@ impl Scale {
             1 => pictures,
             n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
         };
-        let x = conv2d(x, self.weight.val(), None, ConvOptions::new([1; 2], [0; 2], [1; 2], 1));
-        let [batch, filters, h, w] = x.dims();
         let phase = self.bias.val();
-        let x = (x + phase.clone().reshape([1, filters, 1, 1])).sin();
-        let mean = x.reshape([batch, filters, h * w]).mean_dim(2).reshape([batch, filters]);
+        let filters = self.weight.val().reshape([-1, 3]);
+        let mean = mean_sines(x, filters, phase.clone());
+        let filters = phase.dims()[0];
         mean - phase.sin().reshape([1, filters])
     }
 }

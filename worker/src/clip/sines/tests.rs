@@ -1,0 +1,128 @@
+use super::*;
+use crate::device::{DeviceChoice, open};
+use burn::tensor::{Device, TensorData};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Pictures, filters, phases and a gradient, as flat lists, and their sizes `[views, height, width, waves]`.
+struct Case {
+    sizes: [usize; 4],
+    pictures: Vec<f32>,
+    filters: Vec<f32>,
+    phases: Vec<f32>,
+    gradient: Vec<f32>,
+}
+
+/// Colours within 2.5 of 0, angles within about `3 * 2.5 * norm`.
+fn case(sizes: [usize; 4], norm: f32) -> Case {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut random = |count: usize, range: f32| -> Vec<f32> {
+        (0..count).map(|_| range * (2.0 * rng.random::<f32>() - 1.0)).collect()
+    };
+    let [views, height, width, waves] = sizes;
+    Case {
+        sizes,
+        pictures: random(views * 3 * height * width, 2.5),
+        filters: random(3 * waves, norm),
+        phases: random(waves, 3.0),
+        gradient: random(views * waves, 1.0),
+    }
+}
+
+/// Means and the gradient to the pictures.
+fn computed(case: &Case, device: &Device) -> [Vec<f32>; 2] {
+    let [views, height, width, waves] = case.sizes;
+    let device = device.clone().autodiff();
+    let tensor = |values: &[f32], shape: Vec<usize>| TensorData::new(values.to_vec(), shape);
+    let pictures = tensor(&case.pictures, vec![views, 3, height, width]);
+    let pictures = Tensor::<4>::from_data(pictures, &device).require_grad();
+    let filters = Tensor::<2>::from_data(tensor(&case.filters, vec![waves, 3]), &device);
+    let phases = Tensor::<1>::from_data(tensor(&case.phases, vec![waves]), &device);
+    let gradient = Tensor::<2>::from_data(tensor(&case.gradient, vec![views, waves]), &device);
+    let means = mean_sines(pictures.clone(), filters, phases);
+    let found = (means.clone() * gradient).sum().backward();
+    let numbers = |data: TensorData| data.iter::<f32>().collect();
+    [
+        numbers(means.into_data()),
+        numbers(pictures.grad(&found).unwrap().into_data()),
+    ]
+}
+
+/// The same in f64, written down as the formula stands.
+fn reference(case: &Case) -> [Vec<f64>; 2] {
+    let [views, height, width, waves] = case.sizes;
+    let pixels = height * width;
+    let mut means = vec![0.0; views * waves];
+    let mut to_pictures = vec![0.0; case.pictures.len()];
+    for view in 0..views {
+        for pixel in 0..pixels {
+            let at = |channel: usize| (view * 3 + channel) * pixels + pixel;
+            for wave in 0..waves {
+                let filter = |channel: usize| f64::from(case.filters[3 * wave + channel]);
+                let dot: f64 = (0..3).map(|c| filter(c) * f64::from(case.pictures[at(c)])).sum();
+                let angle = dot + f64::from(case.phases[wave]);
+                means[view * waves + wave] += angle.sin() / pixels as f64;
+                let slope = f64::from(case.gradient[view * waves + wave]) * angle.cos() / pixels as f64;
+                (0..3).for_each(|c| to_pictures[at(c)] += slope * filter(c));
+            }
+        }
+    }
+    [means, to_pictures]
+}
+
+fn largest_gap(found: &[f32], expected: &[f64]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let gaps = found.iter().zip(expected).map(|(f, e)| (f64::from(*f) - e).abs());
+    gaps.fold(0.0, |a, b| if b.is_nan() { f64::INFINITY } else { a.max(b) })
+}
+
+fn agrees(device: &Device) {
+    // Less than a block of lanes, less than a chunk, several chunks with a rest.
+    for sizes in [[1, 3, 2, 1], [2, 9, 31, 5], [3, 47, 53, 20]] {
+        for norm in [1.0, 23.0, 400.0] {
+            let case = case(sizes, norm);
+            let ([means, slopes], [true_means, true_slopes]) = (computed(&case, device), reference(&case));
+            // An angle of a is rounded to a * 6e-8 before any sine is taken.
+            let tolerance = 2e-6 + 7.5 * f64::from(norm) * 2e-7;
+            let gap = largest_gap(&means, &true_means);
+            assert!(gap < tolerance, "{sizes:?} {norm}: {gap}");
+            let largest = true_slopes.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            let gap = largest_gap(&slopes, &true_slopes) / largest;
+            assert!(gap < 4.0 * tolerance, "{sizes:?} {norm}: {gap}");
+        }
+    }
+}
+
+#[test]
+fn the_cpu_agrees_with_the_formula() {
+    agrees(&Device::flex());
+}
+
+#[test]
+fn wgpu_agrees_with_the_formula() {
+    match open(DeviceChoice::Wgpu) {
+        Ok(compute) => agrees(&compute.device),
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "{error}");
+            eprintln!("skipped: {error}");
+        }
+    }
+}
+
+#[test]
+fn bytes_do_not_depend_on_the_number_of_threads() {
+    let case = case([2, 47, 53, 20], 23.0);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| computed(&case, &Device::flex()))
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn what_is_no_number_stays_none() {
+    let mut case = case([1, 4, 4, 2], 10.0);
+    case.pictures[3] = f32::NAN;
+    let [means, _] = computed(&case, &Device::flex());
+    assert!(means.iter().all(|m| m.is_nan()));
+}
