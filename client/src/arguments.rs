@@ -10,7 +10,7 @@ use crate::commands;
 ///
 /// Exit codes: 0 done or match, 1 error, 2 no match, 3 inconclusive or target missed.
 #[derive(Parser)]
-#[command(name = "guardsplat", version)]
+#[command(name = "guardsplat", version, after_long_help = EXAMPLE)]
 pub struct Arguments {
     #[command(flatten)]
     pub global: Global,
@@ -18,8 +18,20 @@ pub struct Arguments {
     pub command: Command,
 }
 
+const EXAMPLE: &str = "\
+From nothing to a verdict:
+  guardsplat key create --bits 32 --display-name website
+  guardsplat embed scene.ply -o marked.ply --key website --message c0ffee42
+  guardsplat verify marked.ply --key website --message c0ffee42
+
+The configuration file may set `server` and `timeout`; flags and GUARDSPLAT_SERVER go before it.";
+
+/// Longest display name of a job, in characters.
+pub const LONGEST_NAME: usize = 63;
+
 /// What every command understands.
 #[derive(Args)]
+#[command(next_help_heading = "Options of every command")]
 pub struct Global {
     /// Address of the server [default: http://127.0.0.1:50051]
     #[arg(long, global = true, value_name = "URL", env = "GUARDSPLAT_SERVER")]
@@ -42,8 +54,12 @@ pub enum Command {
     #[command(subcommand)]
     Key(commands::key::Command),
     /// Has a scene marked with a message and fetches it
+    ///
+    /// Exits with 3 when the mark misses what its preset promises; then nothing is written unless --force is given.
     Embed(commands::embed::Arguments),
     /// Reads the message of a scene, or of pictures of one
+    ///
+    /// Exits with 0 for a match, 2 for no match, and 3 when nothing can be decided.
     Verify(commands::verify::Arguments),
     /// Work that is waiting, under way or over
     #[command(subcommand)]
@@ -59,9 +75,10 @@ pub enum Command {
 #[derive(Args)]
 pub struct Submission {
     /// What people call the job, at most 63 characters; the name of the file unless given
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", value_parser = display_name)]
     pub display_name: Option<String>,
-    /// Names this request, so that sending it again gives the same job; drawn at random unless given
+    /// Names this request: the same command with the same id and the same files gives the same job, however often it is
+    /// run; drawn at random unless given
     #[arg(long, value_name = "UUID")]
     pub request_id: Option<Uuid>,
     /// Ends as soon as the job is queued, and prints it
@@ -70,6 +87,13 @@ pub struct Submission {
     /// Ctrl-C while waiting cancels the job; without this, it goes on
     #[arg(long, conflicts_with = "no_wait")]
     pub cancel_on_interrupt: bool,
+}
+
+fn display_name(text: &str) -> Result<String, String> {
+    match text.chars().count() {
+        0..=LONGEST_NAME => Ok(text.to_owned()),
+        length => Err(format!("{length} characters, at most {LONGEST_NAME} are taken")),
+    }
 }
 
 #[cfg(test)]
@@ -116,6 +140,10 @@ mod tests {
         assert!(wrong("verify --key K").contains("PATH"));
         assert!(wrong("verify A --key K --views 0").contains("1..=10000"));
         assert!(wrong("key create --bits 76").contains("1..=75"));
+        assert!(wrong("embed IN -o O --key K --message 0 --size 8").contains("16..=4096"));
+        let long = format!("key create --bits 8 --display-name {}", "é".repeat(64));
+        assert!(wrong(&long).contains("64 characters, at most 63"));
+        assert!(parse(&long.replacen('é', "", 1)).is_ok());
         assert!(wrong("key list --timeout 0").contains("--timeout"));
         assert!(wrong("embed IN -o O --key K --message 0 --request-id 7").contains("--request-id"));
     }

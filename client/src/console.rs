@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::output::say;
+
 /// Time between two lines where there is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 /// Between two pictures of a spinner.
@@ -44,6 +46,7 @@ struct Current {
     last_line: Option<Instant>,
     last_figures: String,
     complete: bool,
+    total: u64,
 }
 
 impl Console {
@@ -72,7 +75,7 @@ impl Console {
             }
             None => {
                 if let Some(line) = current.line(Instant::now(), done, total, figures) {
-                    eprintln!("{line}");
+                    say(&line);
                 }
             }
         }
@@ -82,7 +85,7 @@ impl Console {
     pub fn say(&self, line: &str) {
         match self.current.borrow().as_ref().and_then(|c| c.bar.as_ref()) {
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => say(line),
         }
     }
 
@@ -114,6 +117,7 @@ impl Current {
             last_line: None,
             last_figures: String::new(),
             complete: false,
+            total: 0,
         }
     }
 
@@ -126,18 +130,21 @@ impl Current {
     /// The line to print, if it is time for one: at the beginning, now and then, and once at the end.
     fn line(&mut self, now: Instant, done: u64, total: u64, figures: &str) -> Option<String> {
         let complete = self.unit != Unit::Waiting && total > 0 && done >= total;
-        let due = match self.last_line {
-            None => true,
-            Some(_) if self.unit == Unit::Waiting => figures != self.last_figures,
-            Some(_) if self.complete => false,
-            Some(last) => complete || now.duration_since(last) >= BETWEEN_LINES,
-        };
+        // The next of the same kind: another file, another attempt.
+        let begins = self.complete && (!complete || total != self.total);
+        let due = begins
+            || match self.last_line {
+                None => true,
+                Some(_) if self.unit == Unit::Waiting => figures != self.last_figures,
+                Some(_) if self.complete => false,
+                Some(last) => complete || now.duration_since(last) >= BETWEEN_LINES,
+            };
         if !due {
             return None;
         }
         self.last_line = Some(now);
         self.last_figures = figures.to_owned();
-        self.complete = complete;
+        (self.complete, self.total) = (complete, total);
         let count = match self.unit {
             Unit::Steps => format!(" {done}/{total}"),
             Unit::Bytes => format!(" {done}/{total} bytes"),
@@ -165,6 +172,10 @@ mod tests {
         assert_eq!(current.line(at(11), 3, 10, "").unwrap(), "marking 3/10");
         assert_eq!(current.line(at(12), 10, 10, "").unwrap(), "marking 10/10");
         assert_eq!(current.line(at(40), 10, 10, ""), None);
+        // A second file begins and ends.
+        assert_eq!(current.line(at(41), 1, 7, "").unwrap(), "marking 1/7");
+        assert_eq!(current.line(at(42), 7, 7, "").unwrap(), "marking 7/7");
+        assert_eq!(current.line(at(42), 8, 8, "").unwrap(), "marking 8/8");
     }
 
     #[test]

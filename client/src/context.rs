@@ -55,9 +55,9 @@ impl Context {
         message: M,
         send: impl AsyncFnOnce(Channel, Request<M>) -> Result<Response<R>, Status>,
     ) -> Result<R> {
-        let mut request = Request::new(message);
-        request.set_timeout(self.server.timeout);
-        match send(self.server.channel().await?, request).await {
+        let channel = self.server.channel().await?;
+        // Timed here: the transport's own limit looks like a lost connection, which would be waited for once more.
+        match self.in_time(send(channel, Request::new(message))).await {
             Ok(response) => Ok(response.into_inner()),
             Err(status) => Err(refused(doing, status)),
         }

@@ -4,17 +4,16 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CreateJobRequest, Job, failure::Reason};
 use uuid::Uuid;
 
-use crate::arguments::Submission;
+use crate::arguments::{LONGEST_NAME, Submission};
+use crate::commands::suspects::Inputs;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::output::{print_json, print_line};
 use crate::report::{JobReport, word};
 use crate::show::Show;
+use crate::transfer::discard;
 use crate::watch::watch;
-
-/// Longest display name of a job, in characters.
-const LONGEST_NAME: usize = 63;
 
 /// Queues a job; `name` is what it is called unless the user says otherwise.
 pub async fn create(context: &Context, submission: &Submission, name: &str, spec: Spec) -> Result<Job> {
@@ -40,6 +39,19 @@ pub async fn create(context: &Context, submission: &Submission, name: &str, spec
     created
 }
 
+/// As [`create`], with the files that were sent for it. Those that it does not need after all are deleted again: it was
+/// refused, or the same request made it before, with what was sent then.
+pub async fn create_with(context: &Context, submission: &Submission, inputs: &Inputs, spec: Spec) -> Result<Job> {
+    let created = create(context, submission, &inputs.title, spec).await;
+    let needed: &[String] = match created.as_ref().ok().and_then(|job| job.spec.as_ref()) {
+        Some(Spec::Embed(spec)) => std::slice::from_ref(&spec.scene),
+        Some(Spec::Verify(spec)) => &spec.suspects,
+        Some(Spec::CreateKey(_)) | None => &[],
+    };
+    discard(context, inputs.sent.iter().filter(|name| !needed.contains(name))).await;
+    created
+}
+
 /// Prints a job that is not waited for.
 pub fn leave(context: &Context, job: &Job) {
     if context.json {
@@ -58,7 +70,12 @@ pub async fn wait(context: &Context, submission: &Submission, job: &Job) -> Resu
         job: job.name.clone(),
         cancel: submission.cancel_on_interrupt,
     });
-    context.console.say(&format!("{} is queued", job.name));
+    context.console.say(&match job.state() {
+        State::Queued => format!("{} is queued", job.name),
+        // Of a request that was sent before.
+        State::Running => format!("{} is there already, and running", job.name),
+        _ => format!("{} is there already, and over", job.name),
+    });
     let mut show = Show::default();
     let over = watch(context, &job.name, String::new(), |job, _| {
         show.job(&context.console, job)

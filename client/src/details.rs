@@ -88,14 +88,14 @@ impl fmt::Display for Details {
             &self.message
         };
         write!(f, "{} ({}", printable(message), self.code)?;
-        if let Some(reason) = &self.reason {
+        if let Some(reason) = self.reason.as_ref().filter(|reason| **reason != self.code) {
             write!(f, ", {}", printable(reason))?;
         }
         write!(f, ")")?;
         for violation in &self.field_violations {
             let text = format!("{}: {}", violation.field, violation.description);
-            // The message may be made of them.
-            if !self.message.contains(&text) {
+            // The message may be made of them, or be the only one.
+            if !self.message.contains(&text) && self.message != violation.description {
                 write!(f, "\n  {}", printable(&text))?;
             }
         }
@@ -146,6 +146,26 @@ mod tests {
             Details::from(&status).to_string(),
             "a: is wrong (INVALID_ARGUMENT)\n  b: too"
         );
+    }
+
+    #[test]
+    fn one_violation_that_is_the_message_is_told_once() {
+        let mut details = ErrorDetails::new();
+        details.add_bad_request_violation("request_id", "request_id 7 was used for another job");
+        let status = Status::with_error_details(Code::AlreadyExists, "request_id 7 was used for another job", details);
+        assert_eq!(
+            Details::from(&status).to_string(),
+            "request_id 7 was used for another job (ALREADY_EXISTS)"
+        );
+    }
+
+    #[test]
+    fn a_reason_that_says_no_more_than_the_code_is_left_out() {
+        let mut details = ErrorDetails::new();
+        details.set_error_info("NOT_FOUND", "guardsplat", []);
+        let told = Details::from(&Status::with_error_details(Code::NotFound, "no such key", details));
+        assert_eq!(told.to_string(), "no such key (NOT_FOUND)");
+        assert_eq!(told.reason.as_deref(), Some("NOT_FOUND"));
     }
 
     #[test]

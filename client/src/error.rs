@@ -6,7 +6,7 @@ use serde::Serialize;
 use tonic::Status;
 
 use crate::details::{Details, Violation};
-use crate::output::{print_json_line, printable};
+use crate::output::{print_json_line, printable, say};
 
 /// The result of what can go wrong.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -96,7 +96,7 @@ impl Error {
 
     /// Tells people, and programs where they asked for it.
     pub fn tell(&self, json: bool) {
-        eprintln!("error: {self}");
+        say(&format!("error: {self}"));
         if json && !matches!(self, Self::Told(_)) {
             print_json_line(&self.document());
         }

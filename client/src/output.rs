@@ -39,7 +39,7 @@ fn print_value(json: serde_json::Result<String>) {
     match json {
         Ok(text) => print_line(&text),
         // Reports are structs with text keys, which always have a JSON form.
-        Err(error) => eprintln!("error: no JSON: {error}"),
+        Err(error) => say(&format!("error: no JSON: {error}")),
     }
 }
 
@@ -47,6 +47,11 @@ fn print_value(json: serde_json::Result<String>) {
 pub fn print_line(text: &str) {
     let mut out = std::io::stdout();
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+}
+
+/// Prints a line on standard error; unlike `eprintln!` it goes on when nobody listens there any more.
+pub fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// A text from elsewhere without what would steer a terminal.

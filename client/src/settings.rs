@@ -41,7 +41,9 @@ impl Settings {
                 _ => File::default(),
             },
         };
-        let server = global.server.clone().or(file.server);
+        // An empty variable is how one is unset in many places.
+        let given = global.server.clone().filter(|server| !server.trim().is_empty());
+        let server = given.or(file.server);
         let seconds = global.timeout.or(file.timeout).unwrap_or(DEFAULT_TIMEOUT_SECONDS);
         Ok(Self {
             server: server.unwrap_or_else(|| DEFAULT_SERVER.into()),
@@ -100,6 +102,8 @@ mod tests {
         let settings = load("server = \"http://a:1\"\ntimeout = 5", Some("http://b:2"), Some(7)).unwrap();
         assert_eq!(settings.server, "http://b:2");
         assert_eq!(settings.timeout, Duration::from_secs(7));
+        let unset = load("server = \"http://a:1\"", Some(""), None).unwrap();
+        assert_eq!(unset.server, "http://a:1");
         let settings = load("", None, None).unwrap();
         assert_eq!(settings.server, DEFAULT_SERVER);
         assert_eq!(settings.timeout, Duration::from_secs(60));

@@ -10,6 +10,7 @@ use crate::output::printable;
 #[derive(Default)]
 pub struct Show {
     failed_attempt: i32,
+    running: bool,
     ending: bool,
 }
 
@@ -18,6 +19,9 @@ impl Show {
     pub fn job(&mut self, console: &Console, job: &Job) {
         if let Some(line) = self.failed_attempt(job) {
             console.say(&line);
+        }
+        if self.handed_back(job) {
+            console.say("its worker left and handed it back; it waits for another");
         }
         if job.cancel_requested && !self.ending {
             self.ending = true;
@@ -39,6 +43,12 @@ impl Show {
             }
             _ => console.clear(),
         }
+    }
+
+    /// Whether a worker gave it up that did not fail.
+    fn handed_back(&mut self, job: &Job) -> bool {
+        let was_running = std::mem::replace(&mut self.running, job.state() == State::Running);
+        was_running && job.state() == State::Queued && job.failure.is_none()
     }
 
     /// That an attempt failed, once.
@@ -116,6 +126,27 @@ mod tests {
         assert_eq!(show.failed_attempt(&job), None);
         job.attempt = 2;
         assert!(show.failed_attempt(&job).is_some());
+    }
+
+    #[test]
+    fn a_job_that_was_handed_back_says_so() {
+        let mut show = Show::default();
+        let mut told = |state, failure: Option<Failure>| {
+            let mut job = Job {
+                failure,
+                ..Job::default()
+            };
+            job.set_state(state);
+            show.handed_back(&job)
+        };
+        assert!(!told(State::Queued, None));
+        assert!(!told(State::Running, None));
+        assert!(told(State::Queued, None));
+        assert!(!told(State::Queued, None));
+        assert!(!told(State::Running, None));
+        // That an attempt failed is told already.
+        assert!(!told(State::Queued, Some(Failure::default())));
+        assert!(!told(State::Running, None) && !told(State::Succeeded, None));
     }
 
     #[test]

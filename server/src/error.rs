@@ -32,7 +32,7 @@ pub enum Error {
         name: String,
     },
     /// A request id that stands for another request.
-    #[error("request_id {request_id} was used for another job")]
+    #[error("request_id {request_id} was used before, for a request that was not the same as this one")]
     RequestIdReused {
         /// The id.
         request_id: Uuid,
@@ -50,10 +50,12 @@ pub enum Error {
         name: String,
     },
     /// An artifact that a waiting or running job needs.
-    #[error("{name} is needed by a job that is not finished")]
+    #[error("{name} is needed by {job}, which is not finished")]
     InUse {
         /// The artifact's full name.
         name: String,
+        /// The job's full name.
+        job: String,
     },
     /// A lease token that is not, or no longer, the job's.
     #[error("the lease of {name} is lost: its token is not the one that the job was given out with last")]

@@ -1,5 +1,5 @@
 //! `guardsplat-server`: settings, log and signals around the server.
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -23,10 +23,15 @@ fn main() -> ExitCode {
     {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            say(&format!("error: {error}"));
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints a line on standard error; unlike `eprintln!` it goes on when nobody listens there any more.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 fn start(settings: Settings) -> Result<(), String> {
@@ -51,7 +56,7 @@ fn asked_to_stop() -> std::io::Result<impl Future<Output = ()>> {
         either(&mut terminate, &mut interrupt).await;
         tokio::spawn(async move {
             either(&mut terminate, &mut interrupt).await;
-            eprintln!("error: asked to stop twice, so stopped at once");
+            say("error: asked to stop twice, so stopped at once");
             std::process::exit(1);
         });
     })

@@ -9,12 +9,12 @@ use serde::Serialize;
 use super::{key, suspects};
 use crate::arguments::Submission;
 use crate::context::Context;
-use crate::create::{create, leave, missed_target, no_result, succeeded, wait};
+use crate::create::{create_with, leave, missed_target, no_result, succeeded, wait};
 use crate::error::Result;
 use crate::interrupt::Stage;
-use crate::output::{Exit, print_json, print_line, printable};
+use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
-use crate::transfer::{Destination, discard, download};
+use crate::transfer::{Destination, download};
 
 /// How much work is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -56,12 +56,12 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "standard")]
     preset: Preset,
     /// Decides views, backgrounds and augmentation
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
     /// Side of training views and of those of the verification, in pixels
-    #[arg(long, value_name = "PX")]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
-    /// Writes the scene even when it misses its target
+    /// Writes the scene even when it misses its target; the exit code says 3 all the same
     #[arg(long)]
     force: bool,
     /// Where to write a picture of original, marked and ten times their difference
@@ -98,22 +98,10 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         }
     }
     let key = key::find(context, &arguments.key).await?;
-    key::check_message(&key, &arguments.message)?;
+    let message = key::message(&key, &arguments.message)?;
     let inputs = suspects::send(context, &[suspects::Input::scene(&arguments.input)]).await?;
-    let job = match create(
-        context,
-        &arguments.submission,
-        &inputs.title,
-        spec(arguments, &key, &inputs),
-    )
-    .await
-    {
-        Ok(job) => job,
-        Err(error) => {
-            discard(context, &inputs.sent).await;
-            return Err(error);
-        }
-    };
+    let spec = spec(arguments, &key, message, &inputs);
+    let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {
         leave(context, &job);
         return Ok(Exit::Done);
@@ -125,12 +113,12 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     }
 }
 
-fn spec(arguments: &Arguments, key: &Key, inputs: &suspects::Inputs) -> Spec {
+fn spec(arguments: &Arguments, key: &Key, message: String, inputs: &suspects::Inputs) -> Spec {
     let mut spec = EmbedSpec {
         // One input was given, and one name came back.
         scene: inputs.names.first().cloned().unwrap_or_default(),
         key: key.name.clone(),
-        message: arguments.message.to_ascii_lowercase(),
+        message,
         seed: arguments.seed,
         size: arguments.size.unwrap_or_default(),
         force: arguments.force,
@@ -173,7 +161,10 @@ async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -
     if missed.is_empty() {
         return Ok(Exit::Done);
     }
-    eprintln!("target missed: {}; written all the same", printable(&missed.join(", ")));
+    say(&format!(
+        "target missed: {}; written all the same",
+        printable(&missed.join(", "))
+    ));
     Ok(Exit::Inconclusive)
 }
 
@@ -184,7 +175,7 @@ fn tell_missed(context: &Context, job: &Job, key: &Key, missed: &str) -> Exit {
             ..facts(job, key)
         });
     }
-    eprintln!("target missed: {}; nothing was written", printable(missed));
+    say(&format!("target missed: {}; nothing was written", printable(missed)));
     Exit::Inconclusive
 }
 

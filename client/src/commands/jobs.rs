@@ -10,7 +10,7 @@ use crate::create::{missed_target, no_result, succeeded};
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::names;
-use crate::output::{Exit, print_json, print_json_line, print_line, printable};
+use crate::output::{Exit, print_json, print_json_line, print_line, printable, say};
 use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, word};
 use crate::show::Show;
 use crate::watch::watch;
@@ -178,7 +178,7 @@ async fn follow(context: &Context, name: String, cursor: Option<String>) -> Resu
 /// Tells what came of a job that is over, and exits as the command that created it would have.
 fn outcome(context: &Context, job: Job) -> Result<Exit> {
     if let Some(missed) = missed_target(&job) {
-        eprintln!("target missed: {}", printable(missed));
+        say(&format!("target missed: {}", printable(missed)));
         return Ok(Exit::Inconclusive);
     }
     let job = match succeeded(job) {

@@ -32,7 +32,7 @@ pub struct Create {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=75))]
     bits: u32,
     /// Makes the key reproducible, and no more secret than this number; without it, it is drawn at random
-    #[arg(long)]
+    #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
     #[command(flatten)]
     submission: Submission,
@@ -142,11 +142,14 @@ fn wrong(reason: String) -> Error {
     Error::BadOption { field: "--key", reason }
 }
 
-/// Checks that a message has the length that the key wants, before anything large is sent.
-pub fn check_message(key: &Key, message: &str) -> Result<()> {
+/// The message as the server is sent it, in lower case and without `0x`. It must have the length that the key wants,
+/// which is better known before anything large is sent.
+pub fn message(key: &Key, given: &str) -> Result<String> {
+    let message = given.to_ascii_lowercase();
+    let message = message.strip_prefix("0x").unwrap_or(&message);
     let digits = key.bits.div_ceil(4) as usize;
     if message.len() == digits && message.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return Ok(());
+        return Ok(message.to_owned());
     }
     Err(Error::BadOption {
         field: "--message",
@@ -191,12 +194,13 @@ mod tests {
     #[test]
     fn messages_must_fit_the_key() {
         let key = |bits| Key { bits, ..Key::default() };
-        assert!(check_message(&key(32), "c0ffee42").is_ok());
-        assert!(check_message(&key(30), "00FFEE42").is_ok());
-        assert!(check_message(&key(33), "0c0ffee42").is_ok());
-        let wrong = check_message(&key(32), "c0ffee4").unwrap_err().to_string();
+        assert_eq!(message(&key(32), "c0ffee42").unwrap(), "c0ffee42");
+        assert_eq!(message(&key(30), "00FFEE42").unwrap(), "00ffee42");
+        assert_eq!(message(&key(33), "0X0c0ffee42").unwrap(), "0c0ffee42");
+        let wrong = message(&key(32), "c0ffee4").unwrap_err().to_string();
         assert!(wrong.contains("--message: must be 8 hexadecimal digits"), "{wrong}");
-        assert!(check_message(&key(32), "c0ffee4x").is_err());
-        assert!(check_message(&key(32), "").is_err());
+        assert!(message(&key(32), "c0ffee4x").is_err());
+        assert!(message(&key(32), "0xc0ffee").is_err());
+        assert!(message(&key(32), "").is_err());
     }
 }

@@ -7,11 +7,10 @@ use serde::Serialize;
 use super::{key, suspects};
 use crate::arguments::Submission;
 use crate::context::Context;
-use crate::create::{create, leave, no_result, succeeded, wait};
+use crate::create::{create_with, leave, no_result, succeeded, wait};
 use crate::error::Result;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::VerifyReport;
-use crate::transfer::discard;
 
 /// Arguments of `verify`.
 #[derive(Args)]
@@ -26,13 +25,13 @@ pub struct Arguments {
     #[arg(long, value_name = "HEX")]
     message: Option<String>,
     /// Views that a scene is read from; 20 unless given
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: Option<u32>,
     /// Side of these views in pixels; CLIP's input unless given
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
     /// Decides the views of a scene
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     submission: Submission,
@@ -50,25 +49,18 @@ struct Report<'a> {
 pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     let found = suspects::find(&arguments.paths)?;
     let key = key::find(context, &arguments.key).await?;
-    if let Some(message) = &arguments.message {
-        key::check_message(&key, message)?;
-    }
+    let message = arguments.message.as_deref().map(|given| key::message(&key, given));
+    let message = message.transpose()?;
     let inputs = suspects::send(context, &found).await?;
     let spec = Spec::Verify(VerifySpec {
         suspects: inputs.names.clone(),
         key: key.name.clone(),
-        message: arguments.message.as_deref().unwrap_or_default().to_ascii_lowercase(),
+        message: message.unwrap_or_default(),
         views: arguments.views.unwrap_or_default(),
         size: arguments.size.unwrap_or_default(),
         seed: arguments.seed,
     });
-    let job = match create(context, &arguments.submission, &inputs.title, spec).await {
-        Ok(job) => job,
-        Err(error) => {
-            discard(context, &inputs.sent).await;
-            return Err(error);
-        }
-    };
+    let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {
         leave(context, &job);
         return Ok(Exit::Done);

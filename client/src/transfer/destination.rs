@@ -35,6 +35,10 @@ impl Destination {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
+        if !folder.is_dir() {
+            let reason = format!("there is no folder {}", folder.display());
+            return Err(Error::io(path)(std::io::Error::other(reason)));
+        }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".guardsplat-").suffix(".part");
         #[cfg(unix)]
@@ -45,7 +49,10 @@ impl Destination {
         }
         Ok(Self {
             path: path.to_owned(),
-            file: builder.tempfile_in(folder).map_err(Error::io(path))?,
+            // The kind of the error alone: its text names the temporary file, which is nobody's business.
+            file: builder
+                .tempfile_in(folder)
+                .map_err(|error| Error::io(path)(error.kind().into()))?,
             hasher: Sha256::new(),
             written: 0,
         })
@@ -133,6 +140,11 @@ mod tests {
         assert_eq!(entries(folder.path()), 0);
         assert!(Destination::check(folder.path()).is_err());
         assert!(Destination::check(Path::new("-")).is_err());
-        assert!(Destination::check(&folder.path().join("missing/out")).is_err());
+        let missing = Destination::check(&folder.path().join("missing/out"));
+        let told = missing.unwrap_err().to_string();
+        assert!(
+            told.contains("missing/out: there is no folder") && !told.contains(".part"),
+            "{told}"
+        );
     }
 }

@@ -40,7 +40,7 @@ pub async fn upload(context: &Context, source: &Source, before: u64, total: u64)
 }
 
 /// Deletes what was sent for nothing, as far as that works.
-pub async fn discard(context: &Context, names: &[String]) {
+pub async fn discard(context: &Context, names: impl IntoIterator<Item = &String>) {
     for name in names {
         let request = DeleteArtifactRequest { name: name.clone() };
         // The error that led here is what the user has to hear of.

@@ -209,6 +209,34 @@ fn without_waiting_the_job_is_printed() {
 }
 
 #[test]
+fn it_goes_on_when_nobody_hears_of_its_progress() {
+    let bench = bench(&[]);
+    let mut child = bench.start(LINE);
+    drop((child.stderr.take(), child.stdout.take()));
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
+}
+
+#[test]
+fn the_same_request_sent_again_is_the_same_job() {
+    let bench = bench(&[]);
+    let line = format!("{LINE} --request-id 5f0c54a6-6b0d-4d6f-9a80-6a7a0b1f4f11");
+    assert_eq!(bench.run(&line).code, 0);
+    let first = spec_of(&bench).scene;
+    let marked = bench.fake.store("marked.ply", b"marked");
+    bench.fake.plan([success(Outcome::EmbedResult(figures(&marked, "")))]);
+    let ran = bench.run(&line);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), b"marked");
+    // What was sent again is deleted, what the job has is not.
+    let again = spec_of(&bench).scene;
+    let state = bench.fake.state();
+    assert_eq!((state.jobs.len(), state.created.len(), state.uploads), (1, 2, 2));
+    assert_eq!(state.deleted, [again]);
+    assert!(state.artifacts.contains_key(&first));
+}
+
+#[test]
 fn a_scene_that_is_there_already_is_not_sent() {
     let bench = bench(&[]);
     let name = bench.fake.store("in.ply", b"ply");
@@ -259,7 +287,7 @@ fn what_a_refused_job_would_have_used_is_deleted() {
         .add_bad_request_violation("job.embed.size", "must be 16 to 4096");
     let status = Status::with_error_details(Code::InvalidArgument, "the job is not valid", details);
     bench.fake.state().create_errors.push_back(status);
-    let ran = bench.run(&format!("{LINE} --size 1 --json"));
+    let ran = bench.run(&format!("{LINE} --json"));
     assert_eq!(ran.code, 1);
     let error = &ran.json()["error"];
     assert_eq!(

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
-use guardsplat_proto::v1::job::{Result as Outcome, State as JobState};
+use guardsplat_proto::v1::job::{Result as Outcome, Spec, State as JobState};
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::{Artifact, CreateJobRequest, EmbedResult, Failure, Job, Key, WatchJobRequest};
@@ -64,6 +64,19 @@ pub struct State {
     pub download_ends: VecDeque<usize>,
     /// Whether downloads are damaged on their way.
     pub damage: bool,
+}
+
+impl State {
+    /// What the artifacts of a job hold, by which a request is known when it is sent again.
+    pub fn content(&self, job: &Job) -> Vec<String> {
+        let names = match &job.spec {
+            Some(Spec::Embed(spec)) => vec![&spec.scene],
+            Some(Spec::Verify(spec)) => spec.suspects.iter().collect(),
+            _ => Vec::new(),
+        };
+        let hash = |name: &String| self.artifacts.get(name).map(|(artifact, _)| artifact.sha256.clone());
+        names.into_iter().filter_map(hash).collect()
+    }
 }
 
 /// The server, running on a thread of its own.

@@ -43,7 +43,7 @@ fn plan_success(bench: &Bench) {
 }
 
 #[test]
-fn called_twice_it_sends_and_marks_once() {
+fn called_twice_it_marks_once_and_keeps_one_copy() {
     let bench = bench();
     plan_success(&bench);
     plan_success(&bench);
@@ -56,8 +56,12 @@ fn called_twice_it_sends_and_marks_once() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["written"], true);
     let state = bench.fake.state();
-    assert_eq!((state.uploads, state.jobs.len(), state.created.len()), (1, 1, 2));
-    assert_eq!(state.created[0], state.created[1]);
+    // Both send the scene; whoever comes second finds the other's job, and deletes what it sent.
+    assert_eq!((state.uploads, state.jobs.len(), state.created.len()), (2, 1, 2));
+    let job = state.jobs.values().next().unwrap();
+    assert_eq!(state.deleted.len(), 1);
+    assert_eq!(state.content(job).len(), 1, "the scene of the job is kept");
+    assert_eq!(state.created[0].request_id, state.created[1].request_id);
     let id = uuid::Uuid::try_parse(&state.created[0].request_id).unwrap();
     assert_eq!(id.get_version_num(), 8);
 }
@@ -90,6 +94,18 @@ fn one_name_with_other_bytes_is_refused() {
     bench.file("in.ply", b"another");
     let ran = call(&bench, "7", &[]);
     assert_eq!(ran.code, 1);
+    let report = std::fs::read_to_string(bench.path("out.ply.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["error"]["reason"], "REQUEST_ID_REUSED");
     assert!(ran.err.contains("sent before with other bytes"), "{}", ran.err);
-    assert_eq!(bench.fake.state().created.len(), 1);
+    let state = bench.fake.state();
+    assert_eq!((state.jobs.len(), state.deleted.len()), (1, 1));
+}
+
+#[test]
+fn it_leaves_nothing_but_what_it_promises() {
+    let bench = bench();
+    plan_success(&bench);
+    assert_eq!(call(&bench, "-7", &[]).code, 0);
+    assert_eq!(bench.files(), ["in.ply", "out.ply", "out.ply.json"]);
 }

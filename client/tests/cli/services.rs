@@ -36,6 +36,16 @@ pub fn not_found(name: &str) -> Status {
     Status::with_error_details(Code::NotFound, format!("{name} does not exist"), details)
 }
 
+/// That a request id stands for another request, told as the server tells it.
+fn reused(request_id: &str) -> Status {
+    let message = format!("request_id {request_id} was used for another job");
+    let mut details = ErrorDetails::new();
+    details
+        .set_error_info("REQUEST_ID_REUSED", "guardsplat", [])
+        .add_bad_request_violation("request_id", message.clone());
+    Status::with_error_details(Code::AlreadyExists, message, details)
+}
+
 #[tonic::async_trait]
 impl ArtifactService for Fake {
     async fn upload_artifact(
@@ -127,10 +137,20 @@ impl JobService for Fake {
         if let Some(error) = error.as_ref().filter(|error| error.code() != Code::Unavailable) {
             return Err(error.clone());
         }
-        let known = state.requests.get(&request.request_id).cloned();
-        let name = known.unwrap_or_else(|| format!("jobs/{}", Uuid::new_v4()));
-        state.requests.insert(request.request_id, name.clone());
         let mut job = request.job.unwrap();
+        let known = state
+            .requests
+            .get(&request.request_id)
+            .map(|name| state.jobs[name].clone());
+        if let Some(known) = known {
+            return if state.content(&known) == state.content(&job) {
+                error.map_or(Ok(Response::new(known)), Err)
+            } else {
+                Err(reused(&request.request_id))
+            };
+        }
+        let name = format!("jobs/{}", Uuid::new_v4());
+        state.requests.insert(request.request_id, name.clone());
         job.name = name.clone();
         job.max_attempts = 3;
         job.set_state(JobState::Queued);

@@ -2,6 +2,7 @@
 use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::{EmbedResult, KeyOutput, KeyResult, KeySpec, VerifyResult};
 use prost::Message as _;
+use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use super::convert::decode;
@@ -9,24 +10,22 @@ use super::names::Kind;
 use super::problems::Problems;
 use super::{text, upload};
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, JobKind, JobRow, NewKey};
+use crate::ledger::{ArtifactId, Completion, JobKind, JobRow, NewKey};
 
 /// Most bytes of a result; figures and a few sentences need far less.
 const MAX_RESULT_BYTES: usize = 64 << 10;
 
-/// A result that holds, as far as that can be said without the ledger.
-pub struct Completion {
-    /// The encoded result.
-    pub result: Vec<u8>,
-    /// Outputs that become visible.
-    pub outputs: Vec<ArtifactId>,
-    /// The key that was made.
-    pub key: Option<NewKey>,
+/// What becomes of the job.
+struct Outcome {
+    result: Vec<u8>,
+    outputs: Vec<ArtifactId>,
+    key: Option<NewKey>,
 }
 
-/// Checks what came out of `job`.
+/// Checks what came out of `job`, as far as that can be said without the ledger.
 pub fn check(job: &JobRow, output: Option<Output>) -> Result<Completion> {
-    let completion = match (job.kind, output) {
+    let fingerprint = fingerprint(output.as_ref());
+    let Outcome { result, outputs, key } = match (job.kind, output) {
         (JobKind::Embed, Some(Output::EmbedResult(result))) => embed(&result)?,
         (JobKind::Verify, Some(Output::VerifyResult(result))) => verify(&result)?,
         (JobKind::CreateKey, Some(Output::KeyOutput(output))) => key(job, output)?,
@@ -43,17 +42,28 @@ pub fn check(job: &JobRow, output: Option<Output>) -> Result<Completion> {
             ));
         }
     };
-    if completion.result.len() > MAX_RESULT_BYTES {
-        let reason = format!(
-            "has {} bytes, at most {MAX_RESULT_BYTES} are taken",
-            completion.result.len()
-        );
+    if result.len() > MAX_RESULT_BYTES {
+        let reason = format!("has {} bytes, at most {MAX_RESULT_BYTES} are taken", result.len());
         return Err(Error::invalid("result", reason));
     }
-    Ok(completion)
+    Ok(Completion {
+        result,
+        outputs,
+        key,
+        fingerprint,
+    })
 }
 
-fn embed(result: &EmbedResult) -> Result<Completion> {
+/// SHA-256 of what the worker said; not of the result, in which a key has a name that is drawn anew every time.
+fn fingerprint(output: Option<&Output>) -> [u8; 32] {
+    let mut bytes = Vec::new();
+    if let Some(output) = output {
+        output.encode(&mut bytes);
+    }
+    Sha256::digest(bytes).into()
+}
+
+fn embed(result: &EmbedResult) -> Result<Outcome> {
     let mut problems = Problems::default();
     let scene = problems.take(Kind::Artifact.parse("embed_result.scene", &result.scene))?;
     let comparison = problems.take(Kind::Artifact.parse("embed_result.comparison", &result.comparison))?;
@@ -64,14 +74,14 @@ fn embed(result: &EmbedResult) -> Result<Completion> {
     );
     problems.finish()?;
     let outputs = scene.into_iter().chain(comparison).collect();
-    Ok(Completion {
+    Ok(Outcome {
         result: result.encode_to_vec(),
         outputs,
         key: None,
     })
 }
 
-fn verify(result: &VerifyResult) -> Result<Completion> {
+fn verify(result: &VerifyResult) -> Result<Outcome> {
     use guardsplat_proto::v1::verify_result::Verdict;
     let verdict = Verdict::try_from(result.verdict)
         .ok()
@@ -79,14 +89,14 @@ fn verify(result: &VerifyResult) -> Result<Completion> {
     if verdict.is_none() {
         return Err(Error::invalid("verify_result.verdict", "is missing or not known"));
     }
-    Ok(Completion {
+    Ok(Outcome {
         result: result.encode_to_vec(),
         outputs: Vec::new(),
         key: None,
     })
 }
 
-fn key(job: &JobRow, output: KeyOutput) -> Result<Completion> {
+fn key(job: &JobRow, output: KeyOutput) -> Result<Outcome> {
     let spec: KeySpec = decode(&job.spec)?;
     let mut problems = Problems::default();
     let artifact = problems.take(Kind::Artifact.parse("key_output.key_file", &output.key_file))?;
@@ -126,7 +136,7 @@ fn key(job: &JobRow, output: KeyOutput) -> Result<Completion> {
         seeded: told.seeded,
         artifact,
     };
-    Ok(Completion {
+    Ok(Outcome {
         result: result.encode_to_vec(),
         outputs: Vec::new(),
         key: Some(key),

@@ -23,6 +23,10 @@ pub async fn housekeeping(api: Api) {
     let mut ticks = interval(REAP_EVERY);
     let collect_every = COLLECT_EVERY.min(api.limits().abandoned_after);
     let mut collected: Option<Instant> = None;
+    // While no server was there no worker could report; those that live get the time to, before any is given up.
+    if let Err(error) = api.ledger().renew_leases(api.limits().lease, started).await {
+        tracing::error!(error = %chain(&error), "the leases of running jobs could not be renewed");
+    }
     loop {
         tokio::select! {
             () = stopping.stopped() => return,

@@ -12,7 +12,8 @@ use tonic::{Request, Response, Status};
 use uuid::Uuid;
 
 use super::names::Kind;
-use super::{Api, clock, convert, message, page, submission, watch};
+use super::submission::{self, Submission};
+use super::{Api, clock, convert, fingerprint, message, page, watch};
 use crate::error::{Error, Result};
 use crate::ledger::NewJob;
 
@@ -78,6 +79,7 @@ impl Api {
                 retry_after: QUEUE_RETRY,
             });
         }
+        let fingerprint = self.fingerprint(&submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
             display_name: submission.display_name,
@@ -86,12 +88,23 @@ impl Api {
             inputs: submission.inputs,
             key: submission.key,
             request_id: submission.request_id,
-            fingerprint: submission.fingerprint,
+            fingerprint,
             max_attempts: self.limits().max_attempts,
         };
         let row = self.ledger().create_job(new, clock::now()).await?;
         self.changes().queue_grew();
         convert::job(row)
+    }
+
+    /// What a request is known by when it is sent again; needed only where it has a name.
+    async fn fingerprint(&self, submission: &Submission) -> Result<[u8; 32]> {
+        let mut inputs = Vec::new();
+        if submission.request_id.is_some() {
+            for &id in &submission.inputs {
+                inputs.push((id, self.ledger().get_artifact(id).await?));
+            }
+        }
+        Ok(fingerprint::whole(&submission.asked, &inputs))
     }
 
     /// Whether a request made a job before.

@@ -7,6 +7,7 @@ use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
 
 use super::deadline::Deadlines;
+use super::explained::Explained;
 use crate::error::{Error, Result};
 
 /// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
@@ -25,6 +26,7 @@ pub async fn serve(routes: Routes, listener: TcpListener, shutdown: impl Future<
         .concurrency_limit_per_connection(CALLS_AT_ONCE as usize)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
+        .layer(Explained)
         .layer(Deadlines)
         .add_routes(routes)
         .serve_with_incoming_shutdown(incoming, shutdown)

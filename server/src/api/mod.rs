@@ -20,6 +20,8 @@ mod clock;
 mod completion;
 mod convert;
 mod deadline;
+mod explained;
+mod fingerprint;
 mod housekeeping;
 mod jobs;
 mod keys;

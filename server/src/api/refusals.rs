@@ -22,8 +22,9 @@ impl From<LedgerError> for Error {
             LedgerError::LeaseLost(job) => Self::LeaseLost {
                 name: Kind::Job.name(job),
             },
-            LedgerError::InUse { artifact, .. } => Self::InUse {
+            LedgerError::InUse { artifact, job } => Self::InUse {
                 name: Kind::Artifact.name(artifact),
+                job: Kind::Job.name(job),
             },
             LedgerError::NotAnOutput(artifact) => {
                 let name = Kind::Artifact.name(artifact);

@@ -8,7 +8,7 @@ use tonic_types::{ErrorDetails, FieldViolation, PreconditionViolation, StatusExt
 use crate::error::Error;
 
 /// Domain of every `google.rpc.ErrorInfo`.
-const DOMAIN: &str = "guardsplat";
+pub const DOMAIN: &str = "guardsplat";
 /// When to try again what is not available.
 const SOON: Duration = Duration::from_secs(1);
 
@@ -49,7 +49,10 @@ fn kind(error: &Error) -> (Code, &'static str) {
 /// What `google.rpc.ErrorInfo` says besides the reason.
 fn metadata(error: &Error) -> HashMap<String, String> {
     let entry = match error {
-        Error::Finished { name } | Error::InUse { name } | Error::LeaseLost { name } => ("name", name.clone()),
+        Error::InUse { name, job } => {
+            return HashMap::from([("name", name), ("job", job)].map(|(key, value)| (key.to_owned(), value.clone())));
+        }
+        Error::Finished { name } | Error::LeaseLost { name } => ("name", name.clone()),
         Error::NotFound { name, .. } | Error::NotCancelled { name } => ("name", name.clone()),
         Error::RequestIdReused { request_id } => ("request_id", request_id.to_string()),
         Error::QueueFull { limit, .. } => ("limit", limit.to_string()),
@@ -70,7 +73,7 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         Error::NotFound { kind, name } => {
             details.set_resource_info(format!("guardsplat.v1/{kind}"), name, "", error.to_string());
         }
-        Error::Finished { name } | Error::InUse { name } | Error::NotCancelled { name } => {
+        Error::Finished { name } | Error::InUse { name, .. } | Error::NotCancelled { name } => {
             let violation = PreconditionViolation::new(kind(error).1, name, error.to_string());
             details.set_precondition_failure(vec![violation]);
         }
@@ -154,7 +157,9 @@ mod tests {
 
         let status = Status::from(Error::InUse {
             name: "artifacts/1".into(),
+            job: "jobs/2".into(),
         });
+        assert_eq!(status.get_details_error_info().unwrap().metadata["job"], "jobs/2");
         assert_eq!(
             status.get_details_precondition_failure().unwrap().violations[0].subject,
             "artifacts/1"

@@ -5,9 +5,9 @@ use guardsplat_proto::v1::embed_spec::Preset;
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
 use prost::Message as _;
-use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
+use super::fingerprint;
 use super::message::MAX_BITS;
 use super::names::Kind;
 use super::problems::Problems;
@@ -37,8 +37,8 @@ pub struct Submission {
     pub message: Option<(&'static str, String)>,
     /// Names the request.
     pub request_id: Option<Uuid>,
-    /// SHA-256 of what was asked for.
-    pub fingerprint: [u8; 32],
+    /// SHA-256 of what was asked for, but for the artifacts, which [`fingerprint::whole`] adds.
+    pub asked: [u8; 32],
 }
 
 /// Checks a request.
@@ -51,8 +51,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     let request_id = problems.take(self::request_id(&request_id))?.flatten();
     problems.take(text::display_name("job.display_name", &job.display_name))?;
     output_only(&job, &mut problems);
-    // What was asked for is encoded the same way every time: fields in order, without unknown ones.
-    let fingerprint = Sha256::digest(job.encode_to_vec()).into();
+    let asked = fingerprint::asked(&job);
     let checked = match job.spec {
         Some(Spec::Embed(spec)) => embed(&spec, &mut problems)?.map(|w| (JobKind::Embed, spec.encode_to_vec(), w)),
         Some(Spec::Verify(spec)) => verify(&spec, &mut problems)?.map(|w| (JobKind::Verify, spec.encode_to_vec(), w)),
@@ -79,7 +78,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
         key,
         message,
         request_id,
-        fingerprint,
+        asked,
     })
 }
 

@@ -50,7 +50,7 @@ pub enum StoreError {
         received: String,
     },
     /// Reading was to begin behind the end.
-    #[error("offset {offset} is behind the end, {size}")]
+    #[error("{offset} is behind the end, {size}")]
     BadOffset {
         /// Where to begin.
         offset: u64,

@@ -21,8 +21,8 @@ use uuid::Uuid;
 pub use error::{LedgerError, Result};
 pub use sqlite::SqliteLedger;
 pub use types::{
-    ArtifactId, ArtifactRow, ArtifactState, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow, Lease,
-    NewArtifact, NewJob, NewKey, Origin, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+    ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow,
+    Lease, NewArtifact, NewJob, NewKey, Origin, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
 };
 
 /// What the service keeps of its work. A call that returned `Ok` is on disk.
@@ -30,10 +30,12 @@ pub use types::{
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
 pub trait Ledger: Send + Sync + 'static {
-    /// Queues a job. The same request id and fingerprint give the job that the first call made.
+    /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
+    /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
+    /// then their artifacts may have other names, but hold the same.
     ///
     /// # Errors
-    /// `RequestIdReused` for the same request id with another fingerprint, `NotFound` for an input or a key that isn't
+    /// `RequestIdReused` for the same request id with another request, `NotFound` for an input or a key that isn't
     /// there (or isn't visible).
     async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow>;
 
@@ -77,20 +79,13 @@ pub trait Ledger: Send + Sync + 'static {
         now: i64,
     ) -> Result<bool>;
 
-    /// Ends a job successfully: result, outputs and key become visible at once.
+    /// Ends a job successfully: result, outputs and key become visible at once. The attempt that did so may say the same
+    /// again, in case the answer was lost: it gets the job as it is, and nothing changes.
     ///
     /// # Errors
     /// `NotFound`, `LeaseLost`; `NotAnOutput` for an artifact that this attempt didn't finish writing, or that is
     /// secret where it must not be, or the other way round.
-    async fn complete(
-        &self,
-        id: JobId,
-        token: &str,
-        result: Vec<u8>,
-        outputs: Vec<ArtifactId>,
-        key: Option<NewKey>,
-        now: i64,
-    ) -> Result<JobRow>;
+    async fn complete(&self, id: JobId, token: &str, completion: Completion, now: i64) -> Result<JobRow>;
 
     /// Ends an attempt that failed. A retryable failure queues the job again after a pause while attempts are left
     /// (or ends it as cancelled, if that was asked for); any other fails the job. With `cancelled` the job ends as
@@ -114,6 +109,9 @@ pub trait Ledger: Send + Sync + 'static {
     /// # Errors
     /// `NotFound`, `LeaseLost`.
     async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow>;
+
+    /// Has no lease end before `now + lease`: for a server that begins, as no worker could report while none was there.
+    async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()>;
 
     /// Ends the attempts whose lease has expired, and returns their jobs.
     async fn reap(&self, now: i64) -> Result<Vec<JobId>>;

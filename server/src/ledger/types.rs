@@ -115,7 +115,7 @@ pub struct NewJob {
     pub key: Option<KeyId>,
     /// Names the request, so that it can be repeated.
     pub request_id: Option<Uuid>,
-    /// SHA-256 of the request.
+    /// SHA-256 of the request, with what its artifacts hold in place of their names.
     pub fingerprint: [u8; 32],
     /// How many attempts there may be.
     pub max_attempts: i32,
@@ -231,6 +231,19 @@ pub struct NewKey {
     pub seeded: bool,
     /// The secret output that holds the key file.
     pub artifact: ArtifactId,
+}
+
+/// What an attempt says came out of its job.
+#[derive(Clone, Debug)]
+pub struct Completion {
+    /// Encoded result of the job's kind.
+    pub result: Vec<u8>,
+    /// Outputs that become visible.
+    pub outputs: Vec<ArtifactId>,
+    /// The key that was made.
+    pub key: Option<NewKey>,
+    /// SHA-256 of what the worker said, by which it is known when it is said again.
+    pub fingerprint: [u8; 32],
 }
 
 /// What is known of a key.

@@ -21,7 +21,7 @@ pub enum SecretError {
     #[error("no random numbers: {0}")]
     NoRandomness(String),
     /// A file can't be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("master key: {}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,

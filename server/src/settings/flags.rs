@@ -17,49 +17,49 @@ pub struct Flags {
     /// Settings file [default: /etc/guardsplat/server.toml, if it is there]
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Address and port to listen on; port 0 takes any that is free
+    /// Address and port to listen on; port 0 takes any that is free [default: 127.0.0.1:50051]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
-    /// Folder of everything that is kept
+    /// Folder of everything that is kept [default: guardsplat-data]
     #[arg(long, value_name = "FOLDER")]
     pub data_dir: Option<PathBuf>,
-    /// Most bytes of an artifact
+    /// Most bytes of an artifact [default: 4294967296]
     #[arg(long, value_name = "BYTES")]
     pub max_artifact_bytes: Option<u64>,
-    /// Most jobs that may wait
+    /// Most jobs that may wait [default: 10000]
     #[arg(long, value_name = "JOBS")]
     pub max_queued_jobs: Option<u64>,
-    /// Seconds until a worker that says nothing is given up
+    /// Seconds until a worker that says nothing is given up [default: 30]
     #[arg(long, value_name = "SECONDS")]
     pub lease_seconds: Option<u64>,
-    /// How often a job is tried
+    /// How often a job is tried [default: 3]
     #[arg(long, value_name = "TIMES")]
     pub max_attempts: Option<u32>,
-    /// Seconds that an upload may pause
+    /// Seconds that an upload may pause [default: 60]
     #[arg(long, value_name = "SECONDS")]
     pub upload_timeout_seconds: Option<u64>,
-    /// Seconds after which bytes that nobody published are removed
+    /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
-    /// Whether to run a worker of its own
+    /// Whether to run a worker of its own [default: true]
     #[arg(long, value_name = "true|false")]
     pub embedded_worker: Option<bool>,
     /// Program of that worker [default: guardsplat-worker beside this program]
     #[arg(long, value_name = "FILE")]
     pub worker_binary: Option<PathBuf>,
-    /// What that worker computes on
+    /// What that worker computes on [default: auto]
     #[arg(long, value_name = "DEVICE")]
     pub worker_device: Option<WorkerDevice>,
-    /// File of the master key
+    /// File of the master key, 64 hexadecimal digits [default: master.key in the data folder, made at the first start]
     #[arg(long, value_name = "FILE")]
     pub master_key_file: Option<PathBuf>,
-    /// Seconds that work may take to end when the server stops
+    /// Seconds that work may take to end when the server stops [default: 20]
     #[arg(long, value_name = "SECONDS")]
     pub stop_seconds: Option<u64>,
-    /// How log lines are written
+    /// How log lines are written [default: text]
     #[arg(long, value_name = "FORMAT")]
     pub log_format: Option<LogFormat>,
-    /// What is logged, in the syntax of RUST_LOG
+    /// What is logged, in the syntax of RUST_LOG [default: info]
     #[arg(long, value_name = "FILTER")]
     pub log_filter: Option<String>,
 }

@@ -223,3 +223,22 @@ fn the_master_key_is_not_shown() {
 fn the_command_line_is_sound() {
     Flags::command().debug_assert();
 }
+
+#[test]
+fn help_tells_the_defaults() {
+    let defaults = serde_json::to_value(Settings::default()).unwrap();
+    let command = Flags::command();
+    for (name, value) in defaults.as_object().unwrap() {
+        let flag = command.get_arguments().find(|flag| flag.get_id() == name.as_str());
+        let help = flag
+            .and_then(|flag| flag.get_help())
+            .unwrap_or_else(|| panic!("--{name}"))
+            .to_string();
+        let wanted = match value {
+            serde_json::Value::Null => "[default: ".to_owned(),
+            serde_json::Value::String(text) => format!("[default: {text}]"),
+            other => format!("[default: {other}]"),
+        };
+        assert!(help.contains(&wanted), "{name}: {help}");
+    }
+}

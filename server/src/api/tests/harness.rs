@@ -84,12 +84,18 @@ impl Server {
 
     /// Stops in good order, and starts another server over the same folder.
     pub async fn restart(self, limits: Limits) -> Self {
+        self.restart_after(Duration::ZERO, limits).await
+    }
+
+    /// As [`Self::restart`], with no server at all for a while in between.
+    pub async fn restart_after(self, absence: Duration, limits: Limits) -> Self {
         self.api.stop();
         self.end.send(()).unwrap();
         drop((self.jobs, self.artifacts, self.keys, self.worker, self.channel));
         self.served.await.unwrap().unwrap();
         self.housekeeper.await.unwrap();
         self.ledger.close().await;
+        tokio::time::sleep(absence).await;
         Self::in_folder(self.folder, limits).await
     }
 

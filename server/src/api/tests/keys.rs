@@ -54,6 +54,13 @@ async fn a_job_makes_a_key_that_later_jobs_read() {
         .complete(&job, &token, Output::KeyOutput(key_output(32, &output.name)))
         .await
         .unwrap();
+    // Said again, because the answer was lost, it makes no second key.
+    server
+        .complete(&job, &token, Output::KeyOutput(key_output(32, &output.name)))
+        .await
+        .unwrap();
+    let all = server.keys.clone().list_keys(ListKeysRequest::default()).await.unwrap();
+    assert_eq!(all.into_inner().keys.len(), 1);
 
     let done = server.job(&job).await;
     assert_eq!(done.state(), State::Succeeded);

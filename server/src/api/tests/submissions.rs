@@ -1,6 +1,8 @@
 //! What `CreateJob` takes and refuses.
 use guardsplat_proto::v1::job::Spec;
-use guardsplat_proto::v1::{EmbedSpec, Failure, Job, KeySpec, Progress, VerifySpec, job};
+use guardsplat_proto::v1::{
+    CancelJobRequest, DeleteArtifactRequest, EmbedSpec, Failure, Job, KeySpec, Progress, VerifySpec, job,
+};
 use tonic::Code;
 use uuid::Uuid;
 
@@ -219,6 +221,64 @@ async fn a_request_sent_again_is_the_same_job() {
         server.submit(of(key_spec(8)), &id).await.unwrap().into_inner().name,
         first.name
     );
+}
+
+#[tokio::test]
+async fn a_request_with_the_same_bytes_is_the_same_request() {
+    let server = Server::start().await;
+    let key = server.key(10, b"key file").await;
+    let (id, pictures) = (Uuid::new_v4().to_string(), Uuid::new_v4().to_string());
+    let embed = |scene: &str| {
+        of(Spec::Embed(EmbedSpec {
+            scene: scene.into(),
+            key: key.clone(),
+            message: "2aa".into(),
+            ..Default::default()
+        }))
+    };
+    let verify = |suspects: [&str; 2]| {
+        of(Spec::Verify(VerifySpec {
+            suspects: suspects.map(str::to_owned).to_vec(),
+            key: key.clone(),
+            ..Default::default()
+        }))
+    };
+    let submit = async |job: Job, id: &str| server.submit(job, id).await.map(|answer| answer.into_inner().name);
+    let [first, copy] = ["scene.ply", "copy.ply"].map(|name| server.upload(name, b"scene"));
+    let (first, copy) = (first.await.name, copy.await.name);
+    let other = server.upload("scene.ply", b"SCENE").await.name;
+    let job = submit(embed(&first), &id).await.unwrap();
+    assert_eq!(submit(embed(&copy), &id).await.unwrap(), job);
+    refused(
+        submit(embed(&other), &id).await,
+        Code::AlreadyExists,
+        "REQUEST_ID_REUSED",
+    );
+    // The job reads what it was made with, whoever sent that again.
+    let Some(Spec::Embed(spec)) = server.job(&job).await.spec else {
+        panic!("{job}")
+    };
+    assert_eq!(spec.scene, first);
+
+    // Of several each counts, and their order.
+    let job = submit(verify([&first, &other]), &pictures).await.unwrap();
+    assert_eq!(submit(verify([&copy, &other]), &pictures).await.unwrap(), job);
+    for wrong in [[&other, &first], [&first, &copy]] {
+        let again = submit(verify(wrong.map(String::as_str)), &pictures).await;
+        refused(again, Code::AlreadyExists, "REQUEST_ID_REUSED");
+    }
+    // What is gone is known by its name, and nothing else is taken for it.
+    server
+        .jobs
+        .clone()
+        .cancel_job(CancelJobRequest { name: job.clone() })
+        .await
+        .unwrap();
+    let delete = DeleteArtifactRequest { name: other.clone() };
+    server.artifacts.clone().delete_artifact(delete).await.unwrap();
+    assert_eq!(submit(verify([&first, &other]), &pictures).await.unwrap(), job);
+    let again = submit(verify([&copy, &other]), &pictures).await;
+    refused(again, Code::AlreadyExists, "REQUEST_ID_REUSED");
 }
 
 #[tokio::test]

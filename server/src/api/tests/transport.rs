@@ -1,6 +1,7 @@
 //! What is around the services: deadlines, and reflection for clients that have nothing of ours.
 use std::time::{Duration, Instant};
 
+use guardsplat_proto::v1::GetArtifactRequest;
 use tokio_stream::StreamExt;
 use tonic::body::Body;
 use tonic::codegen::http::{Request, Response};
@@ -11,7 +12,7 @@ use tonic_reflection::pb::v1::server_reflection_response::MessageResponse;
 use tonic_reflection::pb::v1::{ServerReflectionRequest, ServerReflectionResponse};
 use tower::{Layer, ServiceExt, service_fn};
 
-use super::harness::{Server, refused};
+use super::harness::{Server, chunk, first, metadata, refused};
 use crate::api::deadline::Deadlines;
 
 #[tokio::test]
@@ -70,6 +71,39 @@ async fn a_deadline_that_has_passed_leaves_the_server_well() {
     assert!(began.elapsed() < Duration::from_secs(5));
     server.create(super::harness::key_spec(8)).await;
     server.take().await;
+}
+
+#[tokio::test]
+async fn errors_from_below_the_services_have_details_too() {
+    let server = Server::start().await;
+    let upload = [first(metadata("x.ply", &[7; 9])), chunk(&vec![7; 5 << 20])];
+    let answer = server
+        .artifacts
+        .clone()
+        .upload_artifact(tokio_stream::iter(upload))
+        .await;
+    refused(answer, Code::OutOfRange, "MESSAGE_TOO_LARGE");
+    let long = GetArtifactRequest {
+        name: "x".repeat(5 << 20),
+    };
+    refused(
+        server.artifacts.clone().get_artifact(long).await,
+        Code::OutOfRange,
+        "MESSAGE_TOO_LARGE",
+    );
+    let call = async |path: &str| {
+        // A frame of three bytes that are no message.
+        let body = Body::new("\0\0\0\0\u{3}???".to_owned());
+        let request = Request::post(path)
+            .header("content-type", "application/grpc")
+            .body(body);
+        let answer = server.channel.clone().oneshot(request.unwrap()).await.unwrap();
+        Status::from_header_map(answer.headers()).map_or(Ok(()), Err)
+    };
+    let answer = call("/guardsplat.v1.JobService/EndJob").await;
+    refused(answer, Code::Unimplemented, "UNIMPLEMENTED");
+    let answer = call("/guardsplat.v1.JobService/CreateJob").await;
+    refused(answer, Code::Internal, "BAD_MESSAGE");
 }
 
 #[tokio::test]

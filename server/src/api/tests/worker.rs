@@ -93,9 +93,14 @@ async fn outputs_become_visible_with_the_result() {
         (done.state(), done.result),
         (State::Succeeded, Some(JobResult::EmbedResult(result.clone())))
     );
-    // The answer may have been lost; a second try changes nothing.
-    let again = server.complete(&name, &token, Output::EmbedResult(result)).await;
-    refused(again, Code::Aborted, "LEASE_LOST");
+    // The answer may have been lost: said again it is the same, and changes nothing. Anything else comes too late.
+    let before = server.job(&name).await;
+    let again = Output::EmbedResult(result.clone());
+    server.complete(&name, &token, again).await.unwrap();
+    let other = EmbedResult { steps: 8, ..result };
+    let other = server.complete(&name, &token, Output::EmbedResult(other)).await;
+    refused(other, Code::Aborted, "LEASE_LOST");
+    assert_eq!(server.job(&name).await, before);
 }
 
 #[tokio::test]

@@ -9,8 +9,32 @@ use guardsplat_proto::v1::{
 };
 use tonic::Code;
 
-use super::harness::{Server, invalid, refused};
+use super::harness::{Server, invalid, key_output, key_spec, refused};
 use crate::api::Limits;
+
+#[tokio::test]
+async fn a_server_that_was_away_takes_no_lease() {
+    let limits = Limits {
+        lease: Duration::from_secs(1),
+        ..Limits::default()
+    };
+    let server = Server::with(limits.clone()).await;
+    let name = server.create(key_spec(8)).await.name;
+    let (_, token) = server.take().await;
+    let server = server.restart_after(Duration::from_millis(1500), limits).await;
+    // Its housekeeping has looked for leases that expired.
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let report = ReportJobRequest {
+        name: name.clone(),
+        lease_token: token.clone(),
+        progress: None,
+    };
+    server.worker.clone().report_job(report).await.unwrap();
+    let file = server.stored(&name, &token, b"key", true).await;
+    let output = Output::KeyOutput(key_output(8, &file));
+    server.complete(&name, &token, output).await.unwrap();
+    assert_eq!(server.job(&name).await.attempt, 1);
+}
 
 #[tokio::test]
 async fn a_zombie_is_refused_everywhere() {

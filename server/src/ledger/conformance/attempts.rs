@@ -167,6 +167,27 @@ pub(crate) async fn reports_extend_the_lease_and_carry_progress(factory: &dyn Fa
     assert_eq!(claim_of(&*ledger, id, at(200)).await.job.progress, None);
 }
 
+pub(crate) async fn leases_outlast_the_absence_of_the_server(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let (one, two) = (queue(&*ledger, at(0)).await, queue(&*ledger, at(1)).await);
+    let lost = claim_of(&*ledger, one, at(10)).await;
+    let alive = claim_of(&*ledger, two, at(10)).await;
+    let before = [job(&*ledger, one).await, job(&*ledger, two).await];
+    drop(ledger);
+
+    let ledger = factory.open().await;
+    ledger.renew_leases(LEASE, at(1000)).await.unwrap();
+    // Nothing that anybody watches has changed, and a lease never gets shorter.
+    assert_eq!([job(&*ledger, one).await, job(&*ledger, two).await], before);
+    ledger.renew_leases(LEASE, at(500)).await.unwrap();
+    assert_eq!(ledger.reap(at(1029)).await.unwrap(), NONE);
+    // Who is there reports; who is not is missed one lease later.
+    ledger.report(two, &alive.token, None, LEASE, at(1020)).await.unwrap();
+    assert_eq!(ledger.reap(at(1030)).await.unwrap(), [one]);
+    assert!(is_lost(&ledger.report(one, &lost.token, None, LEASE, at(1031)).await));
+    complete(&*ledger, &alive, &[], at(1031)).await;
+}
+
 pub(crate) async fn a_lost_worker_is_noticed(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let id = queue(&*ledger, at(0)).await;

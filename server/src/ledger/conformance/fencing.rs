@@ -11,10 +11,8 @@ async fn all_refused(ledger: &dyn Ledger, zombie: &Lease, written: &[Uuid], now:
     let before = job(ledger, id).await;
     assert!(is_lost(&ledger.leased_job(id, token).await));
     assert!(is_lost(&ledger.report(id, token, Some(vec![66]), LEASE, now).await));
-    assert!(is_lost(&ledger.complete(id, token, vec![66], vec![], None, now).await));
-    assert!(is_lost(
-        &ledger.complete(id, token, vec![66], written.to_vec(), None, now).await
-    ));
+    assert!(is_lost(&ledger.complete(id, token, completion(66, &[]), now).await));
+    assert!(is_lost(&ledger.complete(id, token, completion(66, written), now).await));
     for (retryable, cancelled) in [(true, false), (false, false), (false, true)] {
         assert!(is_lost(
             &ledger
@@ -53,9 +51,7 @@ pub(crate) async fn tokens_differ_and_are_the_only_key(factory: &dyn Factory) {
     assert_ne!(first.token, second.token);
     // The token of another job, a wrong one and none at all.
     for token in [second.token.as_str(), "", "0123456789abcdef"] {
-        assert!(is_lost(
-            &ledger.complete(one, token, vec![1], vec![], None, at(3)).await
-        ));
+        assert!(is_lost(&ledger.complete(one, token, completion(1, &[]), at(3)).await));
         assert!(is_lost(&ledger.leased_job(one, token).await));
     }
     assert_eq!(ledger.leased_job(one, &first.token).await.unwrap().id, one);
@@ -84,7 +80,7 @@ pub(crate) async fn a_zombie_can_not_disturb_its_successor(factory: &dyn Factory
 
     // The successor can't publish what the zombie wrote, either.
     for left in [stale, pending] {
-        let theft = ledger.complete(id, &successor.token, vec![1], vec![left], None, at(42));
+        let theft = ledger.complete(id, &successor.token, completion(1, &[left]), at(42));
         refused!(theft.await, LedgerError::NotAnOutput(artifact) if artifact == left);
         let theft = ledger.artifact_ready(left, Some(&successor.token), at(42)).await;
         refused!(theft, LedgerError::NotAnOutput(artifact) if artifact == left);
@@ -93,7 +89,32 @@ pub(crate) async fn a_zombie_can_not_disturb_its_successor(factory: &dyn Factory
     let done = complete(&*ledger, &successor, &[good], at(44)).await;
     assert_eq!((done.state, done.result), (JobState::Succeeded, Some(vec![9])));
     all_refused(&*ledger, &zombie, &[stale, pending], at(45)).await;
+    // Not even what its successor said.
+    let echo = ledger.complete(id, &zombie.token, completion(9, &[good]), at(46)).await;
+    assert!(is_lost(&echo));
     assert!(visible(&*ledger, good).await);
+}
+
+pub(crate) async fn a_completion_may_be_said_again(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let id = queue(&*ledger, at(0)).await;
+    let lease = claim_of(&*ledger, id, at(1)).await;
+    let scene = output(&*ledger, &lease, false, at(2)).await;
+    let done = complete(&*ledger, &lease, &[scene], at(3)).await;
+    drop(ledger);
+
+    // However late, and after a restart.
+    let ledger = factory.open().await;
+    let again = complete(&*ledger, &lease, &[scene], at(1000)).await;
+    assert_eq!(again, done);
+    assert_eq!(job(&*ledger, id).await, done);
+    assert!(visible(&*ledger, scene).await);
+    // Something else, or somebody else, is refused.
+    for (token, said) in [(lease.token.as_str(), 8), ("0123456789abcdef", 9), ("", 9)] {
+        let refused = ledger.complete(id, token, completion(said, &[scene]), at(1001)).await;
+        assert!(is_lost(&refused), "{token} {said}");
+    }
+    assert_eq!(job(&*ledger, id).await, done);
 }
 
 pub(crate) async fn a_finished_job_takes_nothing_more(factory: &dyn Factory) {

@@ -4,7 +4,8 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use super::super::{
-    ArtifactId, ArtifactState, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, NewArtifact, NewJob, Origin,
+    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, NewArtifact,
+    NewJob, Origin,
 };
 
 /// How long the leases of the tests are.
@@ -114,8 +115,18 @@ pub async fn output(ledger: &dyn Ledger, lease: &Lease, secret: bool, now: i64) 
 }
 
 pub async fn complete(ledger: &dyn Ledger, lease: &Lease, outputs: &[ArtifactId], now: i64) -> JobRow {
-    let done = ledger.complete(lease.job.id, &lease.token, vec![9], outputs.to_vec(), None, now);
+    let done = ledger.complete(lease.job.id, &lease.token, completion(9, outputs), now);
     done.await.expect("a leased job can be completed")
+}
+
+/// That `result` came out, with these outputs.
+pub fn completion(result: u8, outputs: &[ArtifactId]) -> Completion {
+    Completion {
+        result: vec![result],
+        outputs: outputs.to_vec(),
+        key: None,
+        fingerprint: [result; 32],
+    }
 }
 
 /// Whether an artifact is seen from outside.

@@ -37,6 +37,7 @@ macro_rules! conformance_suite {
         $crate::ledger::conformance::conformance_suite!(@tests $factory;
             a_job_is_kept_as_it_was_given
             the_same_request_is_the_same_job
+            a_request_is_the_same_if_its_artifacts_hold_the_same
             one_request_sent_many_times_at_once_is_one_job
             what_a_job_needs_must_be_there
             acknowledged_work_survives
@@ -51,10 +52,12 @@ macro_rules! conformance_suite {
             a_final_failure_is_not_repeated
             a_released_job_is_not_charged_and_keeps_its_place
             reports_extend_the_lease_and_carry_progress
+            leases_outlast_the_absence_of_the_server
             a_lost_worker_is_noticed
             tokens_differ_and_are_the_only_key
             a_reaped_zombie_can_write_nothing
             a_zombie_can_not_disturb_its_successor
+            a_completion_may_be_said_again
             a_finished_job_takes_nothing_more
             unknown_things_are_not_found
             cancelling_a_queued_job_ends_it

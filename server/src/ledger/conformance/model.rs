@@ -16,8 +16,8 @@ pub enum Step {
     Claim,
     /// Reports under any lease ever given out, with progress or without.
     Report(usize, Option<u8>),
-    /// Completes under any lease.
-    Complete(usize),
+    /// Completes under any lease, with one of two results.
+    Complete(usize, u8),
     /// Fails under any lease; retryable, cancelled.
     Fail(usize, bool, bool),
     /// Hands back under any lease.
@@ -36,7 +36,7 @@ pub fn steps() -> impl Strategy<Value = Vec<Step>> {
         4 => (proptest::option::of(0..4_u8), any::<bool>()).prop_map(|(request, body)| Step::Create(request, body)),
         6 => Just(Step::Claim),
         2 => (any::<usize>(), proptest::option::of(0..3_u8)).prop_map(|(lease, news)| Step::Report(lease, news)),
-        1 => any::<usize>().prop_map(Step::Complete),
+        2 => (any::<usize>(), 0..2_u8).prop_map(|(lease, said)| Step::Complete(lease, said)),
         3 => (any::<usize>(), prop::bool::weighted(0.8), prop::bool::weighted(0.2))
             .prop_map(|(lease, retryable, cancelled)| Step::Fail(lease, retryable, cancelled)),
         1 => any::<usize>().prop_map(Step::Release),
@@ -59,6 +59,8 @@ struct Job {
     run_after: Option<i64>,
     create_time: i64,
     revision: i64,
+    /// Which lease completed it, and with what.
+    completed: Option<(usize, u8)>,
     /// Which lease has it, and until when.
     lease: Option<(usize, i64)>,
 }
@@ -135,12 +137,21 @@ impl Pair {
                     }
                 });
             }
-            Step::Complete(choice) => {
+            Step::Complete(choice, said) => {
                 let Some((lease, id, token)) = self.lease(choice) else {
                     return;
                 };
-                let done = self.ledger.complete(id, &token, vec![9], vec![], None, now).await;
-                self.fenced(lease, &done, |job| job.leave(JobState::Succeeded, None));
+                let done = self.ledger.complete(id, &token, completion(said, &[]), now).await;
+                let job = &self.jobs[self.leases[lease].0];
+                if job.completed == Some((lease, said)) {
+                    // The answer may have been lost.
+                    assert_eq!(done.unwrap().state, JobState::Succeeded);
+                    return;
+                }
+                self.fenced(lease, &done, |job| {
+                    job.leave(JobState::Succeeded, None);
+                    job.completed = Some((lease, said));
+                });
             }
             Step::Fail(choice, retryable, cancelled) => {
                 let Some((lease, id, token)) = self.lease(choice) else {
@@ -199,6 +210,7 @@ impl Pair {
         let request_id = request.map(|r| Uuid::from_u128(u128::from(r) + 1));
         let new = NewJob {
             request_id,
+            spec: vec![u8::from(body)],
             fingerprint: [u8::from(body); 32],
             ..new_job()
         };
@@ -223,6 +235,7 @@ impl Pair {
                     run_after: None,
                     create_time: self.now,
                     revision: 1,
+                    completed: None,
                     lease: None,
                 });
             }

@@ -1,7 +1,7 @@
 //! What jobs make: seen when the job is complete, and not before.
 use uuid::Uuid;
 
-use super::super::{JobId, JobKind, JobState, KeyRow, Ledger, LedgerError, NewJob, NewKey};
+use super::super::{Completion, JobId, JobKind, JobState, KeyRow, Ledger, LedgerError, NewJob, NewKey};
 use super::Factory;
 use super::fixture::*;
 
@@ -42,7 +42,7 @@ pub(crate) async fn completion_publishes_all_or_nothing(factory: &dyn Factory) {
     let uploaded = upload(&*ledger, at(2)).await;
     for wrong in [unfinished, secret, of_other, uploaded, Uuid::now_v7()] {
         let done = ledger
-            .complete(id, &lease.token, vec![9], vec![good, wrong], None, at(3))
+            .complete(id, &lease.token, completion(9, &[good, wrong]), at(3))
             .await;
         refused!(done, LedgerError::NotAnOutput(artifact) if artifact == wrong);
         assert!(!visible(&*ledger, good).await);
@@ -65,6 +65,13 @@ fn new_key(artifact: Uuid) -> NewKey {
     }
 }
 
+fn with_key(key: &NewKey) -> Completion {
+    Completion {
+        key: Some(key.clone()),
+        ..completion(9, &[])
+    }
+}
+
 /// Has a job make a key.
 async fn make_key(ledger: &dyn Ledger, now: i64) -> (JobId, NewKey) {
     let id = ledger
@@ -80,10 +87,15 @@ async fn make_key(ledger: &dyn Ledger, now: i64) -> (JobId, NewKey) {
         .id;
     let lease = claim_of(ledger, id, now).await;
     let key = new_key(output(ledger, &lease, true, now).await);
-    ledger
-        .complete(id, &lease.token, vec![9], vec![], Some(key.clone()), now)
-        .await
-        .unwrap();
+    ledger.complete(id, &lease.token, with_key(&key), now).await.unwrap();
+    // A worker that did not hear the answer says it again, for which the server thinks of another name.
+    let again = NewKey {
+        id: Uuid::now_v7(),
+        ..key.clone()
+    };
+    let said_again = ledger.complete(id, &lease.token, with_key(&again), now).await.unwrap();
+    assert_eq!(said_again.state, JobState::Succeeded);
+    assert_eq!(ledger.get_key(again.id).await.unwrap(), None);
     (id, key)
 }
 
@@ -92,9 +104,7 @@ pub(crate) async fn keys_are_published_and_their_files_never(factory: &dyn Facto
     let id = queue(&*ledger, at(0)).await;
     let lease = claim_of(&*ledger, id, at(0)).await;
     let open = new_key(output(&*ledger, &lease, false, at(0)).await);
-    let done = ledger
-        .complete(id, &lease.token, vec![9], vec![], Some(open.clone()), at(1))
-        .await;
+    let done = ledger.complete(id, &lease.token, with_key(&open), at(1)).await;
     refused!(done, LedgerError::NotAnOutput(artifact) if artifact == open.artifact);
     assert_eq!(ledger.get_key(open.id).await.unwrap(), None);
 

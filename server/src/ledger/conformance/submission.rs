@@ -59,6 +59,7 @@ pub(crate) async fn the_same_request_is_the_same_job(factory: &dyn Factory) {
     assert_eq!(ledger.create_job(again.clone(), at(5)).await.unwrap(), made);
 
     let other = NewJob {
+        spec: vec![3, 2, 1],
         fingerprint: [8; 32],
         ..again.clone()
     };
@@ -81,6 +82,35 @@ pub(crate) async fn the_same_request_is_the_same_job(factory: &dyn Factory) {
     let found = ledger.find_request(id).await.unwrap().unwrap();
     assert_eq!((found.id, found.state), (made.id, JobState::Succeeded));
     assert_eq!(ledger.list_jobs(&[], None, 10).await.unwrap().len(), 1);
+}
+
+pub(crate) async fn a_request_is_the_same_if_its_artifacts_hold_the_same(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let first = NewJob {
+        request_id: Some(Uuid::new_v4()),
+        ..new_job()
+    };
+    let made = ledger.create_job(first.clone(), at(0)).await.unwrap();
+    let again = |change: fn(&mut NewJob)| {
+        let mut new = NewJob {
+            id: Uuid::now_v7(),
+            ..first.clone()
+        };
+        change(&mut new);
+        ledger.create_job(new, at(1))
+    };
+    // Other names for the same content; the same names, but nobody knows any more what they stood for.
+    let renamed = again(|new| new.spec = vec![4]).await.unwrap();
+    let gone = again(|new| new.fingerprint = [8; 32]).await.unwrap();
+    assert_eq!([renamed.id, gone.id], [made.id; 2]);
+    assert_eq!(renamed.spec, first.spec);
+    for other in [
+        again(|new| (new.spec, new.fingerprint) = (vec![4], [8; 32])),
+        again(|new| (new.kind, new.fingerprint) = (JobKind::Verify, [8; 32])),
+        again(|new| (new.display_name, new.fingerprint) = ("another".into(), [8; 32])),
+    ] {
+        refused!(other.await, LedgerError::RequestIdReused(id) if Some(id) == first.request_id);
+    }
 }
 
 pub(crate) async fn one_request_sent_many_times_at_once_is_one_job(factory: &dyn Factory) {

@@ -4,7 +4,7 @@ use std::time::Duration;
 use sqlx::{Row, SqliteConnection};
 
 use super::super::types::{
-    ArtifactId, Failure, JobId, JobRow, JobState, Lease, NewKey, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+    Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
 };
 use super::super::{LedgerError, Result, token};
 use super::transition::{Next, after_failure, leave};
@@ -92,12 +92,19 @@ pub(super) async fn complete(
     db: &mut SqliteConnection,
     id: JobId,
     token: Vec<u8>,
-    result: Vec<u8>,
-    outputs: Vec<ArtifactId>,
-    key: Option<NewKey>,
+    completion: Completion,
     now: i64,
 ) -> Result<JobRow> {
+    if let Some(job) = completed(db, id, &token, &completion.fingerprint).await? {
+        return Ok(job);
+    }
     leased(db, id, &token).await?;
+    let Completion {
+        result,
+        outputs,
+        key,
+        fingerprint,
+    } = completion;
     for output in outputs {
         artifacts::publish(db, output, id, &token, false, now).await?;
     }
@@ -105,7 +112,20 @@ pub(super) async fn complete(
         artifacts::publish(db, key.artifact, id, &token, true, now).await?;
         keys::create(db, key, id, now).await?;
     }
+    sqlx::query("UPDATE jobs SET completed_token = ?2, completed_fingerprint = ?3 WHERE id = ?1")
+        .bind(id.as_bytes().as_slice())
+        .bind(&token)
+        .bind(fingerprint.as_slice())
+        .execute(&mut *db)
+        .await?;
     leave(db, id, Next::Succeeded(result), now).await
+}
+
+/// The job, if this attempt completed it in just this way before.
+async fn completed(db: &mut SqliteConnection, id: JobId, token: &[u8], fingerprint: &[u8]) -> Result<Option<JobRow>> {
+    let query = sqlx::query("SELECT * FROM jobs WHERE id = ?1 AND completed_token = ?2 AND completed_fingerprint = ?3");
+    let found = query.bind(id.as_bytes().as_slice()).bind(token).bind(fingerprint);
+    found.fetch_optional(db).await?.as_ref().map(rows::job).transpose()
 }
 
 pub(super) async fn fail(
@@ -144,6 +164,12 @@ pub(super) async fn release(db: &mut SqliteConnection, id: JobId, token: Vec<u8>
         now,
     )
     .await
+}
+
+pub(super) async fn renew(db: &mut SqliteConnection, lease: Duration, now: i64) -> Result<()> {
+    let query = sqlx::query("UPDATE jobs SET lease_expires = ?1 WHERE state = 2 AND lease_expires < ?1");
+    query.bind(end_of(lease, now)).execute(db).await?;
+    Ok(())
 }
 
 pub(super) async fn reap(db: &mut SqliteConnection, now: i64) -> Result<Vec<JobId>> {

@@ -17,7 +17,7 @@ use sqlx::SqlitePool;
 use uuid::Uuid;
 
 use super::types::{
-    ArtifactId, ArtifactRow, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey,
+    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
 };
 use super::{Ledger, LedgerError, Result, token};
 use writer::Writer;
@@ -103,18 +103,10 @@ impl Ledger for SqliteLedger {
             .await
     }
 
-    async fn complete(
-        &self,
-        id: JobId,
-        token: &str,
-        result: Vec<u8>,
-        outputs: Vec<ArtifactId>,
-        key: Option<NewKey>,
-        now: i64,
-    ) -> Result<JobRow> {
+    async fn complete(&self, id: JobId, token: &str, completion: Completion, now: i64) -> Result<JobRow> {
         let token = token::hash(token);
         self.writer
-            .run(move |db| Box::pin(leases::complete(db, id, token, result, outputs, key, now)))
+            .run(move |db| Box::pin(leases::complete(db, id, token, completion, now)))
             .await
     }
 
@@ -138,6 +130,10 @@ impl Ledger for SqliteLedger {
         self.writer
             .run(move |db| Box::pin(leases::release(db, id, token, now)))
             .await
+    }
+
+    async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()> {
+        self.writer.run(move |db| Box::pin(leases::renew(db, lease, now))).await
     }
 
     async fn reap(&self, now: i64) -> Result<Vec<JobId>> {

@@ -45,12 +45,21 @@ pub(super) fn readers(options: &SqliteConnectOptions) -> SqlitePool {
 }
 
 fn migrator() -> Migrator {
-    let layout = include_str!("../../../migrations/sqlite/0001_ledger.sql");
-    Migrator::with_migrations(vec![Migration::new(
-        1,
-        "ledger".into(),
-        MigrationType::Simple,
-        layout.into_sql_str(),
-        false,
-    )])
+    let step = |version, name: &'static str, layout: &'static str| {
+        Migration::new(
+            version,
+            name.into(),
+            MigrationType::Simple,
+            layout.into_sql_str(),
+            false,
+        )
+    };
+    Migrator::with_migrations(vec![
+        step(1, "ledger", include_str!("../../../migrations/sqlite/0001_ledger.sql")),
+        step(
+            2,
+            "completion",
+            include_str!("../../../migrations/sqlite/0002_completion.sql"),
+        ),
+    ])
 }

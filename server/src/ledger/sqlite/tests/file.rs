@@ -121,6 +121,29 @@ async fn files_of_others_are_refused() {
 }
 
 #[tokio::test]
+async fn a_file_of_the_first_version_is_taken_along() {
+    let folder = Folder::new();
+    let ledger = folder.ledger().await;
+    let id = queue(&*ledger, at(0)).await;
+    let lease = claim_of(&*ledger, id, at(1)).await;
+    ledger.close().await;
+    let mut db = raw(&folder).await;
+    for statement in [
+        "ALTER TABLE jobs DROP COLUMN completed_token",
+        "ALTER TABLE jobs DROP COLUMN completed_fingerprint",
+        "DELETE FROM _sqlx_migrations WHERE version > 1",
+    ] {
+        sqlx::query(statement).execute(&mut db).await.unwrap();
+    }
+    db.close().await.unwrap();
+
+    let ledger = folder.ledger().await;
+    assert_eq!(job(&*ledger, id).await, lease.job);
+    let done = complete(&*ledger, &lease, &[], at(2)).await;
+    assert_eq!(complete(&*ledger, &lease, &[], at(3)).await, done);
+}
+
+#[tokio::test]
 async fn what_a_newer_version_wrote_into_a_row_is_an_error_and_no_panic() {
     let folder = Folder::new();
     let ledger = folder.ledger().await;
