@@ -118,8 +118,7 @@ case $status in
 esac
 
 say "Pictures of both scenes, as somebody else might render them"
-# 160 pixels a side: the size that CLIP takes in. At other sizes the mark is read less well (docs/clip.md).
-"$worker" render "$out/scene.ply" "$out/views-unmarked" --views 5 --size 160 --device "$device"
+"$worker" render "$out/scene.ply" "$out/views-unmarked" --views 5 --device "$device"
 "$worker" render "$out/marked.ply" "$out/views-marked" --cameras "$out/views-unmarked/cameras.json" --device "$device"
 
 say "Verdicts"

@@ -134,10 +134,11 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
     match progress {
         Progress::Step(step) => display.set(step.step, step.total, || {
             format!(
-                "bits {:.1} %, PSNR {:.1} dB, message loss {:.3}",
+                "bits {:.1} %, PSNR {:.1} dB, message loss {:.3}, weight of seeing {:.2}",
                 100.0 * step.bit_accuracy,
                 step.psnr_db,
-                step.terms.message
+                step.terms.message,
+                step.balance
             )
         }),
         Progress::Check(check) => display.say(&format!(

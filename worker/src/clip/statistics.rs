@@ -1,12 +1,13 @@
 //! Image tower of local statistics: which colours a picture has, at several scales, wherever they stand in it.
 //!
-//! The picture at several scales passes a layer of small filters; the response y of filter i becomes
-//! sin(y + phase_i) - sin(phase_i) and is averaged over the whole picture, and a linear head turns the averages into
-//! the feature. With filters of one pixel the averages are random Fourier features (Rahimi and Recht 2007) of the
-//! distribution of colours, its characteristic function at random frequencies. The frequencies are so high that natural
-//! colours turn the sine many times: the average over many pixels then varies little from view to view, while a small
-//! change of a surface's colour moves it alike from wherever it is seen. (Quantisation index modulation, Chen and
-//! Wornell 2001, rejects the interference of its host in the same way.)
+//! The picture at several scales passes a layer of filters of one pixel; the response y of filter i becomes
+//! sin(y + phase_i) and is averaged over the whole picture, and a linear head turns the averages into the feature. The
+//! averages are random Fourier features (Rahimi and Recht 2007) of the distribution of colours, its characteristic
+//! function at random frequencies. The frequencies are so high that natural colours turn the sine many times: the
+//! average over many pixels then varies little from view to view, while a small change of a surface's colour moves it
+//! alike from wherever it is seen. (Quantisation index modulation, Chen and Wornell 2001, rejects the interference of
+//! its host in the same way.) The sine is a whole number of half turns at black and at white, so that a ground of
+//! either adds nothing, and a feature's direction does not depend on how much of the picture a scene fills.
 use super::config::VisionConfig;
 use super::params::param;
 use super::sines::mean_sines;
@@ -89,11 +90,8 @@ impl Scale {
             1 => pictures,
             n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
         };
-        let phase = self.bias.val();
-        let filters = self.weight.val().reshape([-1, 3]);
-        let mean = mean_sines(x, filters, phase.clone());
-        let filters = phase.dims()[0];
-        mean - phase.sin().reshape([1, filters])
+        let filters = self.weight.val().reshape([-1, 3]); // the kernel is one pixel
+        mean_sines(x, filters, self.bias.val())
     }
 }
 
@@ -146,12 +144,17 @@ mod tests {
                 assert!((a - b).abs() < 1e-4, "{a} {b}");
             }
         }
-        // Level 0 has no response: what is left of the sine is nothing.
-        assert!(
-            values(shipped_filters().statistics(&picture(|_| 0.0)))
-                .iter()
-                .all(|v| v.abs() < 1e-5)
-        );
+    }
+
+    #[test]
+    fn grounds_of_black_and_white_have_no_response() {
+        let normalization = config().normalization;
+        for level in [0.0, 1.0] {
+            let ground = Tensor::<4>::full([1, 3, SIZE, SIZE], level, &Device::flex());
+            let input = super::super::preprocess(ground, SIZE, &normalization);
+            let response = values(shipped_filters().statistics(&input));
+            assert!(response.iter().all(|v| v.abs() < 1e-4), "{level}: {response:?}");
+        }
     }
 
     #[test]
@@ -183,12 +186,12 @@ mod tests {
     fn configuration_survives_writing() {
         let text = config().to_open_clip().unwrap();
         assert_eq!(ClipConfig::parse("test", &text).unwrap(), config());
-        let broken = text.replace("\"kernel\": 1", "\"kernel\": 30");
+        let broken = text.replace("\"kernel\": 1", "\"kernel\": 3");
         assert!(
             ClipConfig::parse("test", &broken)
                 .unwrap_err()
                 .to_string()
-                .contains("scale")
+                .contains("kernel")
         );
     }
 }

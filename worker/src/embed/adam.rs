@@ -25,6 +25,9 @@ pub struct AdamOptions {
     /// Added to the root of the latter. Gradients of the penalty are down to 1e-9 in large scenes, so the common 1e-8
     /// would freeze them.
     pub epsilon: f32,
+    /// Leaves Gaussians alone in steps whose views do not show them: their means wait, and their clock stands. Otherwise
+    /// their steps shrink with how rarely they are seen, and the more so the larger the scene is.
+    pub sparse: bool,
 }
 
 impl Default for AdamOptions {
@@ -36,6 +39,7 @@ impl Default for AdamOptions {
             beta1: 0.9,
             beta2: 0.999,
             epsilon: 1e-15,
+            sparse: false,
         }
     }
 }
@@ -98,7 +102,10 @@ impl Penalty {
 pub struct Adam {
     options: AdamOptions,
     stride: usize,
-    steps: i32,
+    /// Steps that each row has taken.
+    steps: Vec<u32>,
+    /// Of the step sizes after so many steps, for what the means still lack of having begun at 0.
+    corrections: Vec<Correction>,
     mean: Vec<f32>,
     square: Vec<f32>,
 }
@@ -109,7 +116,8 @@ impl Adam {
         Self {
             options,
             stride,
-            steps: 0,
+            steps: vec![0; rows],
+            corrections: Vec::new(),
             mean: vec![0.0; rows * stride],
             square: vec![0.0; rows * stride],
         }
@@ -118,35 +126,61 @@ impl Adam {
     /// One step on the rows that are `seen`; rates are multiplied by `rate`. The penalty's gradient is added to
     /// `gradient`, which is all zero afterwards in these rows. Rows not seen keep their offsets, which are 0.
     pub fn step(&mut self, rate: f32, penalty: Penalty, seen: &[bool], offsets: &mut [f32], gradient: &mut [f32]) {
-        self.steps = self.steps.saturating_add(1);
         let (o, stride) = (self.options, self.stride);
         let [dc, rest] = penalty.scales(seen.len(), stride).map(|s| 2.0 * s as f32);
-        let correction = |beta: f32| 1.0 - f64::from(beta).powi(self.steps);
-        let root = correction(o.beta2).sqrt() as f32;
-        let scale = f64::from(rate) / correction(o.beta1);
-        let [rate_dc, rate_rest] = [o.rate_dc, o.rate_rest].map(|rate| (f64::from(rate) * scale) as f32);
+        let [rate_dc, rate_rest] = [o.rate_dc, o.rate_rest].map(|r| r * rate);
+        // No row has taken more steps than there were calls.
+        self.corrections
+            .push(Correction::new(o, self.corrections.len() as i32 + 1));
+        let corrections = &self.corrections;
         let size = CHUNK * stride;
         (
             seen.par_chunks(CHUNK),
+            self.steps.par_chunks_mut(CHUNK),
             offsets.par_chunks_mut(size),
             gradient.par_chunks_mut(size),
             self.mean.par_chunks_mut(size),
             self.square.par_chunks_mut(size),
         )
             .into_par_iter()
-            .for_each(|(seen, offsets, gradient, mean, square)| {
+            .for_each(|(seen, steps, offsets, gradient, mean, square)| {
                 for row in (0..seen.len()).filter(|row| seen[*row]) {
-                    for k in 0..stride {
-                        let at = row * stride + k;
+                    let columns = row * stride..(row + 1) * stride;
+                    if o.sparse && gradient[columns.clone()].iter().all(|g| *g == 0.0) {
+                        continue;
+                    }
+                    let correction = corrections[steps[row] as usize];
+                    steps[row] += 1;
+                    for (k, at) in columns.enumerate() {
                         let (rate, pull) = if k < 3 { (rate_dc, dc) } else { (rate_rest, rest) };
                         let g = gradient[at] + pull * offsets[at];
                         gradient[at] = 0.0;
                         mean[at] = o.beta1 * mean[at] + (1.0 - o.beta1) * g;
                         square[at] = o.beta2 * square[at] + (1.0 - o.beta2) * g * g;
-                        offsets[at] -= rate * mean[at] / (square[at].sqrt() / root + o.epsilon);
+                        let root = square[at].sqrt() / correction.root + o.epsilon;
+                        offsets[at] -= rate * correction.scale * mean[at] / root;
                     }
                 }
             });
+    }
+}
+
+/// What the means lack after some steps.
+#[derive(Clone, Copy, Debug)]
+struct Correction {
+    /// Of the mean of gradients, as a factor.
+    scale: f32,
+    /// Of the root of the mean of squares, as a divisor.
+    root: f32,
+}
+
+impl Correction {
+    fn new(options: AdamOptions, steps: i32) -> Self {
+        let lack = |beta: f32| 1.0 - f64::from(beta).powi(steps);
+        Self {
+            scale: (1.0 / lack(options.beta1)) as f32,
+            root: lack(options.beta2).sqrt() as f32,
+        }
     }
 }
 
@@ -189,6 +223,31 @@ mod tests {
         adam.step(0.5, NONE, &[true, false], &mut offsets, &mut gradient);
         assert!((offsets[0] + 2.5e-3).abs() < 1e-6, "{}", offsets[0]);
         assert_eq!(offsets[3..], [0.0; 3]);
+    }
+
+    #[test]
+    fn sparse_rows_wait_without_gradient_and_go_on_where_they_were() {
+        let options = AdamOptions {
+            sparse: true,
+            ..AdamOptions::default()
+        };
+        // The second row is shown in two of four steps, and ends where the first is after two.
+        let mut adam = Adam::new(options, 2, 3);
+        let mut offsets = vec![0.0; 6];
+        for (step, g) in [0.5, 0.0, 0.0, -0.2].into_iter().enumerate() {
+            let always = [0.5, -0.2, 0.7, 0.1][step];
+            let mut gradient = vec![always, always, always, g, g, g];
+            adam.step(1.0, NONE, &[true; 2], &mut offsets, &mut gradient);
+            if step == 1 {
+                assert!(offsets[3] != offsets[0]);
+            }
+        }
+        let mut alone = Adam::new(options, 1, 3);
+        let mut expected = vec![0.0; 3];
+        for g in [0.5, -0.2] {
+            alone.step(1.0, NONE, &[true], &mut expected, &mut [g; 3]);
+        }
+        assert_eq!(offsets[3..], expected[..]);
     }
 
     #[test]

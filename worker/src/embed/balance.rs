@@ -1,10 +1,12 @@
-//! Holds a PSNR: one factor on the reconstruction terms, raised while pictures are too far off and lowered while there
-//! is room and bits are still wrong.
+//! Holds a PSNR: one factor on the reconstruction terms, large while pictures are too far off, small while there is room
+//! and bits are still wrong.
 //!
-//! After every step the mean PSNR and bit accuracy of its views enter exponential running means. Below the target the
-//! factor is multiplied by `rate`; above target and slack, while the accuracy is below `bit_accuracy`, it is divided
-//! by it. It stays within `1 / limit` and `limit`. Adam does not mind the overall scale of a loss, so this is a dial
-//! between seeing and reading.
+//! After every step the mean PSNR and bit accuracy of its views enter exponential running means. With e the dB that the
+//! running PSNR is below the target, the factor is `exp(proportional * e + integral * sum of e)`, within `1 / limit` and
+//! `limit`; the sum is kept within them too, so that nothing builds up which then takes as long to go. Room above the
+//! target counts only while the accuracy is below `bit_accuracy`. PSNR follows the factor some twenty steps late: an
+//! integral alone overshoots by 1 to 2 dB. Adam does not mind the overall scale of a loss, so this is a dial between
+//! seeing and reading.
 use serde::{Deserialize, Serialize};
 
 use super::settings::within;
@@ -16,12 +18,12 @@ use crate::error::Result;
 pub struct Balance {
     /// PSNR to hold on training views, dB.
     pub target_psnr_db: f64,
-    /// Room above the target before the factor is lowered, dB.
-    pub slack_db: f64,
     /// Training bit accuracy from which on the factor is not lowered any more.
     pub bit_accuracy: f64,
-    /// Change of the factor a step.
-    pub rate: f64,
+    /// Of the logarithm of the factor, for each dB below the target.
+    pub proportional: f64,
+    /// Of the logarithm of the factor, for each dB below the target and step.
+    pub integral: f64,
     /// Largest factor, and one over the smallest.
     pub limit: f64,
     /// Decay of the running means.
@@ -32,11 +34,11 @@ impl Default for Balance {
     fn default() -> Self {
         Self {
             target_psnr_db: 36.0,
-            slack_db: 0.3,
             bit_accuracy: 0.999,
-            rate: 1.03,
+            proportional: 2.0,
+            integral: 0.05,
             limit: 100.0,
-            memory: 0.9,
+            memory: 0.8,
         }
     }
 }
@@ -44,8 +46,8 @@ impl Default for Balance {
 impl Balance {
     pub(super) fn check(&self) -> Result<()> {
         within("balance.target_psnr_db", self.target_psnr_db, 0.0, 200.0)?;
-        within("balance.slack_db", self.slack_db, 0.0, 200.0)?;
-        within("balance.rate", self.rate, 1.0, 10.0)?;
+        within("balance.proportional", self.proportional, 0.0, 100.0)?;
+        within("balance.integral", self.integral, 0.0, 100.0)?;
         within("balance.limit", self.limit, 1.0, 1e6)?;
         within("balance.memory", self.memory, 0.0, 0.9999)
     }
@@ -56,6 +58,8 @@ impl Balance {
 pub struct Balancer {
     balance: Option<Balance>,
     running: Option<[f64; 2]>,
+    /// `integral * sum of e`.
+    sum: f64,
     factor: f64,
 }
 
@@ -65,6 +69,7 @@ impl Balancer {
         Self {
             balance,
             running: None,
+            sum: 0.0,
             factor: 1.0,
         }
     }
@@ -82,12 +87,13 @@ impl Balancer {
         let before = self.running.unwrap_or(now);
         let running: [f64; 2] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
         self.running = Some(running);
-        if running[0] < b.target_psnr_db {
-            self.factor *= b.rate;
-        } else if running[0] > b.target_psnr_db + b.slack_db && running[1] < b.bit_accuracy {
-            self.factor /= b.rate;
+        let mut below = b.target_psnr_db - running[0];
+        if running[1] >= b.bit_accuracy {
+            below = below.max(0.0);
         }
-        self.factor = self.factor.clamp(1.0 / b.limit, b.limit);
+        let limit = b.limit.ln();
+        self.sum = (self.sum + b.integral * below).clamp(-limit, limit);
+        self.factor = (self.sum + b.proportional * below).clamp(-limit, limit).exp();
     }
 }
 
@@ -95,30 +101,50 @@ impl Balancer {
 mod tests {
     use super::*;
 
-    fn balancer() -> Balancer {
+    fn balancer(proportional: f64, integral: f64) -> Balancer {
         Balancer::new(Some(Balance {
-            rate: 2.0,
+            proportional,
+            integral,
             limit: 8.0,
             memory: 0.0,
             ..Balance::default()
         }))
     }
 
+    fn factors(mut b: Balancer, psnr_and_bits: &[(f64, f64)]) -> Vec<f64> {
+        let follow = |(psnr, bits): &(f64, f64)| {
+            b.update(*psnr, *bits);
+            f64::from(b.factor()).ln()
+        };
+        psnr_and_bits.iter().map(follow).collect()
+    }
+
+    fn close(found: &[f64], expected: &[f64]) {
+        let gap = found
+            .iter()
+            .zip(expected)
+            .map(|(f, e)| (f - e).abs())
+            .fold(0.0, f64::max);
+        assert!(gap < 1e-6, "{found:?} {expected:?}");
+    }
+
     #[test]
-    fn follows_psnr_and_bits_within_its_limits() {
-        let mut b = balancer();
-        b.update(35.0, 1.0);
-        assert_eq!(b.factor(), 2.0);
-        b.update(36.1, 0.5);
-        assert_eq!(b.factor(), 2.0, "within the slack");
-        b.update(40.0, 1.0);
-        assert_eq!(b.factor(), 2.0, "all bits are right");
-        b.update(40.0, 0.9);
-        assert_eq!(b.factor(), 1.0);
-        (0..9).for_each(|_| b.update(0.0, 0.5));
-        assert_eq!(b.factor(), 8.0);
-        (0..9).for_each(|_| b.update(f64::INFINITY, 0.5));
-        assert_eq!(b.factor(), 0.125);
+    fn follows_the_error_and_its_sum() {
+        let seen = [(35.0, 1.0), (36.0, 0.5), (37.5, 0.5), (37.0, 1.0)];
+        // Room is not used once all bits are right.
+        close(&factors(balancer(0.5, 0.0), &seen), &[0.5, 0.0, -0.75, 0.0]);
+        close(&factors(balancer(0.0, 0.5), &seen), &[0.5, 0.5, -0.25, -0.25]);
+        close(&factors(balancer(0.5, 0.5), &seen), &[1.0, 0.5, -1.0, -0.25]);
+    }
+
+    #[test]
+    fn stays_within_its_limits_and_comes_back_at_once() {
+        let limit = 8.0_f64.ln();
+        close(
+            &factors(balancer(0.0, 1.0), &[(0.0, 0.5), (37.0, 0.5)]),
+            &[limit, limit - 1.0],
+        );
+        close(&factors(balancer(1.0, 1.0), &[(f64::INFINITY, 0.5)]), &[-limit]);
     }
 
     #[test]
@@ -128,8 +154,7 @@ mod tests {
         assert_eq!(none.factor(), 1.0);
         let mut slow = Balancer::new(Some(Balance::default()));
         slow.update(40.0, 0.5);
-        let lowered = slow.factor();
-        slow.update(30.0, 0.5); // the mean is 39
-        assert!(slow.factor() < lowered);
+        slow.update(30.0, 0.5); // the mean is 38
+        assert!(slow.factor() < 1.0);
     }
 }

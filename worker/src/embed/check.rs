@@ -8,6 +8,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
 use crate::scene::Gaussians;
+use crate::splat::sh;
 use crate::view::{Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed.
@@ -32,7 +33,7 @@ impl HeldOut {
         let indices: Vec<u64> = (first..first + stop.views as u64).collect();
         let views = engine.each(&indices, |&index| {
             let camera = sampler.camera(Split::HeldOut, index, size);
-            let mut view = PooledView::new(engine, gaussians, &camera, [1.0; 3])?;
+            let mut view = PooledView::new(engine, gaussians, &camera, 1, [1.0; 3])?;
             view.reference = view.reference.to_8_bit();
             Ok(view)
         })?;
@@ -54,8 +55,8 @@ impl HeldOut {
         step: usize,
     ) -> Result<(Check, bool)> {
         let pictures: Vec<Picture> = engine.each(&self.views, |v| {
-            let picture = engine.draw(gaussians, Some(offsets), &v.view, v.background)?;
-            Ok(picture.to_8_bit())
+            let colours = sh::colours(&gaussians.sh, Some(offsets), &v.view);
+            Ok(v.draw(engine, &colours)?.to_8_bit())
         })?;
         let psnrs = self
             .views

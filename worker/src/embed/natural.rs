@@ -13,8 +13,8 @@ use crate::view::{Split, ViewSampler};
 /// Pictures given to CLIP at once.
 const BATCH: usize = 16;
 /// Scenes to render, and views of each.
-const SCENES: u64 = 2;
-const VIEWS: u64 = 64;
+const SCENES: u64 = 16;
+const VIEWS: u64 = 8;
 /// Gaussians of a scene; enough for views without holes.
 const GAUSSIANS: usize = 20_000;
 /// The seed of the first scene; users begin at 0, and their own sample scene should not be among these.

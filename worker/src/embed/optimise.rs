@@ -177,9 +177,7 @@ impl<'a> Run<'a> {
         let colours = engine.each(views, |v| Ok(sh::colours(&scene.sh, Some(offsets), &v.view)))?;
         timing.lap(Stage::Colours);
         let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
-        let pictures = engine.each(&drawn, |(v, colours)| {
-            engine.rasterizer.render(&v.view, colours, v.background)
-        })?;
+        let pictures = engine.each(&drawn, |(v, colours)| v.draw(engine, colours))?;
         timing.lap(Stage::Render);
 
         let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
@@ -191,9 +189,7 @@ impl<'a> Run<'a> {
         timing.lap(Stage::Loss);
 
         let drawn: Vec<(&PooledView, &Picture)> = views.iter().map(AsRef::as_ref).zip(&found.gradients).collect();
-        let gradients = engine.each(&drawn, |(v, gradient)| {
-            engine.rasterizer.backward(&v.view, &gradient.pixels)
-        })?;
+        let gradients = engine.each(&drawn, |(v, gradient)| v.backward(engine, gradient))?;
         timing.lap(Stage::Backward);
         // One view after the other: sums in a fixed order.
         for ((v, colours), gradient) in views.iter().zip(&colours).zip(&gradients) {

@@ -13,27 +13,50 @@ use crate::error::Result;
 use crate::extract::Engine;
 use crate::picture::Picture;
 use crate::scene::Gaussians;
-use crate::splat::{PreparedView, prepare};
+use crate::splat::{PreparedView, prepare, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// A view with what it looks like unmarked.
 pub(super) struct PooledView {
     pub view: PreparedView,
-    pub background: [f32; 3],
+    background: [f32; 3],
+    /// The view is drawn so many times larger than its picture, and averaged down.
+    times: u32,
     /// The unmarked picture.
     pub reference: Picture,
 }
 
 impl PooledView {
-    pub fn new(engine: &Engine, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Self> {
-        let cache = engine.weight_cache(camera.width);
-        let view = prepare(gaussians, camera, cache)?;
-        let reference = engine.draw(gaussians, None, &view, background)?;
+    /// `camera` has the size of the picture.
+    pub fn new(
+        engine: &Engine,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        times: u32,
+        background: [f32; 3],
+    ) -> Result<Self> {
+        let camera = camera.enlarged(times);
+        let view = prepare(gaussians, &camera, engine.weight_cache(camera.width))?;
+        let colours = sh::colours(&gaussians.sh, None, &view);
+        let reference = engine.rasterizer.render(&view, &colours, background)?.shrunk(times);
         Ok(Self {
             view,
             background,
+            times,
             reference,
         })
+    }
+
+    /// The picture with these colours of the visible Gaussians.
+    pub fn draw(&self, engine: &Engine, colours: &[f32]) -> Result<Picture> {
+        let picture = engine.rasterizer.render(&self.view, colours, self.background)?;
+        Ok(picture.shrunk(self.times))
+    }
+
+    /// Takes a gradient to the picture back to these colours.
+    pub fn backward(&self, engine: &Engine, gradient: &Picture) -> Result<Vec<f32>> {
+        let gradient = gradient.spread(self.times);
+        engine.rasterizer.backward(&self.view, &gradient.pixels)
     }
 
     fn bytes(&self) -> usize {
@@ -72,7 +95,8 @@ impl Pool {
         let wanted: Vec<u64> = (self.next..self.next + fresh as u64).collect();
         let made = engine.each(&wanted, |&index| {
             let camera = self.sampler.camera(Split::Training, index, s.size);
-            let view = PooledView::new(engine, gaussians, &camera, self.background(index))?;
+            let (background, times) = self.chosen(index);
+            let view = PooledView::new(engine, gaussians, &camera, times, background)?;
             Ok(Arc::new(view))
         })?;
         self.next += fresh as u64;
@@ -96,11 +120,13 @@ impl Pool {
         Ok((batch, fresh))
     }
 
-    /// White, or black for a seeded share of the views.
-    fn background(&self, index: u64) -> [f32; 3] {
+    /// Background and enlargement of a training view, seeded: white, or black for a share of the views; drawn at up to
+    /// [`Settings::enlarged`] times its size.
+    fn chosen(&self, index: u64) -> ([f32; 3], u32) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed.wrapping_add(1));
         rng.set_stream(index);
         let black = rng.random::<f32>() < self.settings.black_backgrounds;
-        if black { [0.0; 3] } else { [1.0; 3] }
+        let times = rng.random_range(1..=self.settings.enlarged);
+        (if black { [0.0; 3] } else { [1.0; 3] }, times)
     }
 }

@@ -9,7 +9,7 @@ use crate::message::{Key, Reader};
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch};
 use crate::scene::Gaussians;
-use crate::splat::{CpuRasterizer, GpuRasterizer, PreparedView, Rasterizer, WeightCache, prepare, sh};
+use crate::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
 use crate::stop::Stop;
 use crate::view::Camera;
 
@@ -148,20 +148,5 @@ impl Engine {
         } else {
             items.iter().map(work).collect()
         }
-    }
-
-    /// The picture of a prepared view with `offsets` on the scene's colours, values as they are.
-    ///
-    /// # Errors
-    /// Those of the renderer.
-    pub fn draw(
-        &self,
-        gaussians: &Gaussians,
-        offsets: Option<&[f32]>,
-        view: &PreparedView,
-        background: [f32; 3],
-    ) -> Result<Picture> {
-        let colours = sh::colours(&gaussians.sh, offsets, view);
-        self.rasterizer.render(view, &colours, background)
     }
 }

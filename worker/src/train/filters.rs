@@ -1,4 +1,6 @@
-//! The image tower's random filters: directions of colour, each with a frequency and a phase.
+//! The image tower's random filters: directions of colour, each with a frequency and a phase, to which black and white
+//! are nothing.
+use crate::clip::config::Normalization;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f32::consts::TAU;
@@ -8,23 +10,36 @@ use std::f32::consts::TAU;
 pub(crate) const KERNEL: usize = 1;
 /// Least and largest norm of a filter, for pictures of unit deviation: a change of colour by its inverse turns the sine
 /// by a radian. With weaker filters, colours that differ from view to view and from scene to scene weigh more than
-/// what a mark adds; with stronger ones, the shading of a surface from view to view turns the sine too far.
-const NORM: [f32; 2] = [11.0, 23.0];
+/// what a mark adds, above all on smooth surfaces; with stronger ones, the shading of a surface and the mixture of
+/// colours in a pixel turn the sine too far from view to view.
+const NORM: [f32; 2] = [14.0, 28.0];
 
-/// Filters `[count][3][KERNEL][KERNEL]` and phases `[count]`.
+/// Filters `[count][3][KERNEL][KERNEL]` and phases `[count]`. From black to white a filter makes whole turns, and its
+/// phase makes black 0, so that a ground of either adds nothing to an average, however much of it is seen.
 pub(crate) fn filters(count: usize, seed: u64) -> (Vec<f32>, Vec<f32>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let Normalization { mean, std } = Normalization::default();
+    let black_to_white = std.map(f32::recip);
+    let squares: f32 = black_to_white.iter().map(|v| v * v).sum();
     let mut weights = Vec::with_capacity(count * 3 * KERNEL * KERNEL);
+    let mut phases = Vec::with_capacity(count);
     for _ in 0..count {
-        let filter: Vec<f32> = (0..3 * KERNEL * KERNEL)
-            .map(|_| (0..4).map(|_| rng.random_range(-1.0..1.0_f32)).sum()) // nearly normal
-            .collect();
-        let length = filter.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
+        let direction: [f32; 3] = std::array::from_fn(|_| (0..4).map(|_| rng.random_range(-1.0..1.0_f32)).sum()); // nearly normal
+        let length = direction.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
         let norm = NORM[0] * (NORM[1] / NORM[0]).powf(rng.random());
-        weights.extend(filter.iter().map(|v| norm * v / length));
+        let wave = direction.map(|v| norm * v / length);
+        let angle = dot(&wave, &black_to_white);
+        let change = ((angle / TAU).round() * TAU - angle) / squares;
+        let wave: [f32; 3] = std::array::from_fn(|c| wave[c] + change * black_to_white[c]);
+        let black: [f32; 3] = std::array::from_fn(|c| -mean[c] / std[c]);
+        phases.push((-dot(&wave, &black)).rem_euclid(TAU));
+        weights.extend(wave);
     }
-    let phases = (0..count).map(|_| rng.random_range(0.0..TAU)).collect();
     (weights, phases)
+}
+
+fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -32,14 +47,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn norms_stay_within_their_limits_and_the_seed_decides() {
+    fn norms_stay_near_their_limits_and_the_seed_decides() {
         let (weights, phases) = filters(50, 3);
-        for filter in weights.chunks_exact(3 * KERNEL * KERNEL) {
+        for filter in weights.chunks_exact(3) {
             let norm = filter.iter().map(|v| v * v).sum::<f32>().sqrt();
-            assert!((NORM[0] * 0.999..NORM[1] * 1.001).contains(&norm), "{norm}");
+            // Whole turns from black to white move a filter by less than half a turn over their distance.
+            assert!((NORM[0] - 0.5..NORM[1] + 0.5).contains(&norm), "{norm}");
         }
-        assert!(phases.iter().all(|p| (0.0..TAU).contains(p)));
         assert_eq!(filters(50, 3), (weights.clone(), phases));
         assert_ne!(filters(50, 4).0, weights);
+    }
+
+    #[test]
+    fn black_and_white_are_nothing() {
+        let (weights, phases) = filters(50, 3);
+        let Normalization { mean, std } = Normalization::default();
+        for (wave, phase) in weights.as_chunks::<3>().0.iter().zip(phases) {
+            for level in [0.0, 1.0] {
+                let colour = std::array::from_fn(|c| (level - mean[c]) / std[c]);
+                let response = (dot(wave, &colour) + phase).sin();
+                assert!(response.abs() < 1e-4, "{level}: {response}");
+            }
+        }
     }
 }

@@ -1,10 +1,11 @@
 //! The image tower's linear head, in closed form.
 //!
-//! With N the covariance of the tower's averages from view to view of a scene (and a share of that between scenes),
-//! and S what a mark can do to them in views it was not fitted to ([`super::steering`]), a direction v of feature space
-//! moves by sqrt(vt S v) for a change of the picture of length 1, while it varies by sqrt(vt N v) by itself. The head
-//! takes the directions of the largest ratio (a generalised eigenproblem, as in linear discriminant analysis), scaled
-//! to a natural variation of 1.
+//! With N how the tower's averages vary from view to view of a scene (their covariance, and a share of the squares of
+//! the means of scenes), and S what a mark can do to them in views it was not fitted to ([`super::steering`]), a
+//! direction v of feature space moves by sqrt(vt S v) for a change of the picture of length 1, while it varies by
+//! sqrt(vt N v) by itself. The head takes the directions of the largest ratio (a generalised eigenproblem, as in linear
+//! discriminant analysis), scaled to a natural variation of 1. It has no bias: an empty picture is 0, so that how much
+//! of a picture a scene fills changes the length of a feature and not its direction.
 use super::scenes::ViewedScene;
 use super::steering::across_views;
 use super::{IMAGE_SIZE, TrainOptions, TrainProgress, host};
@@ -16,14 +17,17 @@ use crate::message::eigen;
 use crate::message::matrix::{congruence, dot, product};
 use crate::picture::Picture;
 use crate::quality::batch;
+use std::ops::Range;
 
 /// Grounds that scenes are seen over, one a view; a feature that follows the ground is of no use.
 const GROUNDS: [f32; 6] = [1.0, 1.0, 0.0, 1.0, 0.5, 0.0];
 /// Scenes whose gradients are measured, and views of each.
 const STEERED: usize = 3;
 const STEERED_VIEWS: usize = 5;
-/// Weight of the variation between scenes beside that between views of one.
+/// Weight of the squared means of scenes beside the variation between views of one.
 const BETWEEN: f64 = 0.3;
+/// Scenes on which the head is measured, not those it is fitted to.
+const MEASURED: u64 = 60;
 /// Smallest natural variance that is believed, against the largest.
 const FLOOR: f64 = 1e-6;
 
@@ -31,9 +35,10 @@ const FLOOR: f64 = 1e-6;
 pub(super) struct Head {
     /// `[averages][embed_dim]`.
     pub matrix: Vec<f32>,
-    /// `[embed_dim]`.
+    /// `[embed_dim]`, zeros.
     pub bias: Vec<f32>,
-    /// Per direction, strongest first.
+    /// How far a change of length 1 moves each direction, in standard deviations of its natural variation in scenes that
+    /// the head was not fitted to.
     pub steering: Vec<f64>,
 }
 
@@ -45,14 +50,17 @@ pub(super) fn fit(
     compute: &Compute,
     progress: &mut impl FnMut(TrainProgress),
 ) -> Result<Head> {
-    let (natural, mean) = natural(tower, config, options, compute, progress)?;
-    let n = mean.len();
+    let scenes = options.scenes as u64;
+    let fitted = natural(tower, config, options, 0..scenes, compute, progress)?;
+    let first = scenes + STEERED as u64;
+    let unseen = natural(tower, config, options, first..first + MEASURED, compute, &mut |_| ())?;
+    let n = fitted.len().isqrt();
     let steering = steering(tower, config, options, compute, n, progress)?;
     let failed = || Error::BadModel {
         name: "head".into(),
         reason: "features have no principal directions".into(),
     };
-    let noise = eigen::symmetric(natural, n).ok_or_else(failed)?;
+    let noise = eigen::symmetric(fitted, n).ok_or_else(failed)?;
     let floor = noise.values[0].max(f64::MIN_POSITIVE) * FLOOR;
     // Rows of `white` turn averages into coordinates of unit natural variation.
     let white: Vec<f64> = (0..n * n)
@@ -62,28 +70,31 @@ pub(super) fn fit(
     let steer = eigen::symmetric(turned, n).ok_or_else(failed)?;
     let kept = config.embed_dim;
     let head = product(&steer.vectors[..kept * n], &white, n, n);
-    let bias = head.chunks_exact(n).map(|row| -dot(row, &mean) as f32).collect();
+    let along =
+        |matrix: &[f64], v: &[f64]| -> f64 { matrix.chunks_exact(n).zip(v).map(|(row, x)| x * dot(row, v)).sum() };
+    let reach = |v: &[f64]| (along(&steering, v) / along(&unseen, v)).max(0.0).sqrt();
     Ok(Head {
         matrix: (0..n * kept).map(|i| head[i % kept * n + i / kept] as f32).collect(),
-        bias,
-        steering: steer.values[..kept].iter().map(|v| v.max(0.0).sqrt()).collect(),
+        bias: vec![0.0; kept],
+        steering: head.chunks_exact(n).map(reach).collect(),
     })
 }
 
-/// Covariance of the averages between views of a scene, plus a share of that between scenes; and the mean of all.
+/// Covariance of the averages between views of a scene, plus a share of the squared means of scenes, `[n][n]`.
 fn natural(
     tower: &StatisticsTower,
     config: &ClipConfig,
     options: &TrainOptions,
+    scenes: Range<u64>,
     compute: &Compute,
     progress: &mut impl FnMut(TrainProgress),
-) -> Result<(Vec<f64>, Vec<f64>)> {
+) -> Result<Vec<f64>> {
     let rasterizer = rasterizer(compute)?;
     let views = GROUNDS.len();
-    let mut means: Vec<Vec<f64>> = Vec::with_capacity(options.scenes);
-    let mut covariance = Vec::new();
-    for index in 0..options.scenes {
-        let scene = ViewedScene::new(options.seed, index as u64, views)?;
+    let count = (scenes.end - scenes.start) as usize;
+    let mut sum = Vec::new();
+    for (done, index) in scenes.enumerate() {
+        let scene = ViewedScene::new(options.seed, index, views)?;
         let pictures: Vec<Picture> = scene
             .views
             .iter()
@@ -97,16 +108,17 @@ fn natural(
             .map(f64::from)
             .collect();
         let n = rows.len() / views;
-        covariance.resize(n * n, 0.0);
+        sum.resize(n * n, 0.0);
         let mean = mean(&rows, n);
-        add_covariance(&mut covariance, &rows, &mean, 1.0 / options.scenes as f64);
-        means.push(mean);
-        progress(TrainProgress::Natural(index + 1, options.scenes));
+        let share = 1.0 / count as f64;
+        for row in rows.chunks_exact(n) {
+            let centred: Vec<f64> = row.iter().zip(&mean).map(|(v, m)| v - m).collect();
+            add_square(&mut sum, &centred, share / (views - 1) as f64);
+        }
+        add_square(&mut sum, &mean, share * BETWEEN);
+        progress(TrainProgress::Natural(done + 1, count));
     }
-    let rows: Vec<f64> = means.concat();
-    let mean = mean(&rows, rows.len() / options.scenes);
-    add_covariance(&mut covariance, &rows, &mean, BETWEEN);
-    Ok((covariance, mean))
+    Ok(sum)
 }
 
 /// Mean of rows of `n`.
@@ -119,17 +131,10 @@ fn mean(rows: &[f64], n: usize) -> Vec<f64> {
     mean
 }
 
-/// Adds `weight` times the covariance of rows around their mean.
-fn add_covariance(sum: &mut [f64], rows: &[f64], mean: &[f64], weight: f64) {
-    let n = mean.len();
-    let scale = weight / (rows.len() / n - 1) as f64;
-    for row in rows.chunks_exact(n) {
-        let centred: Vec<f64> = row.iter().zip(mean).map(|(v, m)| v - m).collect();
-        for (i, out) in sum.chunks_exact_mut(n).enumerate() {
-            out.iter_mut()
-                .zip(&centred)
-                .for_each(|(o, v)| *o += scale * centred[i] * v);
-        }
+/// Adds `weight v vt`.
+fn add_square(sum: &mut [f64], v: &[f64], weight: f64) {
+    for (row, x) in sum.chunks_exact_mut(v.len()).zip(v) {
+        row.iter_mut().zip(v).for_each(|(sum, y)| *sum += weight * x * y);
     }
 }
 

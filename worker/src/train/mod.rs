@@ -44,7 +44,7 @@ impl Default for TrainOptions {
     fn default() -> Self {
         Self {
             seed: 1,
-            scenes: 40,
+            scenes: 640,
             steps: 200,
             batch: 64,
         }
@@ -70,7 +70,8 @@ pub struct TrainedClip {
     /// Its weights.
     pub model: ClipModel,
     /// Per kept direction, strongest first: how far a change of a scene that changes its pictures by length 1 moves
-    /// the feature in views that it was not fitted to, in standard deviations of its natural variation.
+    /// the feature in views that it was not fitted to, in standard deviations of its natural variation in scenes that the
+    /// head was not fitted to.
     pub steering: Vec<f64>,
     /// On drawings and captions that training never saw.
     pub retrieval: Retrieval,
@@ -79,7 +80,7 @@ pub struct TrainedClip {
 /// Side of the pictures that the model takes.
 const IMAGE_SIZE: usize = 160;
 /// Filters a scale.
-const FILTERS: usize = 64;
+const FILTERS: usize = 128;
 /// Sides of the squares that are averaged into one pixel of a scale.
 const SCALES: [usize; 3] = [1, 2, 4];
 /// Width of the features.

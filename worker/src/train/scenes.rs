@@ -1,4 +1,5 @@
-//! Sample scenes seen from several views: what the head is fitted to.
+//! Sample scenes seen from several views: what the head is fitted to. Two of three are made fainter, because a scene of a
+//! few smooth colours varies from view to view more than a colourful one does.
 use super::IMAGE_SIZE;
 use crate::error::Result;
 use crate::picture::Picture;
@@ -6,12 +7,21 @@ use crate::sample::sample;
 use crate::scene::Gaussians;
 use crate::splat::{PreparedView, Rasterizer, WeightCache, prepare, sh};
 use crate::view::{Split, ViewSampler};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Gaussians of a scene; enough for views without holes at this size.
 const GAUSSIANS: usize = 6000;
+/// Least contrast of a scene that is made fainter.
+const LEAST_CONTRAST: f32 = 0.15;
+/// How far its mean colour moves at most, at no contrast, as a DC coefficient.
+const LARGEST_SHIFT: f32 = 1.2;
 /// Scenes of different training seeds do not meet, nor those that users make, which begin at 0.
 const FIRST_SEED: u64 = 0x7363_656e_6573;
+
+/// Draws for contrast are none of the scene's own.
+const CONTRAST_STREAM: u64 = 77;
 
 /// A scene and views of it.
 pub(super) struct ViewedScene {
@@ -23,7 +33,11 @@ impl ViewedScene {
     /// Scene `index` of the stream of `seed`, from so many views.
     pub fn new(seed: u64, index: u64, views: usize) -> Result<Self> {
         let seed = FIRST_SEED.wrapping_add(seed.wrapping_mul(1 << 20)).wrapping_add(index);
-        let gaussians = sample(GAUSSIANS, (index % 4) as usize, seed)?.gaussians;
+        let mut gaussians = sample(GAUSSIANS, (index % 4) as usize, seed)?.gaussians;
+        if !index.is_multiple_of(3) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed ^ CONTRAST_STREAM);
+            fade(&mut gaussians, &mut rng);
+        }
         let sampler = ViewSampler::new(&gaussians, seed)?;
         let views = (0..views as u64)
             .into_par_iter()
@@ -41,5 +55,21 @@ impl ViewedScene {
         let mut picture = rasterizer.render(view, &colours, [ground; 3])?;
         picture.pixels.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
         Ok(picture)
+    }
+}
+
+/// Lowers the contrast of a scene by a random factor, around its mean colour, which moves too.
+fn fade(gaussians: &mut Gaussians, rng: &mut ChaCha8Rng) {
+    let contrast = LEAST_CONTRAST * (1.0 / LEAST_CONTRAST).powf(rng.random());
+    let rows = gaussians.len() as f32;
+    let stride = gaussians.sh.per_gaussian();
+    let mut mean = [0.0_f32; 3];
+    for row in gaussians.sh.coefficients.chunks_exact(stride) {
+        mean.iter_mut().zip(row).for_each(|(m, v)| *m += v / rows);
+    }
+    let shift = mean.map(|m| (1.0 - contrast) * (m + LARGEST_SHIFT * rng.random_range(-1.0..1.0_f32)));
+    for row in gaussians.sh.coefficients.chunks_exact_mut(stride) {
+        row.iter_mut().for_each(|v| *v *= contrast);
+        row.iter_mut().zip(shift).for_each(|(v, shift)| *v += shift);
     }
 }

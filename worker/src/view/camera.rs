@@ -47,6 +47,21 @@ impl Camera {
         }
     }
 
+    /// The same view at so many times the size.
+    #[must_use]
+    pub fn enlarged(&self, times: u32) -> Camera {
+        let factor = times as f32;
+        Camera {
+            width: self.width * times,
+            height: self.height * times,
+            fx: self.fx * factor,
+            fy: self.fy * factor,
+            cx: self.cx * factor,
+            cy: self.cy * factor,
+            ..self.clone()
+        }
+    }
+
     /// Where the camera is, in world units.
     pub fn centre(&self) -> [f32; 3] {
         std::array::from_fn(|k| {

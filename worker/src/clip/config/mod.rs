@@ -57,7 +57,7 @@ pub enum VisionTower {
     Statistics {
         /// Sides of the squares that are averaged into one pixel.
         scales: Vec<usize>,
-        /// Side of a filter.
+        /// Side of a filter; 1.
         kernel: usize,
     },
 }
@@ -201,9 +201,10 @@ impl ClipConfig {
             }
             VisionTower::Statistics { scales, kernel } => {
                 within("vision scales", scales.len(), 16)?;
-                within("vision kernel", *kernel, 31)?;
+                // Sines are taken of single pixels.
+                within("vision kernel", *kernel, 1)?;
                 for scale in scales {
-                    within("vision scale", *scale, vision.image_size / kernel)?;
+                    within("vision scale", *scale, vision.image_size)?;
                 }
             }
         }
