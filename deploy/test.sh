@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, protos, lints and all tests. Two to six minutes on two cores when all dependencies are
+# Checks everything: formatting, protos, lints and all tests. Four to eight minutes on two cores when all dependencies are
 # built; building them takes some twenty more.
 # Scenes for the tests that want real ones are taken from $GUARDSPLAT_SCENES or ../shared/scenes; without them those
 # tests are skipped, unless CI is set.

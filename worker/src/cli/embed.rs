@@ -134,11 +134,10 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
     match progress {
         Progress::Step(step) => display.set(step.step, step.total, || {
             format!(
-                "bits {:.1} %, PSNR {:.1} dB, message loss {:.3}, weight of seeing {:.2}",
+                "bits {:.1} %, PSNR {:.1} dB, message loss {:.3}",
                 100.0 * step.bit_accuracy,
                 step.psnr_db,
-                step.terms.message,
-                step.balance
+                step.terms.message
             )
         }),
         Progress::Check(check) => display.say(&format!(

@@ -118,7 +118,7 @@ pub struct Settings {
 /// A named choice of all settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// Minutes on two CPU cores; a weaker mark.
+    /// Half a minute on two CPU cores; a weaker mark.
     Draft,
     /// What the figures in the documentation were made with.
     #[default]

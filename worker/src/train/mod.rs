@@ -69,7 +69,7 @@ pub struct TrainedClip {
     pub config: ClipConfig,
     /// Its weights.
     pub model: ClipModel,
-    /// Per kept direction, strongest first: how far a change of a scene that changes its pictures by length 1 moves
+    /// Per kept direction, in the order of the fit: how far a change of a scene that changes its pictures by length 1 moves
     /// the feature in views that it was not fitted to, in standard deviations of its natural variation in scenes that the
     /// head was not fitted to.
     pub steering: Vec<f64>,

@@ -1,7 +1,7 @@
 //! Mean over a picture's pixels of the sine of a linear function of their colour, as one differentiable operation.
 //!
 //! `out[b][n] = mean over p of sin(filters[n] . pictures[b][:, p] + phases[n])`. Written with burn's tensors it takes
-//! 64 numbers a pixel to memory and back several times, which was three quarters of the time of an embedding; here
+//! a number for every filter and pixel to memory and back several times, which was three quarters of the time of an embedding; here
 //! a pixel is read once and its sines are added up where they are computed. The backward pass computes the cosines anew
 //! instead of keeping the sines.
 //!
