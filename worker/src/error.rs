@@ -94,3 +94,13 @@ impl Error {
         move |source| Self::Io { path, source }
     }
 }
+
+impl From<guardsplat_scene::Error> for Error {
+    fn from(error: guardsplat_scene::Error) -> Self {
+        use guardsplat_scene::Error as Scene;
+        match error {
+            Scene::Io { path, source } => Self::Io { path, source },
+            Scene::BadScene { path, reason } => Self::BadScene { path, reason },
+        }
+    }
+}

@@ -9,7 +9,6 @@ pub mod models;
 pub mod picture;
 pub mod quality;
 pub mod sample;
-pub mod scene;
 pub mod splat;
 pub mod stop;
 #[doc(hidden)]
@@ -18,3 +17,4 @@ pub mod train;
 pub mod view;
 
 pub use error::{Error, Result};
+pub use guardsplat_scene as scene;

@@ -1,10 +1,10 @@
 //! The file layout of the reference implementation, for scenes that were not read from a file.
-use super::fields::{rest_count, sh_index};
-use super::gaussians::{Gaussians, Sh};
+use super::fields::{file_index, rest_count};
+use crate::gaussians::{Gaussians, Sh};
 use std::io::{self, Write};
 
 /// Writes a binary little-endian PLY: x y z, normals of zero, `f_dc_*`, `f_rest_*`, opacity, `scale_*`, `rot_*`.
-pub(super) fn write(gaussians: &Gaussians, sh: &Sh, out: &mut impl Write) -> io::Result<()> {
+pub(crate) fn write(gaussians: &Gaussians, sh: &Sh, out: &mut impl Write) -> io::Result<()> {
     let rest = rest_count(sh.degree);
     write!(
         out,
@@ -22,7 +22,11 @@ pub(super) fn write(gaussians: &Gaussians, sh: &Sh, out: &mut impl Write) -> io:
         writeln!(out, "property float {name}")?;
     }
     out.write_all(b"end_header\n")?;
-    let order: Vec<usize> = (0..sh.per_gaussian()).map(|i| sh_index(sh.degree, i)).collect();
+    // The coefficients in the order of the file.
+    let mut order = vec![0; sh.per_gaussian()];
+    for place in 0..order.len() {
+        order[file_index(sh.degree, place)] = place;
+    }
     let mut row: Vec<f32> = Vec::with_capacity(17 + rest);
     for (i, colour) in sh.coefficients.chunks_exact(sh.per_gaussian()).enumerate() {
         row.clear();

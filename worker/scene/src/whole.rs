@@ -1,5 +1,5 @@
 //! Files that appear whole or not at all.
-use crate::error::{Error, Result};
+use crate::{Error, Result};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Io`]: no such folder, no permission, disk full; or `path` is something else than a regular file, such as
 /// a device, which a rename would replace.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let attempt = || -> std::io::Result<()> {
         if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
             return Err(std::io::Error::other("exists and is not a regular file"));

@@ -1,6 +1,6 @@
 //! The properties of a Gaussian: which columns of a row they are, and what values they may have.
-use super::gaussians::{Gaussians, MAX_DEGREE, Sh};
 use super::header::{bytes, quote};
+use crate::gaussians::{Gaussians, MAX_DEGREE, Sh};
 use ply_rs::ply::ScalarType;
 
 /// Properties before the rest coefficients, in the order in which rows are handed to [`Rows::push`].
@@ -65,6 +65,11 @@ impl Fields {
         Ok(Fields { degree, all })
     }
 
+    /// The band of used property `i`; 0 for all that are no rest coefficients.
+    pub fn band(&self, i: usize) -> usize {
+        i.checked_sub(FIXED.len()).map_or(0, |rest| band(self.degree, rest))
+    }
+
     /// The columns that hold colour: `f_dc_*`, then `f_rest_*`.
     pub fn colour(&self) -> &[Field] {
         &self.all[COLOUR..]
@@ -83,24 +88,33 @@ pub(super) fn name(i: usize) -> String {
         .map_or_else(|| format!("f_rest_{}", i - FIXED.len()), ToString::to_string)
 }
 
-/// Where coefficient `i` of the file's order (`f_dc_*`, then `f_rest_*` channel-major) is in a row of [`Sh`].
-pub(super) fn sh_index(degree: usize, i: usize) -> usize {
-    let rest = (degree + 1) * (degree + 1) - 1;
-    match i.checked_sub(3) {
-        None => i,
-        Some(j) => 3 * (1 + j % rest) + j / rest,
+/// Which of a file's coefficients (`f_dc_*`, then `f_rest_*` channel-major) is at `place` in a row of [`Sh`]; `stored`
+/// is the degree of the file, which the row's may be below.
+pub(super) fn file_index(stored: usize, place: usize) -> usize {
+    let rest = (stored + 1) * (stored + 1) - 1;
+    match place.checked_sub(3) {
+        None => place,
+        Some(rest_place) => 3 + (rest_place % 3) * rest + rest_place / 3,
     }
+}
+
+/// The degree of the band that `f_rest_*` property `i` of a file of degree `stored` belongs to.
+fn band(stored: usize, i: usize) -> usize {
+    let rest = (stored + 1) * (stored + 1) - 1;
+    (i % rest + 1).isqrt()
 }
 
 /// Collects checked rows.
 pub(super) struct Rows {
     gaussians: Gaussians,
+    /// Which value comes at each place of a row of [`Sh`].
     order: Vec<usize>,
 }
 
 impl Rows {
-    /// Room for `rows` Gaussians; call only with a count that the file's size supports.
-    pub fn with_capacity(degree: usize, rows: usize) -> Rows {
+    /// Room for `rows` Gaussians of `degree` from a file of degree `stored`; call only with a count that the file's
+    /// size supports.
+    pub fn with_capacity(stored: usize, degree: usize, rows: usize) -> Rows {
         let per_gaussian = 3 + rest_count(degree);
         let gaussians = Gaussians {
             positions: Vec::with_capacity(rows),
@@ -112,11 +126,9 @@ impl Rows {
                 coefficients: Vec::with_capacity(rows * per_gaussian),
             },
         };
-        // The inverse of `sh_index`: which of the file's values comes at each place in memory.
-        let mut order = vec![0; per_gaussian];
-        for i in 0..per_gaussian {
-            order[sh_index(degree, i)] = COLOUR + i;
-        }
+        let order = (0..per_gaussian)
+            .map(|place| COLOUR + file_index(stored, place))
+            .collect();
         Rows { gaussians, order }
     }
 
@@ -156,10 +168,13 @@ mod tests {
 
     #[test]
     fn rest_coefficients_are_channel_major_in_the_file() {
-        // Degree 1: f_rest_0..2 are red's three, f_rest_3..5 green's, f_rest_6..8 blue's.
-        assert_eq!((0..3).map(|i| sh_index(1, i)).collect::<Vec<_>>(), [0, 1, 2]);
-        let red: Vec<usize> = (3..6).map(|i| sh_index(1, i)).collect();
-        let blue: Vec<usize> = (9..12).map(|i| sh_index(1, i)).collect();
-        assert_eq!((red, blue), (vec![3, 6, 9], vec![5, 8, 11]));
+        // Degree 1: f_rest_0..2 are red's three, f_rest_3..5 green's, f_rest_6..8 blue's; f_rest_0 is number 3.
+        let row: Vec<usize> = (0..12).map(|place| file_index(1, place)).collect();
+        assert_eq!(row, [0, 1, 2, 3, 6, 9, 4, 7, 10, 5, 8, 11]);
+        // In a file of degree 2 green's first is f_rest_8.
+        assert_eq!(file_index(2, 4), 3 + 8);
+        let bands: Vec<usize> = (0..8).map(|i| band(2, i)).collect();
+        assert_eq!(bands, [1, 1, 1, 2, 2, 2, 2, 2]);
+        assert_eq!((band(4, 23), band(4, 24), band(4, 15)), (4, 1, 4));
     }
 }

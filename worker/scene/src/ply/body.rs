@@ -1,7 +1,7 @@
 //! The rows of a PLY file: decoded column by column, and written back with nothing but colours changed.
-use super::fields::{Field, Rows};
-use super::gaussians::{Gaussians, Sh};
+use super::fields::{COLOUR, Field, Rows, file_index};
 use super::header::{Layout, Storage, quote, truncated};
+use crate::gaussians::{Gaussians, Sh};
 use std::io::{self, Write};
 
 /// Decodes the body of a file, all the bytes after its header; `Err` is the reason why not.
@@ -10,10 +10,17 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
     match layout.storage {
         Storage::Binary { big_endian } => {
             let rows = binary_rows(layout, body)?;
-            let mut collected = Rows::with_capacity(layout.fields.degree, layout.rows as usize);
+            let degree = used_degree(layout, rows.clone(), big_endian);
+            let mut collected = Rows::with_capacity(layout.fields.degree, degree, layout.rows as usize);
+            // Values of bands that are not used stay 0.
+            let used: Vec<(usize, Field)> = layout.fields.all.iter().copied().enumerate().collect();
+            let used: Vec<_> = used
+                .into_iter()
+                .filter(|(i, _)| layout.fields.band(*i) <= degree)
+                .collect();
             for row in rows {
-                for (value, field) in values.iter_mut().zip(&layout.fields.all) {
-                    *value = get(row, *field, big_endian);
+                for (i, field) in &used {
+                    values[*i] = get(row, *field, big_endian);
                 }
                 collected.push(&values)?;
             }
@@ -22,7 +29,8 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
         Storage::Ascii => {
             // Again, since a file can shrink between the look at its size and the read.
             layout.check_size(body.len() as u64)?;
-            let mut collected = Rows::with_capacity(layout.fields.degree, layout.rows as usize);
+            let degree = layout.fields.degree;
+            let mut collected = Rows::with_capacity(degree, degree, layout.rows as usize);
             let mut words = Vec::with_capacity(layout.columns);
             let mut lines = ascii_lines(body).filter(|line| !line.trim_ascii().is_empty());
             for _ in 0..layout.skip {
@@ -46,18 +54,43 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
                 }
                 collected.push(&values)?;
             }
-            Ok(collected.finish())
+            let mut gaussians = collected.finish();
+            gaussians.sh.trim();
+            Ok(gaussians)
         }
     }
 }
 
+/// The highest band in which some row has a coefficient other than 0.
+fn used_degree(layout: &Layout, rows: std::slice::ChunksExact<'_, u8>, big_endian: bool) -> usize {
+    let fields = &layout.fields;
+    let mut degree = 0;
+    // Highest bands first: most files use all that they have, and their first row says so.
+    let mut order: Vec<usize> = (COLOUR + 3..fields.all.len()).collect();
+    order.sort_by_key(|i| std::cmp::Reverse(fields.band(*i)));
+    for row in rows {
+        let unused = order.iter().take_while(|i| fields.band(**i) > degree);
+        for i in unused {
+            if get(row, fields.all[*i], big_endian) != 0.0 {
+                degree = fields.band(*i);
+                break;
+            }
+        }
+        if degree == fields.degree {
+            break;
+        }
+    }
+    degree
+}
+
 /// Writes the body with the colours `sh`. Values that are as they were keep their bytes.
 ///
-/// `layout` and `body` are those of a successful [`decode`], and `sh` has the same degree and rows.
+/// `layout` and `body` are those of a successful [`decode`], and `sh` has the degree and rows that it found; bands
+/// above are written as they are.
 pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write) -> io::Result<()> {
-    let degree = layout.fields.degree;
-    let order: Vec<usize> = (0..sh.per_gaussian())
-        .map(|i| super::fields::sh_index(degree, i))
+    let stored = layout.fields.degree;
+    let fields: Vec<Field> = (0..sh.per_gaussian())
+        .map(|place| layout.fields.colour()[file_index(stored, place)])
         .collect();
     let mut colours = sh.coefficients.chunks_exact(sh.per_gaussian());
     match layout.storage {
@@ -68,8 +101,8 @@ pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write
             let mut patched = vec![0; layout.row_bytes];
             for (row, colour) in rows.zip(&mut colours) {
                 patched.copy_from_slice(row);
-                for (field, i) in layout.fields.colour().iter().zip(&order) {
-                    set(&mut patched, *field, big_endian, colour[*i]);
+                for (field, value) in fields.iter().zip(colour) {
+                    set(&mut patched, *field, big_endian, *value);
                 }
                 out.write_all(&patched)?;
             }
@@ -85,7 +118,7 @@ pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write
                     out.write_all(line)?;
                 } else if let Some(colour) = colours.next() {
                     split(line, &mut words);
-                    encode_line(layout, line, &words, |i| colour[order[i]], out)?;
+                    encode_line(&fields, line, &words, colour, out)?;
                 } else {
                     out.write_all(line)?;
                 }
@@ -96,17 +129,17 @@ pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write
 }
 
 fn encode_line(
-    layout: &Layout,
+    fields: &[Field],
     line: &[u8],
     words: &[std::ops::Range<usize>],
-    colour: impl Fn(usize) -> f32,
+    colour: &[f32],
     out: &mut impl Write,
 ) -> io::Result<()> {
     let mut changed: Vec<(usize, f32)> = Vec::new();
-    for (i, field) in layout.fields.colour().iter().enumerate() {
+    for (field, value) in fields.iter().zip(colour) {
         let old = number(&line[words[field.column].clone()]);
-        if old.map(f32::to_bits) != Some(colour(i).to_bits()) {
-            changed.push((field.column, colour(i)));
+        if old.map(f32::to_bits) != Some(value.to_bits()) {
+            changed.push((field.column, *value));
         }
     }
     changed.sort_unstable_by_key(|(column, _)| *column);

@@ -35,6 +35,23 @@ impl Sh {
     pub fn per_gaussian(&self) -> usize {
         3 * (self.degree + 1) * (self.degree + 1)
     }
+
+    /// Drops the bands in which no Gaussian has anything but 0.
+    pub fn trim(&mut self) {
+        let stored = self.per_gaussian();
+        let used = |row: &[f32]| row.iter().rposition(|v| *v != 0.0).map_or(0, |last| (last / 3).isqrt());
+        self.degree = self.coefficients.chunks_exact(stored).map(used).max().unwrap_or(0);
+        let kept = self.per_gaussian();
+        if kept == stored {
+            return;
+        }
+        for row in 0..self.coefficients.len() / stored {
+            self.coefficients
+                .copy_within(row * stored..row * stored + kept, row * kept);
+        }
+        self.coefficients.truncate(self.coefficients.len() / stored * kept);
+        self.coefficients.shrink_to_fit();
+    }
 }
 
 impl Gaussians {
@@ -68,6 +85,28 @@ mod tests {
         assert!(gaussians.opacity(0) > 0.999_999);
         assert!(gaussians.opacity(1) > 0.0 && gaussians.opacity(1) < 1e-8);
         assert_eq!(gaussians.opacity(2), 0.5);
+    }
+
+    #[test]
+    fn bands_of_zeros_are_dropped() {
+        let mut sh = Sh {
+            degree: 2,
+            coefficients: vec![0.0; 54],
+        };
+        sh.coefficients[27 + 11] = 3.0; // the last of the first band
+        sh.coefficients[27] = 1.0;
+        sh.trim();
+        assert_eq!((sh.degree, sh.coefficients.len()), (1, 24));
+        assert_eq!((sh.coefficients[12], sh.coefficients[23]), (1.0, 3.0));
+        sh.coefficients.fill(0.0);
+        sh.trim();
+        assert_eq!((sh.degree, sh.coefficients.len()), (0, 6));
+        let mut none = Sh {
+            degree: 3,
+            coefficients: Vec::new(),
+        };
+        none.trim();
+        assert_eq!(none.degree, 0);
     }
 
     #[test]

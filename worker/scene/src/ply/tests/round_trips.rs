@@ -115,3 +115,36 @@ fn zero_and_one_gaussian_are_read() {
         }
     }
 }
+
+/// Tools pad: a file of degree 3 with nothing in its third band is a scene of degree 2.
+#[test]
+fn bands_of_zeros_are_in_the_file_only() {
+    for encoding in ENCODINGS {
+        let mut file = File::new(encoding, 3, 3);
+        for i in 0..45 {
+            if i % 15 >= 8 {
+                (0..3).for_each(|row| {
+                    file =
+                        std::mem::replace(&mut file, File::new(encoding, 0, 0)).with(&format!("f_rest_{i}"), row, 0.0)
+                });
+            }
+        }
+        let scene = file.read().unwrap();
+        assert_eq!((scene.gaussians.sh.degree, scene.learnable_degree()), (2, 2));
+        assert_eq!(scene.gaussians.sh.coefficients.len(), 3 * 27);
+        assert_eq!(written(&scene, &scene.gaussians.sh), file.bytes());
+        // Blue's last coefficient of the second band is f_rest_37.
+        let mut sh = scene.gaussians.sh.clone();
+        sh.coefficients[27 + 26] = 0.5;
+        let expected = file.with("f_rest_37", 1, 0.5);
+        assert_eq!(
+            read(&written(&scene, &sh)).unwrap().gaussians,
+            expected.read().unwrap().gaussians
+        );
+    }
+    let Some(path) = crate::testing::scene_path("playbot_8k.ply") else {
+        return;
+    };
+    let scene = Scene::read(&path).unwrap();
+    assert_eq!(scene.gaussians.sh.degree, 2, "stored as degree 3");
+}

@@ -4,8 +4,9 @@ mod refusals;
 mod round_trips;
 
 use super::fields::rest_count;
-use super::*;
+use crate::{Error, MAX_DEGREE, Result, Scene, Sh};
 use std::fmt::Write as _;
+use std::path::Path;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Encoding {
@@ -133,7 +134,7 @@ impl File {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::read_from(Path::new("test.ply"), &mut BufReader::new(bytes), bytes.len() as u64)
+    Scene::parse(Path::new("test.ply"), bytes)
 }
 
 fn refused(bytes: &[u8]) -> String {

@@ -1,0 +1,59 @@
+//! What a file is besides its Gaussians: how it is written again with other colours, and which colours it can keep.
+use crate::Sh;
+use std::fmt::Debug;
+use std::io::{self, Write};
+
+/// The file formats of scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// The PLY of the reference implementation: ASCII or binary of either byte order.
+    Ply,
+    /// SuperSplat's PLY of chunks and packed integers.
+    CompressedPly,
+    /// Niantic's SPZ.
+    Spz,
+    /// 32 bytes a Gaussian without a header.
+    Splat,
+    /// PlayCanvas' pictures in a ZIP.
+    Sog,
+}
+
+impl Format {
+    /// What files of the format end in, after the last dot of the name that is the user's.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Ply => "ply",
+            Format::CompressedPly => "compressed.ply",
+            Format::Spz => "spz",
+            Format::Splat => "splat",
+            Format::Sog => "sog",
+        }
+    }
+}
+
+/// A file as it was read.
+///
+/// What `keep` says is what comes back: reading what [`write`](Self::write) wrote gives the coefficients of the
+/// scene after [`keep`](Self::keep), bit by bit, and everything else as it was.
+pub(crate) trait Container: Debug + Send + Sync {
+    /// Which format.
+    fn format(&self) -> Format;
+
+    /// Whether [`keep`](Self::keep) leaves every finite coefficient as it is.
+    fn exact(&self) -> bool {
+        true
+    }
+
+    /// Highest degree whose coefficients can be changed for each Gaussian by itself, at most that of the scene.
+    fn learnable_degree(&self, scene: usize) -> usize {
+        scene
+    }
+
+    /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what the file keeps of them.
+    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+        let _ = (row, coefficients);
+    }
+
+    /// Writes the file with the colours `sh`: finite, of the degree and the rows of the scene that was read.
+    fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()>;
+}

@@ -1,0 +1,34 @@
+//! Everything that can go wrong with scene files, by what happened.
+use std::path::PathBuf;
+
+/// Result of operations on scene files.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// One variant per thing that can happen; texts name the field, the row and the limit.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Reading or writing a file failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file is not a scene we can read, or cannot hold what is to be written.
+    #[error("{}: {reason}", path.display())]
+    BadScene {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the field, the row and the limit.
+        reason: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Io`] at `path`, for `map_err`.
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { path, source }
+    }
+}

@@ -1,0 +1,18 @@
+//! Scenes: Gaussians in memory, and the files of every common format that they come from.
+//!
+//! A written file differs from the one read in nothing but its colours, and is of the same format. Only the bands of
+//! spherical harmonics that hold something are in memory, whatever the file has room for.
+mod container;
+mod error;
+mod gaussians;
+mod ply;
+mod scene;
+#[doc(hidden)]
+pub mod testing;
+mod whole;
+
+pub use container::Format;
+pub use error::{Error, Result};
+pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
+pub use scene::Scene;
+pub use whole::write_whole;

@@ -1,0 +1,137 @@
+//! A scene and the file it came from, whatever its format.
+use crate::container::{Container, Format};
+use crate::gaussians::{Gaussians, Sh};
+use crate::whole::write_whole;
+use crate::{Error, Result, ply};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A scene: what the engine computes with, and the file it came from.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The Gaussians in the order of the file. The degree of their colours is that of the highest band in which any
+    /// Gaussian has a coefficient other than 0, which may be lower than what the file has room for.
+    pub gaussians: Gaussians,
+    /// `None` for a scene that was not read from a file.
+    source: Option<Arc<dyn Container>>,
+}
+
+impl Scene {
+    /// Reads a scene. The format is told by the content, not by the name.
+    ///
+    /// A file of no Gaussians is read; marking and viewing it is what fails. Memory: the file's size for its bytes,
+    /// and about as much for the numbers in them; for compressed formats both as large as the bytes uncompressed.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where reading fails. [`Error::BadScene`], with property, row and limit: not a scene of a known
+    /// format, properties missing, twice or not numbers, fewer rows than promised, NaN in a used property, infinities
+    /// other than those of opacity and of flat axes (a log scale of minus infinity), more bytes uncompressed than
+    /// allowed. Counts are compared with the file before anything is allocated.
+    pub fn read(path: &Path) -> Result<Scene> {
+        let file = File::open(path).map_err(Error::io(path))?;
+        let metadata = file.metadata().map_err(Error::io(path))?;
+        if !metadata.is_file() {
+            return Err(bad(path, "not a regular file".to_string()));
+        }
+        Scene::read_from(path, &mut BufReader::with_capacity(1 << 16, file), metadata.len())
+    }
+
+    /// Reads a scene from memory; `name` is for messages.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read`].
+    pub fn parse(name: &Path, bytes: &[u8]) -> Result<Scene> {
+        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64)
+    }
+
+    /// Reads a scene of `size` bytes; `path` is for messages.
+    fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64) -> Result<Scene> {
+        // The file system may give fewer bytes at first, but a buffer of an empty file only.
+        let _first = source.fill_buf().map_err(Error::io(path))?;
+        let (gaussians, source) = ply::read(path, source, size)?;
+        Ok(Scene {
+            gaussians,
+            source: Some(source),
+        })
+    }
+
+    /// Writes the scene with the colours `sh` in place of its own, whole or not at all, in the format that it was
+    /// read from.
+    ///
+    /// A scene from a file is written as that file with its colours changed, whatever else was done to
+    /// [`Scene::gaussians`]; one that was made in memory, as a PLY in the layout of the reference implementation.
+    ///
+    /// # Errors
+    /// [`Error::BadScene`] where `sh` has another degree or number of rows than the scene, or a value that is not
+    /// finite; [`Error::Io`] where writing fails, the disk being full included.
+    pub fn write(&self, path: &Path, sh: &Sh) -> Result<()> {
+        let own = &self.gaussians.sh;
+        if sh.degree != own.degree || sh.coefficients.len() != own.coefficients.len() {
+            let sizes = (sh.degree, sh.coefficients.len(), own.degree, own.coefficients.len());
+            let (degree, count, own_degree, own_count) = sizes;
+            return Err(bad(
+                path,
+                format!("colours of degree {degree} with {count} values; the scene has {own_degree} and {own_count}"),
+            ));
+        }
+        if let Some(i) = sh.coefficients.iter().position(|v| !v.is_finite()) {
+            let (row, value) = (i / sh.per_gaussian(), sh.coefficients[i]);
+            return Err(bad(path, format!("a colour of row {row} would be {value}")));
+        }
+        write_whole(path, |out| self.encode(sh, out))
+    }
+
+    /// The bytes that [`Scene::write`] puts into a file, for colours that it would not refuse.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn encode(&self, sh: &Sh, mut out: &mut dyn Write) -> std::io::Result<()> {
+        match &self.source {
+            Some(source) => source.write(sh, out),
+            None => ply::write_standard(&self.gaussians, sh, &mut out),
+        }
+    }
+
+    /// A scene without a file; it is written as a PLY in the layout of the reference implementation.
+    pub fn from_gaussians(gaussians: Gaussians) -> Scene {
+        Scene {
+            gaussians,
+            source: None,
+        }
+    }
+
+    /// The format that [`Scene::write`] writes.
+    pub fn format(&self) -> Format {
+        self.source.as_ref().map_or(Format::Ply, |source| source.format())
+    }
+
+    /// Whether a written file keeps every finite colour as it is. Otherwise [`Scene::keep`] tells what it keeps.
+    pub fn exact(&self) -> bool {
+        self.source.as_ref().is_none_or(|source| source.exact())
+    }
+
+    /// Highest degree of spherical harmonics whose coefficients a written file can have changed for each Gaussian by
+    /// itself; those above are written as they were read.
+    pub fn learnable_degree(&self) -> usize {
+        let degree = self.gaussians.sh.degree;
+        self.source
+            .as_ref()
+            .map_or(degree, |s| s.learnable_degree(degree).min(degree))
+    }
+
+    /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what a written file keeps of them.
+    pub fn keep(&self, row: usize, coefficients: &mut [f32]) {
+        if let Some(source) = &self.source {
+            source.keep(row, coefficients);
+        }
+    }
+}
+
+pub(crate) fn bad(path: &Path, reason: String) -> Error {
+    Error::BadScene {
+        path: path.into(),
+        reason,
+    }
+}
