@@ -2,7 +2,7 @@
 //! `cargo run --release --example bench_splat -- SCENE.ply SIZE [VIEWS] [wgpu]`.
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::scene::{Gaussians, Scene};
-use guardsplat_worker::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
+use guardsplat_worker::splat::{CpuRasterizer, GpuRasterizer, Learnable, Rasterizer, WeightCache, prepare, sh};
 use guardsplat_worker::view::Camera;
 use std::time::Instant;
 
@@ -44,13 +44,14 @@ fn measure(
     cameras: &[Camera],
     cache: WeightCache,
 ) -> guardsplat_worker::Result<()> {
+    let learnable = Learnable::all(gaussians);
     let mut best = [f64::INFINITY; STAGES.len()];
     let mut size = String::new();
     for _ in 0..ROUNDS {
         let mut ms = [0.0f64; STAGES.len()];
         let (mut visible, mut pairs, mut weights, mut bytes) = (0, 0, 0, 0);
         for camera in cameras {
-            let mut sum = vec![0.0; gaussians.sh.coefficients.len()];
+            let mut sum = vec![0.0; learnable.len()];
             let mut clock = Instant::now();
             let mut lap = |stage: usize| {
                 ms[stage] += clock.elapsed().as_secs_f64() * 1e3 / cameras.len() as f64;
@@ -64,7 +65,7 @@ fn measure(
             lap(2);
             let gradient = rasterizer.backward(&view, &picture.pixels)?;
             lap(3);
-            sh::backward(gaussians.sh.degree, &view, &colours, &gradient, &mut sum);
+            sh::backward(&learnable, &view, &colours, &gradient, &mut sum);
             lap(4);
             visible += view.visible.len() / cameras.len();
             pairs += view.tiles.pairs() / cameras.len();

@@ -140,7 +140,7 @@ fn files(folder: &Path) -> Vec<String> {
 
 #[test]
 fn the_loss_falls_on_training_views() {
-    let (engine, scene) = (engine(), small_scene());
+    let (engine, scene) = (engine(), Scene::from_gaussians(small_scene()));
     let mut settings = Settings {
         steps: 60,
         ..settings()
@@ -202,31 +202,44 @@ fn gaussians_that_no_view_sees_keep_their_colours() {
     for row in [0, 17, 599] {
         scene.opacity_logits[row] = f32::NEG_INFINITY;
     }
+    let original = scene.sh.clone();
+    let stride = original.per_gaussian();
+    let scene = Scene::from_gaussians(scene);
     let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
-    let stride = scene.sh.per_gaussian();
-    let rows: Vec<&[f32]> = done.offsets.chunks_exact(stride).collect();
-    for row in [0, 17, 599] {
-        assert!(!done.seen[row] && rows[row].iter().all(|o| *o == 0.0));
-    }
-    assert!(done.seen.iter().filter(|seen| **seen).count() > 100);
-    for (seen, row) in done.seen.iter().zip(&rows) {
-        assert!(*seen || row.iter().all(|o| *o == 0.0));
-        assert!(row.iter().all(|o| o.is_finite()));
+    let learnable = &done.learned.learnable;
+    assert!(learnable.rows().len() > 100 && learnable.rows().len() <= 597);
+    // They take no memory either.
+    assert_eq!(done.learned.values.len(), learnable.rows().len() * stride);
+    let colours = done.learned.colours(&original);
+    for row in 0..600 {
+        let at = row * stride..(row + 1) * stride;
+        let same = colours.coefficients[at.clone()] == original.coefficients[at.clone()];
+        assert!(same || learnable.slot(row as u32).is_some());
+        assert!(!([0, 17, 599].contains(&row) && !same));
+        assert!(colours.coefficients[at].iter().all(|o| o.is_finite()));
     }
 }
 
 #[test]
 fn scenes_without_view_dependence_and_without_anything_to_see() {
     let engine = engine();
-    let mut scene = sample(300, 0, 7).unwrap().gaussians;
+    let scene = sample(300, 0, 7).unwrap();
     let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
-    assert!(done.offsets.iter().any(|o| *o != 0.0));
+    assert!(done.learned.values.iter().any(|o| *o != 0.0));
     // Nothing visible: nothing to learn, and no NaN from it.
+    let mut scene = scene.gaussians;
     scene.opacity_logits.fill(f32::NEG_INFINITY);
+    let scene = Scene::from_gaussians(scene);
     let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
-    assert!(done.offsets.iter().all(|o| *o == 0.0));
+    assert!(done.learned.values.is_empty());
     // Nothing at all.
-    let empty = optimise(&engine, &Gaussians::default(), &message(), &settings(), &mut |_| {});
+    let empty = optimise(
+        &engine,
+        &Scene::from_gaussians(Gaussians::default()),
+        &message(),
+        &settings(),
+        &mut |_| {},
+    );
     assert!(empty.is_err());
 }
 
@@ -276,7 +289,7 @@ fn a_missed_target_writes_nothing_unless_forced() {
 
 #[test]
 fn a_held_out_margin_that_holds_ends_the_run() {
-    let (engine, scene) = (engine(), small_scene());
+    let (engine, scene) = (engine(), Scene::from_gaussians(small_scene()));
     let mut easy = Preset::Standard.settings().early_stop.unwrap();
     (easy.every, easy.views, easy.min_steps, easy.patience) = (2, 2, 5, 2);
     (easy.bit_accuracy, easy.margin, easy.psnr_db) = (0.0, -1e9, 0.0);
@@ -296,7 +309,7 @@ fn a_held_out_margin_that_holds_ends_the_run() {
 
 #[test]
 fn what_does_not_fit_together_is_refused() {
-    let (engine, scene) = (engine(), small_scene());
+    let (engine, scene) = (engine(), Scene::from_gaussians(small_scene()));
     let long = Message::parse("5c5c", 16).unwrap();
     let refused = |message: &Message, settings: &Settings| {
         let result = optimise(&engine, &scene, message, settings, &mut |_| {});

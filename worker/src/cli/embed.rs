@@ -76,7 +76,9 @@ struct Report<'a> {
     views: usize,
     size: u32,
     gaussians: usize,
+    seen_gaussians: usize,
     changed_gaussians: usize,
+    covering_views: usize,
     written: bool,
     target_missed: &'a [String],
 }
@@ -140,6 +142,9 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
                 step.terms.message
             )
         }),
+        Progress::Covered { views, seen, gaussians } => display.say(&format!(
+            "{seen} of {gaussians} Gaussians can be seen, as {views} views show; the others are left alone"
+        )),
         Progress::Check(check) => display.say(&format!(
             "step {}: held-out bits {:.1} %, PSNR {:.2} dB, weakest bit {:+.2}",
             check.step,
@@ -182,7 +187,9 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
         views: found.views,
         size: found.size,
         gaussians: outcome.gaussians,
+        seen_gaussians: outcome.seen,
         changed_gaussians: outcome.changed,
+        covering_views: outcome.covering_views,
         written: outcome.written,
         target_missed: &outcome.missed,
     };

@@ -1,4 +1,4 @@
-//! Adam (Kingma and Ba 2015) over the offsets of the Gaussians that some view has seen, with the offset penalty.
+//! Adam (Kingma and Ba 2015) over the offsets of the Gaussians that views show, with the offset penalty.
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -65,8 +65,9 @@ pub struct Penalty {
 }
 
 impl Penalty {
-    /// Value for offsets `[n][stride]`, of which the first three of a Gaussian are constant coefficients.
-    pub fn value(&self, offsets: &[f32], stride: usize) -> f64 {
+    /// Value for offsets `[slots][stride]`, of which the first three of a Gaussian are constant coefficients, in a scene
+    /// of `gaussians`; those without a slot have no offsets.
+    pub fn value(&self, offsets: &[f32], stride: usize, gaussians: usize) -> f64 {
         // Partial sums are added in order, so that the value does not depend on the number of threads.
         let parts: Vec<[f64; 2]> = offsets
             .par_chunks(CHUNK * stride)
@@ -83,7 +84,7 @@ impl Penalty {
         let [dc, rest] = parts
             .iter()
             .fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
-        let [scale_dc, scale_rest] = self.scales(offsets.len() / stride, stride);
+        let [scale_dc, scale_rest] = self.scales(gaussians, stride);
         dc * scale_dc + rest * scale_rest
     }
 
@@ -97,11 +98,11 @@ impl Penalty {
     }
 }
 
-/// The state of the optimiser. Memory of Gaussians that no view sees is reserved but never touched, so the system
-/// does not hand it out.
+/// The state of the optimiser; Gaussians that are not learned take none.
 pub struct Adam {
     options: AdamOptions,
     stride: usize,
+    gaussians: usize,
     /// Steps that each row has taken.
     steps: Vec<u32>,
     /// Of the step sizes after so many steps, for what the means still lack of having begun at 0.
@@ -111,11 +112,12 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// For `rows` Gaussians of `stride` coefficients each.
-    pub fn new(options: AdamOptions, rows: usize, stride: usize) -> Self {
+    /// For `rows` learned Gaussians of `stride` coefficients each, in a scene of `gaussians`.
+    pub fn new(options: AdamOptions, rows: usize, stride: usize, gaussians: usize) -> Self {
         Self {
             options,
             stride,
+            gaussians,
             steps: vec![0; rows],
             corrections: Vec::new(),
             mean: vec![0.0; rows * stride],
@@ -123,11 +125,11 @@ impl Adam {
         }
     }
 
-    /// One step on the rows that are `seen`; rates are multiplied by `rate`. The penalty's gradient is added to
-    /// `gradient`, which is all zero afterwards in these rows. Rows not seen keep their offsets, which are 0.
-    pub fn step(&mut self, rate: f32, penalty: Penalty, seen: &[bool], offsets: &mut [f32], gradient: &mut [f32]) {
+    /// One step; rates are multiplied by `rate`. The penalty's gradient is added to `gradient`, which is all zero
+    /// afterwards.
+    pub fn step(&mut self, rate: f32, penalty: Penalty, offsets: &mut [f32], gradient: &mut [f32]) {
         let (o, stride) = (self.options, self.stride);
-        let [dc, rest] = penalty.scales(seen.len(), stride).map(|s| 2.0 * s as f32);
+        let [dc, rest] = penalty.scales(self.gaussians, stride).map(|s| 2.0 * s as f32);
         let [rate_dc, rate_rest] = [o.rate_dc, o.rate_rest].map(|r| r * rate);
         // No row has taken more steps than there were calls.
         self.corrections
@@ -135,7 +137,6 @@ impl Adam {
         let corrections = &self.corrections;
         let size = CHUNK * stride;
         (
-            seen.par_chunks(CHUNK),
             self.steps.par_chunks_mut(CHUNK),
             offsets.par_chunks_mut(size),
             gradient.par_chunks_mut(size),
@@ -143,8 +144,8 @@ impl Adam {
             self.square.par_chunks_mut(size),
         )
             .into_par_iter()
-            .for_each(|(seen, steps, offsets, gradient, mean, square)| {
-                for row in (0..seen.len()).filter(|row| seen[*row]) {
+            .for_each(|(steps, offsets, gradient, mean, square)| {
+                for row in 0..steps.len() {
                     let columns = row * stride..(row + 1) * stride;
                     if o.sparse && gradient[columns.clone()].iter().all(|g| *g == 0.0) {
                         continue;
@@ -197,12 +198,12 @@ mod tests {
             rate_rest: 0.01,
             ..AdamOptions::default()
         };
-        let mut adam = Adam::new(options, 1, 12);
+        let mut adam = Adam::new(options, 1, 12, 1);
         let mut offsets = vec![0.0; 12];
         let mut step = |g: f32, offsets: &mut Vec<f32>| {
             let mut gradient = vec![0.0; 12];
             (gradient[0], gradient[3]) = (g, g);
-            adam.step(1.0, NONE, &[true], offsets, &mut gradient);
+            adam.step(1.0, NONE, offsets, &mut gradient);
             assert_eq!(gradient, [0.0; 12]);
         };
         // Gradients 1 and -2: means 0.1 and -0.11, squares 0.001 and 0.004999, corrected by 0.1, 0.19, 0.001, 0.001999.
@@ -216,13 +217,12 @@ mod tests {
     }
 
     #[test]
-    fn tiny_gradients_move_offsets_and_unseen_rows_stay() {
-        let mut adam = Adam::new(AdamOptions::default(), 2, 3);
+    fn tiny_gradients_move_offsets() {
+        let mut adam = Adam::new(AdamOptions::default(), 2, 3, 2);
         let mut offsets = vec![0.0; 6];
         let mut gradient = vec![1e-10; 6];
-        adam.step(0.5, NONE, &[true, false], &mut offsets, &mut gradient);
+        adam.step(0.5, NONE, &mut offsets, &mut gradient);
         assert!((offsets[0] + 2.5e-3).abs() < 1e-6, "{}", offsets[0]);
-        assert_eq!(offsets[3..], [0.0; 3]);
     }
 
     #[test]
@@ -232,20 +232,20 @@ mod tests {
             ..AdamOptions::default()
         };
         // The second row is shown in two of four steps, and ends where the first is after two.
-        let mut adam = Adam::new(options, 2, 3);
+        let mut adam = Adam::new(options, 2, 3, 2);
         let mut offsets = vec![0.0; 6];
         for (step, g) in [0.5, 0.0, 0.0, -0.2].into_iter().enumerate() {
             let always = [0.5, -0.2, 0.7, 0.1][step];
             let mut gradient = vec![always, always, always, g, g, g];
-            adam.step(1.0, NONE, &[true; 2], &mut offsets, &mut gradient);
+            adam.step(1.0, NONE, &mut offsets, &mut gradient);
             if step == 1 {
                 assert!(offsets[3] != offsets[0]);
             }
         }
-        let mut alone = Adam::new(options, 1, 3);
+        let mut alone = Adam::new(options, 1, 3, 1);
         let mut expected = vec![0.0; 3];
         for g in [0.5, -0.2] {
-            alone.step(1.0, NONE, &[true], &mut expected, &mut [g; 3]);
+            alone.step(1.0, NONE, &mut expected, &mut [g; 3]);
         }
         assert_eq!(offsets[3..], expected[..]);
     }
@@ -256,7 +256,7 @@ mod tests {
         let penalty = Penalty { dc: 6.0, rest: 1.8 };
         let mut offsets = vec![0.0; 24];
         (offsets[0], offsets[15]) = (0.5, -2.0);
-        let value = penalty.value(&offsets, 12);
+        let value = penalty.value(&offsets, 12, 2);
         assert!((value - (0.25 + 0.1 * 4.0)).abs() < 1e-6, "{value}");
         // With both betas at 0 a step is rate * g / |g|; the root of the second moment is |g|.
         let options = AdamOptions {
@@ -267,21 +267,21 @@ mod tests {
             rate_rest: 1.0,
             ..AdamOptions::default()
         };
-        let mut adam = Adam::new(options, 2, 12);
+        let mut adam = Adam::new(options, 2, 12, 2);
         let before = offsets.clone();
-        adam.step(1.0, penalty, &[true; 2], &mut offsets, &mut [0.0; 24]);
+        adam.step(1.0, penalty, &mut offsets, &mut [0.0; 24]);
         for at in 0..24 {
             let h = 1e-3;
             let at_step = |sign: f32| {
                 let mut moved = before.clone();
                 moved[at] += sign * h;
-                penalty.value(&moved, 12)
+                penalty.value(&moved, 12, 2)
             };
             let slope = ((at_step(1.0) - at_step(-1.0)) / (2.0 * f64::from(h))) as f32;
             let expected = before[at] - slope / (slope.abs() + 1.0);
             assert!((offsets[at] - expected).abs() < 1e-4, "{at}");
         }
         // Degree 0 has no other coefficients.
-        assert_eq!(penalty.value(&[1.0, 0.0, 0.0], 3), 2.0);
+        assert_eq!(penalty.value(&[1.0, 0.0, 0.0], 3, 1), 2.0);
     }
 }

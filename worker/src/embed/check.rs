@@ -8,7 +8,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
 use crate::scene::Gaussians;
-use crate::splat::sh;
+use crate::splat::{Changes, sh};
 use crate::view::{Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed.
@@ -45,17 +45,17 @@ impl HeldOut {
         step.is_multiple_of(self.stop.every)
     }
 
-    /// Reads the views as they are with `offsets`; the second value says whether to stop.
+    /// Reads the views as they are with `changes`; the second value says whether to stop.
     pub fn check(
         &mut self,
         engine: &Engine,
         gaussians: &Gaussians,
-        offsets: &[f32],
+        changes: Changes<'_>,
         message: &Message,
         step: usize,
     ) -> Result<(Check, bool)> {
         let pictures: Vec<Picture> = engine.each(&self.views, |v| {
-            let colours = sh::colours(&gaussians.sh, Some(offsets), &v.view);
+            let colours = sh::colours(&gaussians.sh, Some(changes), &v.view);
             Ok(v.draw(engine, &colours)?.to_8_bit())
         })?;
         let psnrs = self

@@ -7,8 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use super::adam::{Adam, Penalty};
 use super::balance::Balancer;
 use super::check::HeldOut;
+use super::learned::Learned;
 use super::loss::{Loss, finite};
-use super::pool::{Pool, PooledView};
+use super::pool::{Coverage, Pool, PooledView};
 use super::progress::{Progress, Step};
 use super::settings::Settings;
 use super::timing::{Stage, Timing};
@@ -16,8 +17,8 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
-use crate::scene::{Gaussians, Sh};
-use crate::splat::sh;
+use crate::scene::Scene;
+use crate::splat::{Learnable, sh};
 use crate::view::ViewSampler;
 
 /// Steps between two reports of the timing.
@@ -26,25 +27,14 @@ const TIMED_STEPS: usize = 20;
 /// The outcome of the loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimised {
-    /// Learned changes, laid out as the scene's coefficients. Gaussians that no view saw have 0.
-    pub offsets: Vec<f32>,
-    /// Whether any view saw a Gaussian.
-    pub seen: Vec<bool>,
+    /// The learned changes.
+    pub learned: Learned,
+    /// Views that it took to find the Gaussians that can be seen.
+    pub covering_views: usize,
     /// Steps taken.
     pub steps: usize,
     /// Views drawn in all steps.
     pub view_steps: usize,
-}
-
-impl Optimised {
-    /// The scene's colours with the offsets on them.
-    pub fn colours(&self, original: &Sh) -> Sh {
-        let pairs = original.coefficients.iter().zip(&self.offsets);
-        Sh {
-            degree: original.degree,
-            coefficients: pairs.map(|(h, o)| h + o).collect(),
-        }
-    }
 }
 
 /// Optimises offsets that make views of the scene read as `message`. The same arguments on the same device give the
@@ -55,7 +45,7 @@ impl Optimised {
 /// [`Error::NotFinite`] when a term stops being a number, [`Error::Stopped`], or a failing device.
 pub fn optimise(
     engine: &Engine,
-    gaussians: &Gaussians,
+    scene: &Scene,
     message: &Message,
     settings: &Settings,
     progress: &mut dyn FnMut(Progress),
@@ -67,12 +57,18 @@ pub fn optimise(
             reason: format!("{} bits, but the key has {}", message.len(), engine.bits),
         });
     }
+    let gaussians = &scene.gaussians;
     let sampler = ViewSampler::new(gaussians, settings.seed)?;
     let mut held_out = settings
         .early_stop
         .map(|stop| HeldOut::new(engine, gaussians, &sampler, settings, stop))
         .transpose()?;
-    let mut run = Run::new(engine, gaussians, message, settings, sampler);
+    let (mut run, coverage) = Run::new(engine, scene, message, settings, sampler)?;
+    progress(Progress::Covered {
+        views: coverage.views,
+        seen: coverage.count(),
+        gaussians: gaussians.len(),
+    });
     let mut timing = Timing::new();
     let mut steps = 0;
     while steps < settings.steps {
@@ -83,7 +79,7 @@ pub fn optimise(
         let mut enough = false;
         if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
             let check;
-            (check, enough) = held_out.check(engine, gaussians, &run.offsets, message, steps)?;
+            (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
             progress(Progress::Check(check));
         }
         timing.lap(Stage::Check);
@@ -94,8 +90,8 @@ pub fn optimise(
         }
     }
     Ok(Optimised {
-        offsets: run.offsets,
-        seen: run.seen,
+        learned: run.learned,
+        covering_views: coverage.views,
         view_steps: steps * settings.views_per_step,
         steps,
     })
@@ -104,52 +100,49 @@ pub fn optimise(
 /// The state of a run.
 struct Run<'a> {
     engine: &'a Engine,
-    gaussians: &'a Gaussians,
+    scene: &'a Scene,
     settings: &'a Settings,
     loss: Loss<'a>,
     pool: Pool,
     adam: Adam,
     balancer: Balancer,
     augmentation: ChaCha8Rng,
-    seen: Vec<bool>,
-    offsets: Vec<f32>,
+    learned: Learned,
     gradient: Vec<f32>,
 }
 
 impl<'a> Run<'a> {
     fn new(
         engine: &'a Engine,
-        gaussians: &'a Gaussians,
+        scene: &'a Scene,
         message: &Message,
         settings: &'a Settings,
         sampler: ViewSampler,
-    ) -> Self {
-        let stride = gaussians.sh.per_gaussian();
-        let count = gaussians.sh.coefficients.len();
+    ) -> Result<(Self, Coverage)> {
+        let mut pool = Pool::new(sampler, settings);
+        let coverage = pool.cover(engine, &scene.gaussians)?;
+        let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
         let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
         augmentation.set_stream(u64::MAX - 1);
-        Self {
+        let (rows, columns) = (learnable.rows().len(), learnable.columns());
+        let run = Self {
             engine,
-            gaussians,
+            scene,
             settings,
             loss: Loss::new(engine, settings, message),
-            pool: Pool::new(sampler, settings),
-            adam: Adam::new(settings.adam, gaussians.len(), stride),
+            pool,
+            adam: Adam::new(settings.adam, rows, columns, scene.gaussians.len()),
             balancer: Balancer::new(settings.balance),
             augmentation,
-            seen: vec![false; gaussians.len()],
-            offsets: vec![0.0; count],
-            gradient: vec![0.0; count],
-        }
+            gradient: vec![0.0; learnable.len()],
+            learned: Learned::new(scene, learnable),
+        };
+        Ok((run, coverage))
     }
 
     /// One step; `step` counts from 1.
     fn step(&mut self, step: usize, timing: &mut Timing) -> Result<Step> {
-        let (views, fresh) = self.pool.batch(self.engine, self.gaussians)?;
-        for view in &views[..fresh] {
-            let rows = view.view.visible.iter();
-            rows.for_each(|&row| self.seen[row as usize] = true);
-        }
+        let views = self.pool.batch(self.engine, &self.scene.gaussians)?;
         timing.lap(Stage::Prepare);
         let mut figures = self.differentiate(step, &views, timing)?;
 
@@ -158,12 +151,13 @@ impl<'a> Run<'a> {
             dc: lambda.offset_dc,
             rest: lambda.offset_rest,
         };
-        let stride = self.gaussians.sh.per_gaussian();
-        figures.terms.offset = penalty.value(&self.offsets, stride) as f32;
+        let (columns, gaussians) = (self.learned.learnable.columns(), self.scene.gaussians.len());
+        figures.terms.offset = penalty.value(&self.learned.values, columns, gaussians) as f32;
         finite(step, "offset", figures.terms.offset)?;
         let rate = self.rate(step);
         self.adam
-            .step(rate, penalty, &self.seen, &mut self.offsets, &mut self.gradient);
+            .step(rate, penalty, &mut self.learned.values, &mut self.gradient);
+        self.learned.settle(self.scene);
         self.balancer.update(figures.psnr_db, figures.bit_accuracy);
         timing.lap(Stage::Adam);
         Ok(figures)
@@ -172,9 +166,9 @@ impl<'a> Run<'a> {
     /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
     /// `self.gradient`.
     fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut Timing) -> Result<Step> {
-        let (engine, scene) = (self.engine, self.gaussians);
-        let offsets = &self.offsets;
-        let colours = engine.each(views, |v| Ok(sh::colours(&scene.sh, Some(offsets), &v.view)))?;
+        let (engine, scene) = (self.engine, &self.scene.gaussians);
+        let changes = self.learned.changes();
+        let colours = engine.each(views, |v| Ok(sh::colours(&scene.sh, Some(changes), &v.view)))?;
         timing.lap(Stage::Colours);
         let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
         let pictures = engine.each(&drawn, |(v, colours)| v.draw(engine, colours))?;
@@ -193,8 +187,7 @@ impl<'a> Run<'a> {
         timing.lap(Stage::Backward);
         // One view after the other: sums in a fixed order.
         for ((v, colours), gradient) in views.iter().zip(&colours).zip(&gradients) {
-            let degree = scene.sh.degree;
-            sh::backward(degree, &v.view, colours, gradient, &mut self.gradient);
+            sh::backward(&self.learned.learnable, &v.view, colours, gradient, &mut self.gradient);
         }
         timing.lap(Stage::ShBackward);
         Ok(Step {
@@ -271,7 +264,7 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_the_loss() {
         let engine = engine();
-        let scene = sample(300, 2, 3).unwrap().gaussians;
+        let scene = sample(300, 2, 3).unwrap();
         let message = Message::parse("6", 4).unwrap();
         let mut settings = Preset::Draft.settings();
         (settings.views_per_step, settings.size) = (2, 40);
@@ -280,16 +273,19 @@ mod tests {
             ..settings.augmentation
         };
         let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let start: Vec<f32> = (0..scene.sh.coefficients.len())
+        let start: Vec<f32> = (0..scene.gaussians.sh.coefficients.len())
             .map(|_| 0.2 * (rng.random::<f32>() - 0.5))
             .collect();
         for (message_weight, weight) in [(1.0, 0.0), (0.0, 1.0), (0.5, 2.0)] {
             (settings.lambda.message, settings.lambda.reconstruction) = (message_weight, weight);
-            let sampler = ViewSampler::new(&scene, 1).unwrap();
-            let mut run = Run::new(&engine, &scene, &message, &settings, sampler);
-            let (views, _) = run.pool.batch(&engine, &scene).unwrap();
+            let sampler = ViewSampler::new(&scene.gaussians, 1).unwrap();
+            let (mut run, coverage) = Run::new(&engine, &scene, &message, &settings, sampler).unwrap();
+            let views = run.pool.batch(&engine, &scene.gaussians).unwrap();
+            // Offsets of Gaussians that no view shows have no slot.
+            let columns = run.learned.learnable.columns();
+            let start = start[..coverage.count() * columns].to_vec();
             let mut at = |offsets: Vec<f32>| {
-                run.offsets = offsets;
+                run.learned.values = offsets;
                 run.gradient.fill(0.0);
                 // The same augmentation every time.
                 run.augmentation = ChaCha8Rng::seed_from_u64(4);

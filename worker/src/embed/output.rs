@@ -41,6 +41,10 @@ pub struct Outcome {
     pub view_steps: usize,
     /// Gaussians of the scene.
     pub gaussians: usize,
+    /// Gaussians that training views show; the others were left alone.
+    pub seen: usize,
+    /// Training views that it took to find them.
+    pub covering_views: usize,
     /// Gaussians whose colours changed.
     pub changed: usize,
 }
@@ -57,11 +61,11 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     let scene = Scene::read(job.input)?;
     stop.check()?;
     let aside = reserve(job, &scene)?;
-    let optimised = optimise(engine, &scene.gaussians, job.message, job.settings, progress)?;
+    let optimised = optimise(engine, &scene, job.message, job.settings, progress)?;
 
     stop.check()?;
     progress(Progress::Writing);
-    let colours = optimised.colours(&scene.gaussians.sh);
+    let colours = optimised.learned.colours(&scene.gaussians.sh);
     // The new file is complete before it replaces the reserved one, so free that one's space first.
     std::fs::write(&aside, []).map_err(Error::io(job.output))?;
     scene.write(&aside, &colours).map_err(|e| named(e, job.output))?;
@@ -79,8 +83,6 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     if written {
         aside.persist(job.output).map_err(|e| Error::io(job.output)(e.error))?;
     }
-    let stride = scene.gaussians.sh.per_gaussian();
-    let rows = optimised.offsets.chunks_exact(stride);
     Ok(Outcome {
         verification,
         missed,
@@ -88,7 +90,9 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         steps: optimised.steps,
         view_steps: optimised.view_steps,
         gaussians: scene.gaussians.len(),
-        changed: rows.filter(|row| row.iter().any(|o| *o != 0.0)).count(),
+        seen: optimised.learned.learnable.rows().len(),
+        covering_views: optimised.covering_views,
+        changed: optimised.learned.changed(),
     })
 }
 
@@ -109,7 +113,7 @@ fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
     };
     let aside = tempfile::Builder::new()
         .prefix(".guardsplat-")
-        .suffix(".ply.part")
+        .suffix(".part")
         .tempfile_in(folder)
         .map_err(Error::io(job.output))?
         .into_temp_path();
@@ -127,8 +131,8 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// The error of the file aside, told of the output that the user knows.
-fn named(error: Error, output: &Path) -> Error {
-    match error {
+fn named(error: impl Into<Error>, output: &Path) -> Error {
+    match error.into() {
         Error::Io { source, .. } => Error::io(output)(source),
         Error::BadScene { reason, .. } => Error::BadScene {
             path: output.into(),
@@ -144,7 +148,7 @@ fn check_geometry(output: &Path, scene: &Scene, marked: &crate::scene::Gaussians
         && original.rotations == marked.rotations
         && original.log_scales == marked.log_scales
         && original.opacity_logits == marked.opacity_logits
-        && original.sh.degree == marked.sh.degree;
+        && original.sh.degree >= marked.sh.degree;
     if same {
         return Ok(());
     }

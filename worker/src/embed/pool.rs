@@ -1,5 +1,6 @@
 //! The views of each step: some never used before, the others drawn from those kept from earlier steps.
 //!
+//! The first ones are as many as show every Gaussian that can be seen; which these are is known from then on.
 //! Fixed sets of views are memorised instead of generalised from; always preparing all views anew wastes what a view
 //! keeps. So every step adds fresh views to the pool, and the oldest leave it.
 use std::collections::VecDeque;
@@ -15,6 +16,11 @@ use crate::picture::Picture;
 use crate::scene::Gaussians;
 use crate::splat::{PreparedView, prepare, sh};
 use crate::view::{Camera, Split, ViewSampler};
+
+/// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
+const NEWLY_SEEN: f64 = 1e-3;
+/// Most views that are looked at to find the Gaussians that can be seen.
+const MOST_COVERING: usize = 128;
 
 /// A view with what it looks like unmarked.
 pub(super) struct PooledView {
@@ -73,6 +79,22 @@ pub(super) struct Pool {
     picks: ChaCha8Rng,
 }
 
+/// Which Gaussians training views show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coverage {
+    /// Views that were looked at.
+    pub views: usize,
+    /// Whether any of them shows a Gaussian.
+    pub seen: Vec<bool>,
+}
+
+impl Coverage {
+    /// Gaussians that some view shows.
+    pub fn count(&self) -> usize {
+        self.seen.iter().filter(|seen| **seen).count()
+    }
+}
+
 impl Pool {
     pub fn new(sampler: ViewSampler, settings: &Settings) -> Self {
         let mut picks = ChaCha8Rng::seed_from_u64(settings.seed);
@@ -86,20 +108,36 @@ impl Pool {
         }
     }
 
-    /// The views of the next step; the first `fresh` of them are new. There are more fresh ones than the settings say
-    /// while the pool does not hold enough others.
-    pub fn batch(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<(Vec<Arc<PooledView>>, usize)> {
+    /// Fills the pool with the first views, as many as show every Gaussian that can be seen.
+    pub fn cover(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<Coverage> {
+        let mut seen = vec![false; gaussians.len()];
+        let (mut views, mut count) = (0, 0);
+        loop {
+            let made = self.make(engine, gaussians, self.settings.views_per_step)?;
+            views += made.len();
+            let mut new = 0;
+            for row in made.iter().flat_map(|view| &view.view.visible) {
+                let seen = &mut seen[*row as usize];
+                new += usize::from(!*seen);
+                *seen = true;
+            }
+            count += new;
+            self.keep(made);
+            if new as f64 <= NEWLY_SEEN * count as f64 || views >= MOST_COVERING {
+                return Ok(Coverage { views, seen });
+            }
+        }
+    }
+
+    /// The views of the next step. There are more fresh ones than the settings say while the pool does not hold enough
+    /// others, and none once there were as many as the settings allow.
+    pub fn batch(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<Vec<Arc<PooledView>>> {
         let s = &self.settings;
-        let old = (s.views_per_step - s.fresh_per_step).min(self.kept.len());
+        let enough = s.views.is_some_and(|views| self.kept.len() >= views);
+        let wanted = if enough { 0 } else { s.fresh_per_step };
+        let old = (s.views_per_step - wanted).min(self.kept.len());
         let fresh = s.views_per_step - old;
-        let wanted: Vec<u64> = (self.next..self.next + fresh as u64).collect();
-        let made = engine.each(&wanted, |&index| {
-            let camera = self.sampler.camera(Split::Training, index, s.size);
-            let (background, times) = self.chosen(index);
-            let view = PooledView::new(engine, gaussians, &camera, times, background)?;
-            Ok(Arc::new(view))
-        })?;
-        self.next += fresh as u64;
+        let made = self.make(engine, gaussians, fresh)?;
         let mut batch = made.clone();
         // A partial shuffle of the numbers of the kept views: all are distinct.
         let mut numbers: Vec<usize> = (0..self.kept.len()).collect();
@@ -108,7 +146,28 @@ impl Pool {
             numbers.swap(i, j);
             batch.push(self.kept[numbers[i]].clone());
         }
+        self.keep(made);
+        Ok(batch)
+    }
+
+    /// The next views; beyond the number that the settings allow it begins again with those that did not fit in memory.
+    fn make(&mut self, engine: &Engine, gaussians: &Gaussians, count: usize) -> Result<Vec<Arc<PooledView>>> {
+        let all = self.settings.views.map_or(u64::MAX, |views| views as u64);
+        let wanted: Vec<u64> = (self.next..self.next + count as u64).map(|i| i % all).collect();
+        let made = engine.each(&wanted, |&index| {
+            let camera = self.sampler.camera(Split::Training, index, self.settings.size);
+            let (background, times) = self.chosen(index);
+            let view = PooledView::new(engine, gaussians, &camera, times, background)?;
+            Ok(Arc::new(view))
+        })?;
+        self.next += count as u64;
+        Ok(made)
+    }
+
+    /// Keeps views, and lets the oldest go that are too many or too large.
+    fn keep(&mut self, made: Vec<Arc<PooledView>>) {
         self.kept.extend(made);
+        let s = &self.settings;
         let budget = s.pool_mebibytes << 20;
         let mut bytes: usize = self.kept.iter().map(|view| view.bytes()).sum();
         while self.kept.len() > s.pool_views || bytes > budget {
@@ -117,7 +176,6 @@ impl Pool {
             };
             bytes -= oldest.bytes();
         }
-        Ok((batch, fresh))
     }
 
     /// Background and enlargement of a training view, seeded: white, or black for a share of the views; drawn at up to

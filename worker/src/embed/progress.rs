@@ -50,6 +50,15 @@ pub struct Check {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "stage", rename_all = "snake_case")]
 pub enum Progress {
+    /// It is known which Gaussians training views show.
+    Covered {
+        /// Views that were looked at.
+        views: usize,
+        /// Gaussians that some of them shows: those that are learned.
+        seen: usize,
+        /// Gaussians of the scene.
+        gaussians: usize,
+    },
     /// A step is done.
     Step(Step),
     /// Held-out views were read.

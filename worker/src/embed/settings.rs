@@ -88,6 +88,9 @@ pub struct Settings {
     /// How many of them were never used before; the others are drawn from the pool. With 0 the first step's views are
     /// all there ever are.
     pub fresh_per_step: usize,
+    /// Most different training views; `None` has fresh ones at every step. Never fewer than it takes to show every
+    /// Gaussian that can be seen.
+    pub views: Option<usize>,
     /// Views that are kept for later steps; fresh ones replace the oldest.
     pub pool_views: usize,
     /// Memory for kept views, in MiB; the oldest go first.
@@ -160,6 +163,7 @@ impl Preset {
             steps: 400,
             views_per_step: 8,
             fresh_per_step: 4,
+            views: None,
             pool_views: 150,
             pool_mebibytes: 1024,
             size: 160,
@@ -292,6 +296,9 @@ impl Settings {
             0.0,
             self.views_per_step as f64,
         )?;
+        if let Some(views) = self.views {
+            within("views", views as f64, self.views_per_step as f64, 1e6)?;
+        }
         count("pool_views", self.pool_views, 1_000_000)?;
         within("size", f64::from(self.size), 16.0, 4096.0)?;
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;

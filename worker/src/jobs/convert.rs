@@ -66,7 +66,10 @@ pub fn embedding_progress(progress: &embed::Progress) -> Option<api::Progress> {
             ..stage(Stage::Optimising, step.step, step.total)
         }),
         embed::Progress::Verifying { done, total } => Some(stage(Stage::Reading, *done, *total)),
-        embed::Progress::Check(_) | embed::Progress::Stopped { .. } | embed::Progress::Writing => None,
+        embed::Progress::Covered { .. }
+        | embed::Progress::Check(_)
+        | embed::Progress::Stopped { .. }
+        | embed::Progress::Writing => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! What every rasteriser must do: run for the CPU here and for the GPU in its module.
 use super::compare::GradientError;
-use super::{CpuRasterizer, PreparedView, Rasterizer, WeightCache, extremes, prepare, reference, sh};
+use super::{CpuRasterizer, Learnable, PreparedView, Rasterizer, WeightCache, extremes, prepare, reference, sh};
 use crate::scene::{Gaussians, Scene, Sh};
 use crate::testing::scene_path;
 use crate::view::Camera;
@@ -93,7 +93,7 @@ fn agrees(rasterizer: &dyn Rasterizer, cache: WeightCache, g: &Gaussians, camera
     let single: Vec<f32> = picture_gradient.iter().map(|v| *v as f32).collect();
     let colour_gradient = rasterizer.backward(&view, &single).unwrap();
     let mut got = vec![0.0; g.sh.coefficients.len()];
-    sh::backward(g.sh.degree, &view, &colours, &colour_gradient, &mut got);
+    sh::backward(&Learnable::all(g), &view, &colours, &colour_gradient, &mut got);
     let error = GradientError::new(&got, &reference::gradient(g, camera, &picture_gradient));
     println!(
         "{} {cache:?}, {} Gaussians, {} px: pixels {worst:.1e} ({:.2} % uncertain: {worst_uncertain:.1e}), \
@@ -156,7 +156,7 @@ fn cached_and_fresh_weights_give_the_same_bytes() {
         let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
         let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
         let mut all = vec![0.0f32; g.sh.coefficients.len()];
-        sh::backward(1, &view, &colours, &gradient, &mut all);
+        sh::backward(&Learnable::all(&g), &view, &colours, &gradient, &mut all);
         (view, picture, all)
     };
     let (plain, kept) = (run(WeightCache::None), run(WeightCache::Weights));
@@ -187,7 +187,7 @@ fn the_number_of_threads_changes_nothing() {
             let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
             let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
             let mut all = vec![0.0f32; g.sh.coefficients.len()];
-            sh::backward(2, &view, &colours, &gradient, &mut all);
+            sh::backward(&Learnable::all(&g), &view, &colours, &gradient, &mut all);
             (view, picture, all)
         })
     };

@@ -1,6 +1,6 @@
 //! Scenes at the limits of what is legal, and the outcome that each must have.
 use super::checks::{BACKGROUND, camera, scene};
-use super::{PreparedView, Rasterizer, WeightCache, prepare, sh};
+use super::{Learnable, PreparedView, Rasterizer, WeightCache, prepare, sh};
 use crate::scene::Gaussians;
 
 /// Needles, discs, pixel-small ones, saturated and faint ones, zero quaternions, colours far out of range, some
@@ -36,7 +36,7 @@ pub(super) fn all(rasterizer: &dyn Rasterizer, cache: WeightCache) {
         let pixels = rasterizer.render(&view, &colours, BACKGROUND).unwrap().pixels;
         let colour_gradient = rasterizer.backward(&view, &vec![1.0; pixels.len()]).unwrap();
         let mut gradient = vec![0.0; g.sh.coefficients.len()];
-        sh::backward(g.sh.degree, &view, &colours, &colour_gradient, &mut gradient);
+        sh::backward(&Learnable::all(g), &view, &colours, &colour_gradient, &mut gradient);
         assert!(pixels.iter().chain(&gradient).all(|v| v.is_finite()));
         (view, pixels, gradient)
     };

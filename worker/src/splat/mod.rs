@@ -11,6 +11,7 @@ mod cpu;
 mod extremes;
 mod gpu;
 mod kernels;
+mod learnable;
 mod prepare;
 mod project;
 pub mod reference;
@@ -25,6 +26,7 @@ use crate::picture::Picture;
 
 pub use cpu::CpuRasterizer;
 pub use gpu::GpuRasterizer;
+pub use learnable::{Changes, Learnable};
 pub use prepare::{PreparedView, WeightCache, prepare};
 pub use project::Splat2d;
 pub use tiles::{MAX_PAIRS, TILE, TileLists};

@@ -1,5 +1,5 @@
 //! Spherical harmonics: from coefficients to the colour seen from a direction, and the gradient back.
-use super::PreparedView;
+use super::{Changes, Learnable, PreparedView};
 use crate::scene::Sh;
 use rayon::prelude::*;
 
@@ -80,9 +80,9 @@ pub fn basis(degree: usize, dir: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
 
 /// Colours of the visible Gaussians of `view`, `[visible][3]`: `max(0, SH(direction) + 0.5)`.
 ///
-/// `offsets`, laid out as `sh.coefficients` (`[n][(degree+1)^2][3]`), are added to the coefficients first.
-/// `view` must have been prepared from a scene of as many Gaussians as `sh` has.
-pub fn colours(sh: &Sh, offsets: Option<&[f32]>, view: &PreparedView) -> Vec<f32> {
+/// `changes` are added to the coefficients first. `view` must have been prepared from a scene of as many Gaussians as
+/// `sh` has.
+pub fn colours(sh: &Sh, changes: Option<Changes<'_>>, view: &PreparedView) -> Vec<f32> {
     let stride = sh.per_gaussian();
     let mut out = vec![0.0; view.visible.len() * 3];
     let work = |((out, &row), &dir): ((&mut [f32], &u32), &[f32; 3])| {
@@ -90,21 +90,16 @@ pub fn colours(sh: &Sh, offsets: Option<&[f32]>, view: &PreparedView) -> Vec<f32
         let at = row as usize * stride;
         let mut c = [0.5f32; 3];
         let coefficients = &sh.coefficients[at..at + stride];
-        match offsets {
-            None => {
-                for (k, h) in coefficients.chunks_exact(3).enumerate() {
-                    for j in 0..3 {
-                        c[j] += b[k] * h[j];
-                    }
-                }
+        let changed = changes.and_then(|changes| changes.of(row)).unwrap_or_default();
+        let (both, plain) = coefficients.split_at(changed.len());
+        for (k, (h, o)) in both.chunks_exact(3).zip(changed.chunks_exact(3)).enumerate() {
+            for j in 0..3 {
+                c[j] += b[k] * (h[j] + o[j]);
             }
-            Some(offsets) => {
-                let o = &offsets[at..at + stride];
-                for (k, (h, o)) in coefficients.chunks_exact(3).zip(o.chunks_exact(3)).enumerate() {
-                    for j in 0..3 {
-                        c[j] += b[k] * (h[j] + o[j]);
-                    }
-                }
+        }
+        for (k, h) in plain.chunks_exact(3).enumerate() {
+            for j in 0..3 {
+                c[j] += b[changed.len() / 3 + k] * h[j];
             }
         }
         for j in 0..3 {
@@ -118,26 +113,24 @@ pub fn colours(sh: &Sh, offsets: Option<&[f32]>, view: &PreparedView) -> Vec<f32
     out
 }
 
-/// Adds to `sh_gradient` (`[n][(degree+1)^2][3]`) what `colour_gradient` (`[visible][3]`) means for the coefficients.
+/// Adds to `out` (`[slots][columns]`) what `colour_gradient` (`[visible][3]`) means for the learned coefficients.
 ///
 /// `colours` are those that [`colours`] returned: where one is 0 it was clamped, and its gradient is 0.
-pub fn backward(degree: usize, view: &PreparedView, colours: &[f32], colour_gradient: &[f32], sh_gradient: &mut [f32]) {
+pub fn backward(learnable: &Learnable, view: &PreparedView, colours: &[f32], colour_gradient: &[f32], out: &mut [f32]) {
     let part = Part {
-        degree,
-        stride: 3 * (degree + 1) * (degree + 1),
+        learnable,
         visible: &view.visible,
         directions: &view.directions,
         colours,
         colour_gradient,
     };
-    part.add(0, sh_gradient);
+    part.add(0, out);
 }
 
-/// A range of the visible Gaussians; ranges own disjoint rows of the gradient because `visible` ascends.
+/// A range of the visible Gaussians; ranges own disjoint slots of the gradient because `visible` and slots ascend.
 #[derive(Clone, Copy)]
 struct Part<'a> {
-    degree: usize,
-    stride: usize,
+    learnable: &'a Learnable,
     visible: &'a [u32],
     directions: &'a [[f32; 3]],
     colours: &'a [f32],
@@ -145,15 +138,17 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// `out` starts at the row `first` of the scene.
+    /// `out` starts at the slot `first`.
     fn add(self, first: usize, out: &mut [f32]) {
-        let n = self.visible.len();
+        let (n, columns) = (self.visible.len(), self.learnable.columns());
         if n > 4096 {
             let at = n / 2;
-            let row = self.visible[at] as usize;
+            // Where the later part's first slot is; without one it has nothing to add to.
+            let slot = self.visible[at..].iter().find_map(|row| self.learnable.slot(*row));
+            let slot = slot.unwrap_or(first + out.len() / columns);
             let (v, d) = (self.visible.split_at(at), self.directions.split_at(at));
             let (c, g) = (self.colours.split_at(3 * at), self.colour_gradient.split_at(3 * at));
-            let (low, high) = out.split_at_mut((row - first) * self.stride);
+            let (low, high) = out.split_at_mut((slot - first) * columns);
             let left = Part {
                 visible: v.0,
                 directions: d.0,
@@ -168,7 +163,7 @@ impl Part<'_> {
                 colour_gradient: g.1,
                 ..self
             };
-            rayon::join(|| left.add(first, low), || right.add(row, high));
+            rayon::join(|| left.add(first, low), || right.add(slot, high));
             return;
         }
         for i in 0..n {
@@ -181,9 +176,12 @@ impl Part<'_> {
             if g == [0.0; 3] {
                 continue;
             }
-            let b = basis(self.degree, self.directions[i]);
-            let at = (self.visible[i] as usize - first) * self.stride;
-            for (k, out) in out[at..at + self.stride].chunks_exact_mut(3).enumerate() {
+            let Some(slot) = self.learnable.slot(self.visible[i]) else {
+                continue;
+            };
+            let b = basis(self.learnable.degree(), self.directions[i]);
+            let at = (slot - first) * columns;
+            for (k, out) in out[at..at + columns].chunks_exact_mut(3).enumerate() {
                 for j in 0..3 {
                     out[j] += b[k] * g[j];
                 }

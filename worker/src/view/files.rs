@@ -62,7 +62,8 @@ pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<()> {
     write_whole(path, |out| {
         serde_json::to_writer_pretty(&mut *out, &value)?;
         out.write_all(b"\n")
-    })
+    })?;
+    Ok(())
 }
 
 fn parse(text: &[u8]) -> Result<Vec<Camera>, String> {
