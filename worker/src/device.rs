@@ -41,6 +41,8 @@ pub struct Compute {
     pub name: String,
     /// Whether it is a real GPU.
     pub is_gpu: bool,
+    /// Bytes of the largest buffer that a kernel can be given, where there is a limit.
+    pub max_buffer: Option<u64>,
 }
 
 /// Opens the device that was chosen. A process opens wgpu once; later calls get the same one.
@@ -62,6 +64,7 @@ fn cpu() -> Compute {
         device: Device::flex(),
         name: "cpu".into(),
         is_gpu: false,
+        max_buffer: None,
     }
 }
 
@@ -78,10 +81,12 @@ fn open_wgpu() -> Result<Compute> {
         let (device, setup) = options.init_with_setup().map_err(|e| e.to_string())?;
         let info = setup.adapter.get_info();
         let name = format!("wgpu: {} ({})", info.name, info.driver_info);
+        let limits = setup.device.limits();
         Ok(Compute {
             device,
             name,
             is_gpu: is_gpu(&info),
+            max_buffer: Some(limits.max_buffer_size.min(limits.max_storage_buffer_binding_size)),
         })
     });
     opened.clone().map_err(|reason| Error::Device {

@@ -64,6 +64,12 @@ pub enum Error {
         /// What is wrong, with the limit.
         reason: String,
     },
+    /// The job takes more memory than there is.
+    #[error("the scene does not fit: {reason}")]
+    DoesNotFit {
+        /// What is needed and what there is, in numbers.
+        reason: String,
+    },
     /// The compute device is missing or failed.
     #[error("device {device}: {reason}")]
     Device {

@@ -39,6 +39,9 @@ pub(crate) trait Container: Debug + Send + Sync {
     /// Which format.
     fn format(&self) -> Format;
 
+    /// Bytes of the file that are in memory.
+    fn bytes(&self) -> usize;
+
     /// Whether [`keep`](Self::keep) leaves every finite coefficient as it is.
     fn exact(&self) -> bool {
         true

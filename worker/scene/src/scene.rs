@@ -107,6 +107,11 @@ impl Scene {
         self.source.as_ref().map_or(Format::Ply, |source| source.format())
     }
 
+    /// Bytes of the file that are in memory, uncompressed.
+    pub fn file_bytes(&self) -> usize {
+        self.source.as_ref().map_or(0, |source| source.bytes())
+    }
+
     /// Whether a written file keeps every finite colour as it is. Otherwise [`Scene::keep`] tells what it keeps.
     pub fn exact(&self) -> bool {
         self.source.as_ref().is_none_or(|source| source.exact())

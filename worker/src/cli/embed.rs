@@ -5,6 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verification, embed};
+use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Key;
 use guardsplat_worker::quality::{Quality, write_picture};
 use guardsplat_worker::{Error, Result};
@@ -79,6 +80,9 @@ struct Report<'a> {
     seen_gaussians: usize,
     changed_gaussians: usize,
     covering_views: usize,
+    predicted_memory_bytes: u64,
+    predicted_memory: Memory,
+    peak_memory_bytes: Option<u64>,
     written: bool,
     target_missed: &'a [String],
 }
@@ -95,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         open(arguments.device)?,
         true,
     )?;
-    if settings.lambda.lpips > 0.0 && engine.lpips.is_none() {
+    if settings.lambda.lpips > 0.0 && !engine.has_lpips() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
     }
     let job = Job {
@@ -142,6 +146,7 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
                 step.terms.message
             )
         }),
+        Progress::Admitted(memory) => display.say(&format!("memory: {memory}")),
         Progress::Covered { views, seen, gaussians } => display.say(&format!(
             "{seen} of {gaussians} Gaussians can be seen, as {views} views show; the others are left alone"
         )),
@@ -190,6 +195,9 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
         seen_gaussians: outcome.seen,
         changed_gaussians: outcome.changed,
         covering_views: outcome.covering_views,
+        predicted_memory_bytes: outcome.memory.total(),
+        predicted_memory: outcome.memory,
+        peak_memory_bytes: guardsplat_worker::memory::peak(),
         written: outcome.written,
         target_missed: &outcome.missed,
     };

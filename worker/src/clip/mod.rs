@@ -52,6 +52,11 @@ pub struct Clip {
 }
 
 impl Clip {
+    /// Numbers of the towers that are loaded.
+    pub fn parameters(&self) -> usize {
+        self.model.num_params()
+    }
+
     /// Loads `config.json` and `model.safetensors` (or `open_clip_config.json` and `open_clip_model.safetensors`)
     /// from a folder.
     ///

@@ -66,13 +66,14 @@ impl<'a> Loss<'a> {
         let l1 = (marked.clone() - original.clone()).abs().mean();
         let ssim = -self.ssim.mean(original.clone(), marked.clone()) + 1.0;
         let mut reconstruction = l1.clone() * lambda.l1 + ssim.clone() * lambda.ssim;
-        let lpips = match &self.engine.lpips {
-            Some(lpips) if lambda.lpips > 0.0 => {
+        let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
+        let lpips = match lpips {
+            Some(lpips) => {
                 let distance = lpips.per_view(original, marked.clone())?.mean();
                 reconstruction = reconstruction + distance.clone() * lambda.lpips;
                 Some(distance)
             }
-            _ => None,
+            None => None,
         };
         let seen = self.settings.augmentation.apply(marked, rng);
         let logits = self.engine.logits(seen);

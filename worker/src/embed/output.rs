@@ -3,12 +3,14 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
+use super::needs::{SceneSize, ViewSize, needs};
 use super::optimise::optimise;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::verify::{Verification, verify};
 use crate::error::{Error, Result};
 use crate::extract::Engine;
+use crate::memory::Memory;
 use crate::message::Message;
 use crate::scene::Scene;
 
@@ -39,6 +41,8 @@ pub struct Outcome {
     pub steps: usize,
     /// Views drawn in all steps.
     pub view_steps: usize,
+    /// Memory that was predicted.
+    pub memory: Memory,
     /// Gaussians of the scene.
     pub gaussians: usize,
     /// Gaussians that training views show; the others were left alone.
@@ -60,6 +64,8 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     stop.check()?;
     let scene = Scene::read(job.input)?;
     stop.check()?;
+    let memory = admit(engine, &scene, job.settings)?;
+    progress(Progress::Admitted(memory));
     let aside = reserve(job, &scene)?;
     let optimised = optimise(engine, &scene, job.message, job.settings, progress)?;
 
@@ -90,10 +96,20 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         steps: optimised.steps,
         view_steps: optimised.view_steps,
         gaussians: scene.gaussians.len(),
+        memory,
         seen: optimised.learned.learnable.rows().len(),
         covering_views: optimised.covering_views,
         changed: optimised.learned.changed(),
     })
+}
+
+/// Predicts what memory the job will need, and refuses one that does not fit.
+fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<Memory> {
+    let view = ViewSize::measure(engine, &scene.gaussians, settings)?;
+    let models = engine.model_bytes(settings.lambda.lpips > 0.0);
+    let memory = needs(SceneSize::of(scene), view, settings, models);
+    engine.limits.admit(&memory)?;
+    Ok(memory)
 }
 
 /// A file beside the output that holds as much as the output will. A folder that is missing, read-only or full is

@@ -44,7 +44,7 @@ impl PooledView {
         let camera = camera.enlarged(times);
         let view = prepare(gaussians, &camera, engine.weight_cache(camera.width))?;
         let colours = sh::colours(&gaussians.sh, None, &view);
-        let reference = engine.rasterizer.render(&view, &colours, background)?.shrunk(times);
+        let reference = engine.rasterizer()?.render(&view, &colours, background)?.shrunk(times);
         Ok(Self {
             view,
             background,
@@ -55,14 +55,14 @@ impl PooledView {
 
     /// The picture with these colours of the visible Gaussians.
     pub fn draw(&self, engine: &Engine, colours: &[f32]) -> Result<Picture> {
-        let picture = engine.rasterizer.render(&self.view, colours, self.background)?;
+        let picture = engine.rasterizer()?.render(&self.view, colours, self.background)?;
         Ok(picture.shrunk(self.times))
     }
 
     /// Takes a gradient to the picture back to these colours.
     pub fn backward(&self, engine: &Engine, gradient: &Picture) -> Result<Vec<f32>> {
         let gradient = gradient.spread(self.times);
-        engine.rasterizer.backward(&self.view, &gradient.pixels)
+        engine.rasterizer()?.backward(&self.view, &gradient.pixels)
     }
 
     fn bytes(&self) -> usize {

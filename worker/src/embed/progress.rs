@@ -1,6 +1,8 @@
 //! What an embedding tells whoever watches it.
 use serde::Serialize;
 
+use crate::memory::Memory;
+
 /// Unweighted terms of the loss, means over the views of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Terms {
@@ -50,6 +52,8 @@ pub struct Check {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "stage", rename_all = "snake_case")]
 pub enum Progress {
+    /// The scene was read, and the job fits in memory; this much it will need.
+    Admitted(Memory),
     /// It is known which Gaussians training views show.
     Covered {
         /// Views that were looked at.

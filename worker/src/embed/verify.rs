@@ -55,7 +55,7 @@ pub fn verify(
         pairs.push((before?, after));
         done(index + 1);
     }
-    let quality = measure(&pairs, engine.lpips.as_ref(), &engine.compute.device, &engine.stop)?;
+    let quality = measure(&pairs, engine.lpips()?, &engine.compute.device, &engine.stop)?;
     pairs.truncate(KEPT_PAIRS);
     let reading = Reading::new(logits)?;
     let read = reading.of_first(settings.verify.message_views)?.message()?;

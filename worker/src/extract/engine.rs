@@ -1,10 +1,14 @@
 //! The parts that embedding and extraction share: device, CLIP, a key's decoder and the renderer.
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
+use crate::memory::Limits;
 use crate::message::{Key, Reader};
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch};
@@ -44,10 +48,14 @@ pub struct Engine {
     pub reader: Reader,
     /// Bits of the key's messages.
     pub bits: usize,
-    /// The renderer.
-    pub rasterizer: Box<dyn Rasterizer>,
-    /// Perceptual distance, where its weights are.
-    pub lpips: Option<Lpips>,
+    /// The renderer, from its first use on: pictures are read without it.
+    rasterizer: OnceLock<Box<dyn Rasterizer>>,
+    /// Where the weights of the perceptual distance are, if they were added.
+    lpips_weights: Option<PathBuf>,
+    /// The perceptual distance, from its first use on.
+    lpips: OnceLock<Lpips>,
+    /// What a job may take of the machine's memory.
+    pub limits: Limits,
     /// Ends whatever is being computed, with [`Error::Stopped`](crate::Error::Stopped).
     pub stop: Stop,
 }
@@ -57,8 +65,8 @@ impl Engine {
     /// ([`Key::require_clip`]), who knows their files.
     ///
     /// # Errors
-    /// When the device cannot render, or features and decoder differ in width.
-    pub fn new(compute: Compute, clip: Clip, key: &Key, lpips: Option<Lpips>) -> Result<Self> {
+    /// When features and decoder differ in width.
+    pub fn new(compute: Compute, clip: Clip, key: &Key, lpips_weights: Option<PathBuf>) -> Result<Self> {
         if clip.dim() != key.projection.width {
             return Err(Error::BadModel {
                 name: key.clip.name.clone(),
@@ -70,14 +78,60 @@ impl Engine {
             });
         }
         Ok(Self {
-            rasterizer: rasterizer(&compute)?,
+            rasterizer: OnceLock::new(),
             reader: key.reader(&compute.device),
             bits: key.bits(),
+            limits: Limits {
+                buffer: compute.max_buffer,
+                ..Limits::of_machine(None)
+            },
             compute,
             clip,
-            lpips,
+            lpips_weights,
+            lpips: OnceLock::new(),
             stop: Stop::default(),
         })
+    }
+
+    /// The renderer.
+    ///
+    /// # Errors
+    /// When the device cannot render.
+    pub fn rasterizer(&self) -> Result<&dyn Rasterizer> {
+        if self.rasterizer.get().is_none() {
+            // Another thread may have been faster, which is as good.
+            let _ = self.rasterizer.set(rasterizer(&self.compute)?);
+        }
+        self.rasterizer.get().map(AsRef::as_ref).ok_or_else(|| Error::Device {
+            device: self.compute.name.clone(),
+            reason: "the renderer could not be made".into(),
+        })
+    }
+
+    /// Whether the weights of the perceptual distance were added.
+    pub fn has_lpips(&self) -> bool {
+        self.lpips_weights.is_some()
+    }
+
+    /// The perceptual distance, where its weights were added. They are read at the first call.
+    ///
+    /// # Errors
+    /// When the weights are not those that are expected.
+    pub fn lpips(&self) -> Result<Option<&Lpips>> {
+        let Some(path) = &self.lpips_weights else {
+            return Ok(None);
+        };
+        if self.lpips.get().is_none() {
+            let _ = self.lpips.set(Lpips::load(path, &self.compute.device)?);
+        }
+        Ok(self.lpips.get())
+    }
+
+    /// Bytes of the weights of all models that a job uses; `with_lpips` says whether that is one of them.
+    pub fn model_bytes(&self, with_lpips: bool) -> u64 {
+        let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
+        let lpips = self.lpips_weights.as_ref().filter(|_| with_lpips).map_or(0, size);
+        4 * (self.clip.parameters() + self.reader.parameters()) as u64 + lpips
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]` in [0, 1]; differentiable in the pictures.
@@ -130,7 +184,7 @@ impl Engine {
         self.stop.check()?;
         let view = prepare(gaussians, camera, WeightCache::None)?;
         let colours = sh::colours(&gaussians.sh, None, &view);
-        Ok(self.rasterizer.render(&view, &colours, background)?.to_8_bit())
+        Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
     }
 
     /// `work` on each item, in order. On the CPU items run side by side; a GPU has one queue, and waiting for it on

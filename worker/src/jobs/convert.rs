@@ -66,7 +66,8 @@ pub fn embedding_progress(progress: &embed::Progress) -> Option<api::Progress> {
             ..stage(Stage::Optimising, step.step, step.total)
         }),
         embed::Progress::Verifying { done, total } => Some(stage(Stage::Reading, *done, *total)),
-        embed::Progress::Covered { .. }
+        embed::Progress::Admitted(_)
+        | embed::Progress::Covered { .. }
         | embed::Progress::Check(_)
         | embed::Progress::Stopped { .. }
         | embed::Progress::Writing => None,
@@ -154,6 +155,8 @@ pub fn failure(error: &Error) -> (api::Failure, bool) {
             EngineError::BadScene { .. } | EngineError::BadPicture { .. } | EngineError::BadOption { .. } => {
                 (Reason::InvalidInput, false)
             }
+            // Another worker may have more memory, but nothing says that one is there.
+            EngineError::DoesNotFit { .. } => (Reason::InvalidInput, false),
             EngineError::Device { .. } => (Reason::WorkerLost, true),
             // The same numbers come out next time.
             EngineError::NotFinite { .. } => (Reason::Internal, false),

@@ -124,6 +124,11 @@ impl AffineMap {
         }
     }
 
+    /// Numbers that it holds.
+    pub(super) fn parameters(&self) -> usize {
+        self.mean.shape().num_elements() + self.matrix.shape().num_elements()
+    }
+
     /// Maps `[b, width]` to `[b, rank]`.
     pub fn apply(&self, features: Tensor<2>) -> Tensor<2> {
         (features - self.mean.clone()).matmul(self.matrix.clone())

@@ -1,4 +1,5 @@
 //! Reads logits from CLIP features with a key's projection and decoder: what embedding and extraction share.
+use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use super::decoder::{Decoder, DecoderWeights};
@@ -21,6 +22,11 @@ impl Reader {
             text: projection.text_map(&device),
             decoder: Decoder::new(decoder, &device),
         }
+    }
+
+    /// Numbers that it holds.
+    pub fn parameters(&self) -> usize {
+        self.image.parameters() + self.text.parameters() + self.decoder.num_params()
     }
 
     /// Logits `[b, bits]` of L2-normalised image features `[b, width]`.

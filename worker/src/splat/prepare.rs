@@ -60,7 +60,12 @@ impl PreparedView {
     /// Memory that the view holds, in bytes.
     pub fn bytes(&self) -> usize {
         let per_visible = size_of::<u32>() + size_of::<Splat2d>() + size_of::<[f32; 3]>();
-        self.visible.len() * per_visible + self.tiles.bytes() + self.weights.as_ref().map_or(0, SparseWeights::bytes)
+        self.visible.len() * per_visible + self.tiles.bytes() + self.weight_bytes()
+    }
+
+    /// Memory of the cached weights, in bytes.
+    pub fn weight_bytes(&self) -> usize {
+        self.weights.as_ref().map_or(0, SparseWeights::bytes)
     }
 
     /// Number of cached weights, if they are cached.

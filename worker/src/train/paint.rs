@@ -78,6 +78,7 @@ mod tests {
             device: device.clone(),
             name: "cpu".into(),
             is_gpu: false,
+            max_buffer: None,
         };
         let config = crate::train::config();
         let model = ClipModel::init(&config, Parts::Image, &device, 3);

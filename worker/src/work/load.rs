@@ -1,5 +1,5 @@
-//! Loads what embedding and verifying need: CLIP, LPIPS, and the engine for a key.
-use std::path::Path;
+//! Loads what embedding and verifying need: CLIP, and the engine for a key, which loads the rest when it is used.
+use std::path::{Path, PathBuf};
 
 use guardsplat_worker::Result;
 use guardsplat_worker::clip::{Clip, Parts};
@@ -7,7 +7,6 @@ use guardsplat_worker::device::Compute;
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::{ClipIdentity, Key};
 use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
-use guardsplat_worker::quality::Lpips;
 
 /// What the CLIP in the repository is called.
 pub const SHIPPED: &str = "guardsplat";
@@ -27,17 +26,11 @@ pub fn clip(name: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip
     Ok((clip, identity))
 }
 
-/// LPIPS, where its weights were added.
-pub fn lpips(compute: &Compute) -> Result<Option<Lpips>> {
-    let models = match Models::open() {
-        Ok(models) => models,
-        // Without a data folder nothing was added.
-        Err(_) => return Ok(None),
-    };
-    match models.dir(LPIPS) {
-        Ok(dir) => Lpips::load(&dir.join(WEIGHTS), &compute.device).map(Some),
-        Err(_) => Ok(None),
-    }
+/// Where the weights of LPIPS are, if they were added.
+fn lpips() -> Option<PathBuf> {
+    // Without a data folder nothing was added.
+    let folder = Models::open().ok()?.dir(LPIPS).ok()?;
+    Some(folder.join(WEIGHTS))
 }
 
 /// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names. `path` names the
@@ -46,6 +39,6 @@ pub fn engine(path: &Path, key: &Key, clip_name: Option<&str>, compute: Compute,
     let name = clip_name.unwrap_or(&key.clip.name);
     let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
     key.require_clip(path, &identity)?;
-    let lpips = if with_lpips { lpips(&compute)? } else { None };
+    let lpips = if with_lpips { lpips() } else { None };
     Engine::new(compute, clip, key, lpips)
 }

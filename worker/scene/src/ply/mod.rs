@@ -58,6 +58,10 @@ impl Container for Ply {
         Format::Ply
     }
 
+    fn bytes(&self) -> usize {
+        self.header.len() + self.body.len()
+    }
+
     fn write(&self, sh: &Sh, mut out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&self.header)?;
         body::encode(&self.layout, &self.body, sh, &mut out)

@@ -1,0 +1,128 @@
+//! How much memory an embedding will need.
+use super::pool::PooledView;
+use super::settings::Settings;
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::memory::Memory;
+use crate::scene::{Gaussians, Scene};
+use crate::view::{Split, ViewSampler};
+
+/// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
+const GEOMETRY: u64 = 11;
+/// Bytes that allocation wastes between views of different sizes that come and go, as a share of theirs.
+const FRAGMENTS: f64 = 0.12;
+/// Pictures of a step, as large as those that CLIP sees, that differentiation keeps for each view: L1, SSIM with its
+/// five windowed means, and the augmentation.
+const KEPT_PICTURES: u64 = 40;
+/// Bytes that a rasteriser's thread works in.
+const SCRATCH: u64 = 8 << 20;
+
+/// What of a scene decides how much memory it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneSize {
+    /// Gaussians.
+    pub gaussians: u64,
+    /// Degree of the spherical harmonics in use.
+    pub degree: u64,
+    /// Degree that is learned.
+    pub learned_degree: u64,
+    /// Whether the file keeps colours as they are.
+    pub exact: bool,
+    /// Bytes of the file, uncompressed.
+    pub file: u64,
+}
+
+impl SceneSize {
+    /// Of a scene that was read.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            gaussians: scene.gaussians.len() as u64,
+            degree: scene.gaussians.sh.degree as u64,
+            learned_degree: scene.learnable_degree() as u64,
+            exact: scene.exact(),
+            file: scene.file_bytes() as u64,
+        }
+    }
+
+    /// Bytes of the scene in memory: its file, and its numbers.
+    pub fn bytes(&self) -> u64 {
+        self.file + 4 * self.gaussians * (GEOMETRY + coefficients(self.degree))
+    }
+}
+
+fn coefficients(degree: u64) -> u64 {
+    3 * (degree + 1) * (degree + 1)
+}
+
+/// Bytes of prepared views: what all have alike, and what grows with their pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewSize {
+    /// Of the Gaussians that a view shows.
+    pub visible: f64,
+    /// Of a pixel that is drawn.
+    pub pixel: f64,
+}
+
+impl ViewSize {
+    /// Measured on one training view of the largest size.
+    ///
+    /// # Errors
+    /// An empty scene, a failing device.
+    pub fn measure(engine: &Engine, gaussians: &Gaussians, settings: &Settings) -> Result<Self> {
+        let sampler = ViewSampler::new(gaussians, settings.seed)?;
+        let camera = sampler.camera(Split::Training, 0, settings.size);
+        let view = PooledView::new(engine, gaussians, &camera, settings.enlarged, [1.0; 3])?.view;
+        let weights = view.weight_bytes() as f64;
+        let side = f64::from(settings.size * settings.enlarged);
+        Ok(Self {
+            visible: view.bytes() as f64 - weights,
+            pixel: weights / (side * side),
+        })
+    }
+
+    /// Mean bytes of a training view: it is drawn at 1 to so many times its size.
+    fn mean(&self, settings: &Settings) -> f64 {
+        let times = f64::from(settings.enlarged);
+        let mean_square = (times + 1.0) * (2.0 * times + 1.0) / 6.0;
+        let pixels = f64::from(settings.size).powi(2);
+        // Its reference picture besides.
+        self.visible + pixels * (self.pixel * mean_square + 12.0)
+    }
+}
+
+/// Predicts the most memory that an embedding has in use at once.
+pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: u64) -> Memory {
+    let threads = rayon::current_num_threads() as u64;
+    let learned = 4 * scene.gaussians * coefficients(scene.learned_degree);
+    let mean = view.mean(settings);
+    let kept = (settings.pool_views as f64 * mean).min((settings.pool_mebibytes << 20) as f64);
+    // A step's views may have left the pool, or not have come into it; those of the early stop stay.
+    let in_hand = settings.views_per_step as f64 * mean;
+    let pixels = f64::from(settings.size).powi(2);
+    let held_out = settings.early_stop.map_or(0.0, |stop| stop.views as f64) * (view.visible + pixels * view.pixel);
+    let largest = f64::from(settings.size * settings.enlarged).powi(2);
+    let drawn = 2.0 * 12.0 * largest * settings.views_per_step as f64;
+    let picture = 12 * u64::from(settings.size).pow(2);
+    let optimising = Memory {
+        models,
+        scene: scene.bytes(),
+        offsets: 2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians,
+        optimiser: 2 * learned + 4 * scene.gaussians,
+        views: ((1.0 + FRAGMENTS) * (kept + in_hand + held_out)) as u64,
+        pictures: drawn as u64 + settings.views_per_step as u64 * KEPT_PICTURES * picture + threads * SCRATCH,
+        ..Memory::of_program()
+    };
+    // When the marked scene is verified, views and optimiser are gone, and there are two scenes.
+    let verifying = Memory {
+        models,
+        scene: 2 * scene.bytes(),
+        offsets: optimising.offsets - learned,
+        pictures: 2 * settings.verify.views as u64 * picture + threads * SCRATCH,
+        ..Memory::of_program()
+    };
+    if optimising.total() >= verifying.total() {
+        optimising
+    } else {
+        verifying
+    }
+}
