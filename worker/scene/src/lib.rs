@@ -5,7 +5,10 @@
 mod container;
 mod error;
 mod gaussians;
+mod packed;
 mod ply;
+mod range;
+mod rest;
 mod scene;
 #[doc(hidden)]
 pub mod testing;
