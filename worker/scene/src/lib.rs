@@ -10,6 +10,7 @@ mod ply;
 mod range;
 mod rest;
 mod scene;
+mod splat;
 #[doc(hidden)]
 pub mod testing;
 mod whole;

@@ -14,7 +14,6 @@ pub(crate) struct Range {
 
 impl Range {
     /// Colours from black to white.
-    #[cfg(test)]
     pub const UNIT: Range = Range { min: 0.0, max: 1.0 };
 
     /// What `value` of 0 to `top` stands for.

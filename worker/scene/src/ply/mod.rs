@@ -27,6 +27,13 @@ struct Ply {
     body: Vec<u8>,
 }
 
+/// Whether a file that begins with these bytes is a PLY, if one that may be damaged.
+pub(crate) fn begins(first: &[u8]) -> bool {
+    first
+        .strip_prefix(b"ply")
+        .is_some_and(|next| next.first().is_none_or(u8::is_ascii_whitespace))
+}
+
 /// Reads a PLY of `size` bytes from its first byte, plain or compressed; `path` is for messages.
 pub(crate) fn read(
     path: &Path,
