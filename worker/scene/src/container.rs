@@ -34,7 +34,9 @@ impl Format {
 /// A file as it was read.
 ///
 /// What `keep` says is what comes back: reading what [`write`](Self::write) wrote gives the coefficients of the
-/// scene after [`keep`](Self::keep), bit by bit, and everything else as it was.
+/// scene after [`keep`](Self::keep), bit by bit, and everything else as it was. Colours that are all as they were read
+/// are written as they were, even where `keep` says otherwise: a format may have other steps for a scene as soon as
+/// one of its colours changes.
 pub(crate) trait Container: Debug + Send + Sync {
     /// Which format.
     fn format(&self) -> Format;

@@ -5,8 +5,12 @@
 mod container;
 mod error;
 mod gaussians;
+mod packed;
 mod ply;
+mod range;
+mod rest;
 mod scene;
+mod splat;
 #[doc(hidden)]
 pub mod testing;
 mod whole;

@@ -2,11 +2,15 @@
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::whole::write_whole;
-use crate::{Error, Result, ply};
+use crate::{Error, Result, ply, splat};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
+
+/// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
+/// a format whose files may begin in any way.
+pub(crate) const UNKNOWN: &str = "not a scene: neither a PLY, plain or compressed, nor a .splat, since ";
 
 /// A scene: what the engine computes with, and the file it came from.
 #[derive(Clone, Debug)]
@@ -49,8 +53,11 @@ impl Scene {
     /// Reads a scene of `size` bytes; `path` is for messages.
     fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
-        let _first = source.fill_buf().map_err(Error::io(path))?;
-        let (gaussians, source) = ply::read(path, source, size)?;
+        let first = source.fill_buf().map_err(Error::io(path))?;
+        let (gaussians, source) = match first {
+            ply if ply::begins(ply) => ply::read(path, source, size)?,
+            _ => splat::read(path, source, size)?,
+        };
         Ok(Scene {
             gaussians,
             source: Some(source),

@@ -1,6 +1,7 @@
 //! The rows of a PLY file: decoded column by column, and written back with nothing but colours changed.
 use super::fields::{COLOUR, Field, Rows, file_index};
-use super::header::{Layout, Storage, quote, truncated};
+use super::header::{Storage, quote};
+use super::layout::{Layout, truncated};
 use crate::gaussians::{Gaussians, Sh};
 use std::io::{self, Write};
 

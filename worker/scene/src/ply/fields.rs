@@ -34,9 +34,6 @@ pub(super) struct Fields {
 impl Fields {
     /// Finds the properties among the columns of a row; `Err` is what is missing or wrong.
     pub fn find(columns: &[(&str, &ScalarType)]) -> Result<Fields, String> {
-        if columns.iter().any(|(name, _)| *name == "packed_position") {
-            return Err("a compressed PLY (property packed_position); expand it to a plain 3DGS PLY first".into());
-        }
         let find = |name: &str| -> Result<Field, String> {
             let column = columns
                 .iter()
@@ -77,7 +74,7 @@ impl Fields {
 }
 
 /// Number of `f_rest_*` properties of a degree.
-pub(super) fn rest_count(degree: usize) -> usize {
+pub(crate) fn rest_count(degree: usize) -> usize {
     3 * ((degree + 1) * (degree + 1) - 1)
 }
 
@@ -90,7 +87,7 @@ pub(super) fn name(i: usize) -> String {
 
 /// Which of a file's coefficients (`f_dc_*`, then `f_rest_*` channel-major) is at `place` in a row of [`Sh`]; `stored`
 /// is the degree of the file, which the row's may be below.
-pub(super) fn file_index(stored: usize, place: usize) -> usize {
+pub(crate) fn file_index(stored: usize, place: usize) -> usize {
     let rest = (stored + 1) * (stored + 1) - 1;
     match place.checked_sub(3) {
         None => place,
@@ -99,13 +96,13 @@ pub(super) fn file_index(stored: usize, place: usize) -> usize {
 }
 
 /// The degree of the band that `f_rest_*` property `i` of a file of degree `stored` belongs to.
-fn band(stored: usize, i: usize) -> usize {
+pub(crate) fn band(stored: usize, i: usize) -> usize {
     let rest = (stored + 1) * (stored + 1) - 1;
     (i % rest + 1).isqrt()
 }
 
 /// Collects checked rows.
-pub(super) struct Rows {
+pub(crate) struct Rows {
     gaussians: Gaussians,
     /// Which value comes at each place of a row of [`Sh`].
     order: Vec<usize>,

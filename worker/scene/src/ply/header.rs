@@ -2,7 +2,6 @@
 //!
 //! At most [`MAX_HEADER`] bytes are read in search of `end_header`; `ply-rs` parses them. Counts are believed only
 //! after they were compared with the size of the file, see the readers of the body.
-use super::fields::Fields;
 use ply_rs::parser::{Parser, Reader};
 use ply_rs::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
@@ -14,7 +13,7 @@ const MAX_QUOTE: usize = 200;
 
 /// How the rows of the body are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Storage {
+pub(crate) enum Storage {
     /// Lines of numbers.
     Ascii,
     /// Rows of fixed size.
@@ -24,55 +23,10 @@ pub(super) enum Storage {
     },
 }
 
-/// What the header says of the file.
-#[derive(Clone, Debug)]
-pub(super) struct Layout {
-    /// How rows are stored.
-    pub storage: Storage,
-    /// Bytes (binary) or lines (ASCII) of the body before the first Gaussian.
-    pub skip: u64,
-    /// Gaussians that the header promises.
-    pub rows: u64,
-    /// Bytes of a binary row.
-    pub row_bytes: usize,
-    /// Properties of a row.
-    pub columns: usize,
-    /// Which of them are used, and where they are.
-    pub fields: Fields,
-}
-
-impl Layout {
-    /// Compares the counts with the bytes after the header, before anything is allocated; `Err` is the reason.
-    pub fn check_size(&self, body: u64) -> Result<(), String> {
-        // The shortest row of text has a digit a value and a separator after each but the very last.
-        let (row, slack) = match self.storage {
-            Storage::Binary { .. } => (self.row_bytes as u64, 0),
-            Storage::Ascii => (2 * self.columns as u64, 1),
-        };
-        let skip = if self.storage == Storage::Ascii { 0 } else { self.skip };
-        let there = (body + slack).saturating_sub(skip) / row;
-        if there < self.rows || body < skip {
-            let rows = self.rows;
-            return Err(match self.storage {
-                Storage::Binary { .. } => truncated(there, rows),
-                Storage::Ascii => {
-                    format!("truncated body: {body} bytes cannot hold the {rows} Gaussians that the header promises")
-                }
-            });
-        }
-        Ok(())
-    }
-}
-
-/// The complaint about missing rows.
-pub(super) fn truncated(there: u64, promised: u64) -> String {
-    format!("truncated body: {there} of the {promised} Gaussians that the header promises are there")
-}
-
 /// Reads up to and including the line `end_header`, from a source at its first byte.
 ///
 /// Returns the bytes as they are. An `Err` holds the reason; failures of the source are its `io::Error`.
-pub(super) fn read_header(source: &mut impl BufRead) -> std::io::Result<Result<Vec<u8>, String>> {
+pub(crate) fn read_header(source: &mut impl BufRead) -> std::io::Result<Result<Vec<u8>, String>> {
     let mut header = Vec::new();
     let mut bounded = source.take(MAX_HEADER);
     loop {
@@ -96,7 +50,7 @@ pub(super) fn read_header(source: &mut impl BufRead) -> std::io::Result<Result<V
 }
 
 /// Understands a header; `Err` is the reason why not.
-pub(super) fn parse(header: &[u8]) -> Result<Layout, String> {
+pub(crate) fn parse(header: &[u8]) -> Result<Header, String> {
     // Comments in other encodings than UTF-8 exist; they are kept as bytes and only parsed lossily.
     let text = String::from_utf8_lossy(header);
     check_counts(&text)?;
@@ -104,36 +58,36 @@ pub(super) fn parse(header: &[u8]) -> Result<Layout, String> {
         .read_header(&mut Reader::new(text.as_bytes()))
         .map_err(|e| format!("bad header: {}", quote(&e.to_string())))?;
     check_duplicates(&text, &parsed)?;
-    let Some(position) = parsed.elements.get_index_of("vertex") else {
-        return Err("the header has no element vertex".to_string());
-    };
-    let storage = match parsed.encoding {
+    Ok(parsed)
+}
+
+/// How the rows of a body are stored.
+pub(crate) fn storage(header: &Header) -> Storage {
+    match header.encoding {
         Encoding::Ascii => Storage::Ascii,
         Encoding::BinaryLittleEndian => Storage::Binary { big_endian: false },
         Encoding::BinaryBigEndian => Storage::Binary { big_endian: true },
+    }
+}
+
+/// An element, and how many bytes (binary) or lines (ASCII) of the body are before its first row; `Err` says why it
+/// cannot be found.
+pub(crate) fn element<'a>(header: &'a Header, name: &str) -> Result<(&'a ElementDef, u64), String> {
+    let Some(position) = header.elements.get_index_of(name) else {
+        return Err(format!("the header has no element {name}"));
     };
-    let mut skip = 0u64;
-    for element in parsed.elements.values().take(position) {
-        skip = skipped(element, storage)
-            .and_then(|more| skip.checked_add(more))
+    let mut before = 0u64;
+    for element in header.elements.values().take(position) {
+        before = size(element, storage(header))
+            .and_then(|more| before.checked_add(more))
             .ok_or_else(|| {
                 format!(
-                    "element {} before vertex has a list, no properties or too many rows; it cannot be skipped",
+                    "element {} before {name} has a list, no properties or too many rows; it cannot be skipped",
                     quote(&element.name)
                 )
             })?;
     }
-    let vertex = &parsed.elements[position];
-    let columns = scalars(vertex)?;
-    let fields = Fields::find(&columns)?;
-    Ok(Layout {
-        storage,
-        skip,
-        rows: vertex.count as u64,
-        row_bytes: columns.iter().map(|(_, t)| bytes(t)).sum(),
-        columns: columns.len(),
-        fields,
-    })
+    Ok((&header.elements[position], before))
 }
 
 /// Counts that no integer holds get a message that says so.
@@ -172,8 +126,8 @@ fn check_duplicates(text: &str, parsed: &Header) -> Result<(), String> {
     Ok(())
 }
 
-/// Bytes or lines that an element before the vertices takes, if that can be told from the header.
-fn skipped(element: &ElementDef, storage: Storage) -> Option<u64> {
+/// Bytes or lines that an element takes, if that can be told from the header.
+fn size(element: &ElementDef, storage: Storage) -> Option<u64> {
     if element.properties.is_empty() && element.count > 0 {
         return None;
     }
@@ -187,7 +141,7 @@ fn skipped(element: &ElementDef, storage: Storage) -> Option<u64> {
 }
 
 /// The properties of an element, all of which must be scalars.
-fn scalars(element: &ElementDef) -> Result<Vec<(&str, &ScalarType)>, String> {
+pub(crate) fn scalars(element: &ElementDef) -> Result<Vec<(&str, &ScalarType)>, String> {
     element
         .properties
         .values()
@@ -202,7 +156,7 @@ fn scalars(element: &ElementDef) -> Result<Vec<(&str, &ScalarType)>, String> {
 }
 
 /// Bytes of a scalar in a binary row.
-pub(super) fn bytes(scalar: &ScalarType) -> usize {
+pub(crate) fn bytes(scalar: &ScalarType) -> usize {
     match scalar {
         ScalarType::Char | ScalarType::UChar => 1,
         ScalarType::Short | ScalarType::UShort => 2,
@@ -212,7 +166,7 @@ pub(super) fn bytes(scalar: &ScalarType) -> usize {
 }
 
 /// Somebody else's text on one line and not too long.
-pub(super) fn quote(text: &str) -> String {
+pub(crate) fn quote(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(MAX_QUOTE) {
         Some((end, _)) => format!("{}...", &line[..end]),

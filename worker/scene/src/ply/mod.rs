@@ -3,14 +3,16 @@
 //! A written file differs from the one read in nothing but the values of `f_dc_*` and `f_rest_*`: the header with
 //! its comments, the order of rows, other properties and anything after the Gaussians keep their bytes.
 mod body;
-mod fields;
-mod header;
+pub(crate) mod fields;
+pub(crate) mod header;
+mod layout;
 mod standard;
 
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::rest::rest;
 use crate::scene::bad;
-use crate::{Error, Result};
+use crate::{Error, Result, packed};
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -21,11 +23,18 @@ pub(crate) use standard::write as write_standard;
 #[derive(Debug)]
 struct Ply {
     header: Vec<u8>,
-    layout: header::Layout,
+    layout: layout::Layout,
     body: Vec<u8>,
 }
 
-/// Reads a PLY of `size` bytes from its first byte; `path` is for messages.
+/// Whether a file that begins with these bytes is a PLY, if one that may be damaged.
+pub(crate) fn begins(first: &[u8]) -> bool {
+    first
+        .strip_prefix(b"ply")
+        .is_some_and(|next| next.first().is_none_or(u8::is_ascii_whitespace))
+}
+
+/// Reads a PLY of `size` bytes from its first byte, plain or compressed; `path` is for messages.
 pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
@@ -33,24 +42,16 @@ pub(crate) fn read(
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let header = header::read_header(source).map_err(Error::io(path))?;
     let header = header.map_err(|reason| bad(path, reason))?;
-    let layout = header::parse(&header).map_err(|reason| bad(path, reason))?;
+    let parsed = header::parse(&header).map_err(|reason| bad(path, reason))?;
     let left = size.saturating_sub(header.len() as u64);
+    if packed::announced(&parsed) {
+        return packed::read(path, header, &parsed, source, left);
+    }
+    let layout = layout::Layout::find(&parsed).map_err(|reason| bad(path, reason))?;
     layout.check_size(left).map_err(|reason| bad(path, reason))?;
     let body = rest(path, source, left)?;
     let gaussians = body::decode(&layout, &body).map_err(|reason| bad(path, reason))?;
     Ok((gaussians, Arc::new(Ply { header, layout, body })))
-}
-
-/// The `left` bytes that a source should still have, or as many as it has: one that grows while it is read is read up
-/// to the size it had.
-fn rest(path: &Path, source: &mut BufReader<impl Read>, left: u64) -> Result<Vec<u8>> {
-    let mut body = Vec::new();
-    usize::try_from(left)
-        .ok()
-        .and_then(|left| body.try_reserve_exact(left).ok())
-        .ok_or_else(|| bad(path, format!("{left} bytes of Gaussians do not fit in memory")))?;
-    source.take(left).read_to_end(&mut body).map_err(Error::io(path))?;
-    Ok(body)
 }
 
 impl Container for Ply {

@@ -1,0 +1,141 @@
+//! Files of 32 bytes a Gaussian without a header, as antimatter15's viewer reads them (.splat).
+//!
+//! Position and standard deviations in single precision, colour and opacity as four bytes, a unit quaternion w, x, y, z
+//! as four. There are no spherical harmonics beyond the constant one.
+use crate::Result;
+use crate::container::{Container, Format};
+use crate::gaussians::{Gaussians, Sh};
+use crate::ply::fields::Rows;
+use crate::range::{Range, logit};
+use crate::rest::rest;
+use crate::scene::{UNKNOWN, bad};
+use std::io::{self, BufReader, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Bytes of a Gaussian.
+const ROW: usize = 32;
+/// First byte of the colour of a row.
+const COLOUR: usize = 24;
+/// How far the length of a rotation may be from 1. Its bytes make up for 0.02, other conventions for rounding as much.
+const UNIT: f32 = 0.1;
+
+/// A file as it was read.
+#[derive(Debug)]
+struct Splat {
+    body: Vec<u8>,
+}
+
+/// Reads a file of `size` bytes from its first; `path` is for messages. The reason of a refusal continues a sentence
+/// that says what else the file is not.
+///
+/// Nothing in a file says that it is one, so it must look like one to be read: a whole number of rows, at least one;
+/// in each the position finite, the standard deviations finite and not negative; and at least half of the rotations
+/// of length 1, which writers make them. Zeros, text, pictures and noise fail that.
+pub(crate) fn read(
+    path: &Path,
+    source: &mut BufReader<impl Read>,
+    size: u64,
+) -> Result<(Gaussians, Arc<dyn Container>)> {
+    let refused = |reason| bad(path, format!("{}{reason}", UNKNOWN));
+    check_size(size).map_err(refused)?;
+    let body = rest(path, source, size)?;
+    // Again, since a file can shrink between the look at its size and the read.
+    check_size(body.len() as u64).map_err(refused)?;
+    let gaussians = decode(&body).map_err(refused)?;
+    Ok((gaussians, Arc::new(Splat { body })))
+}
+
+fn check_size(size: u64) -> Result<(), String> {
+    if size == 0 {
+        return Err("it is empty".to_string());
+    }
+    if !size.is_multiple_of(ROW as u64) {
+        return Err(format!("its size of {size} bytes is no multiple of {ROW}"));
+    }
+    Ok(())
+}
+
+fn decode(body: &[u8]) -> Result<Gaussians, String> {
+    check_rows(body)?;
+    let mut collected = Rows::with_capacity(0, 0, body.len() / ROW);
+    for row in body.chunks_exact(ROW) {
+        let [x, y, z, a, b, c] = floats(row);
+        let [w, i, j, k] = rotation(row);
+        let log = |scale: f32| f64::from(scale).ln() as f32;
+        let [red, green, blue] = [0, 1, 2].map(|channel| Range::UNIT.coefficient(row[COLOUR + channel]));
+        let (a, b, c, alpha) = (log(a), log(b), log(c), logit(row[COLOUR + 3]));
+        collected.push(&[x, y, z, w, i, j, k, a, b, c, alpha, red, green, blue])?;
+    }
+    Ok(collected.finish())
+}
+
+/// Whether the rows are Gaussians; see [`read`].
+fn check_rows(body: &[u8]) -> Result<(), String> {
+    let mut units = 0;
+    for (i, row) in body.chunks_exact(ROW).enumerate() {
+        let values = floats(row);
+        for (axis, value) in ["x", "y", "z"].iter().zip(values) {
+            if !value.is_finite() {
+                return Err(format!("{axis} of row {i} is {value}"));
+            }
+        }
+        for (axis, value) in values[3..].iter().enumerate() {
+            if !(value.is_finite() && *value >= 0.0) {
+                return Err(format!("the scale of row {i} along axis {axis} is {value}"));
+            }
+        }
+        let length = rotation(row).iter().map(|v| v * v).sum::<f32>().sqrt();
+        units += usize::from((length - 1.0).abs() <= UNIT);
+    }
+    let rows = body.len() / ROW;
+    if units < rows.div_ceil(2) {
+        return Err(format!("only {units} of {rows} rows have a rotation of length 1"));
+    }
+    Ok(())
+}
+
+/// The numbers at the start of a row: position, standard deviations.
+fn floats(row: &[u8]) -> [f32; 6] {
+    std::array::from_fn(|i| {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&row[4 * i..4 * i + 4]);
+        f32::from_le_bytes(bytes)
+    })
+}
+
+/// The quaternion at the end of a row.
+fn rotation(row: &[u8]) -> [f32; 4] {
+    std::array::from_fn(|i| (f32::from(row[28 + i]) - 128.0) / 128.0)
+}
+
+impl Container for Splat {
+    fn format(&self) -> Format {
+        Format::Splat
+    }
+
+    fn exact(&self) -> bool {
+        false
+    }
+
+    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
+        for value in coefficients {
+            *value = Range::UNIT.coefficient(Range::UNIT.nearest(*value));
+        }
+    }
+
+    fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {
+        let mut patched = [0; ROW];
+        for (row, colour) in self.body.chunks_exact(ROW).zip(sh.coefficients.chunks_exact(3)) {
+            patched.copy_from_slice(row);
+            for (byte, value) in patched[COLOUR..].iter_mut().zip(colour) {
+                *byte = Range::UNIT.nearest(*value);
+            }
+            out.write_all(&patched)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;
