@@ -103,21 +103,22 @@ fn colours_are_bytes_with_red_green_blue_innermost() {
 fn bands_without_anything_are_not_in_memory() {
     for version in VERSIONS {
         for degree in 0..=4u8 {
-            for used in 0..=degree {
+            // Red of the first coefficient of each band, and blue of the last, of the second Gaussian.
+            let places = (0..degree).flat_map(|band| [3 * usize::from(band * (band + 2)), harmonics(band + 1) - 1]);
+            for place in places.map(Some).chain([None]) {
                 let mut file = File::new(version, degree, 3);
                 file.sections[HARMONICS].fill(128);
-                let row = file.sections[HARMONICS].len() / 3;
-                let bytes = 3 * ((usize::from(used) + 1).pow(2) - 1);
-                if used > 0 {
-                    // Blue of the last coefficient of the band, of the second Gaussian.
-                    file.sections[HARMONICS][row + bytes - 1] = 129;
+                let used = place.map_or(0, |place| (1..).find(|band| place < harmonics(*band)).unwrap());
+                if let Some(place) = place {
+                    file.sections[HARMONICS][harmonics(degree) + place] = 129;
                 }
                 let scene = file.read().unwrap();
                 let sh = &scene.gaussians.sh;
-                assert_eq!((sh.degree, sh.coefficients.len()), (used.into(), 3 * (bytes + 3)));
+                let row = harmonics(used) + 3;
+                assert_eq!((sh.degree, sh.coefficients.len()), (used.into(), 3 * row), "{place:?}");
                 assert_eq!(scene.learnable_degree(), used.into());
-                if used > 0 {
-                    assert_eq!(sh.coefficients[2 * (bytes + 3) - 1], 1.0 / 128.0);
+                if let Some(place) = place {
+                    assert_eq!(sh.coefficients[row + 3 + place], 1.0 / 128.0);
                 }
                 assert_eq!(plain(&written(&scene, sh)), plain(&file.bytes()));
             }

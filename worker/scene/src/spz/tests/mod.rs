@@ -38,7 +38,6 @@ impl File {
     /// Bytes without a pattern in all sections.
     fn new(version: u32, degree: u8, points: u32) -> File {
         let rotation = if version == 2 { 3 } else { 4 };
-        let harmonics = 3 * ((usize::from(degree) + 1).pow(2) - 1);
         let mut state = 1u32;
         let mut byte = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -51,7 +50,7 @@ impl File {
             degree,
             fractional_bits: 12,
             flags: 1,
-            sections: [9, 1, 3, 3, rotation, harmonics]
+            sections: [9, 1, 3, 3, rotation, harmonics(degree)]
                 .map(|bytes| (0..bytes * points as usize).map(|_| byte()).collect()),
             extensions: Vec::new(),
             after: Vec::new(),
@@ -120,6 +119,11 @@ impl File {
     fn refused(&self) -> String {
         refused(&self.bytes())
     }
+}
+
+/// Bytes of the spherical harmonics of a Gaussian.
+fn harmonics(degree: u8) -> usize {
+    [0, 9, 24, 45, 72][usize::from(degree)]
 }
 
 fn gzip(content: &[u8]) -> Vec<u8> {
