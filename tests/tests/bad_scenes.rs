@@ -15,9 +15,9 @@ fn bad_scenes() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
         (
             "text.ply",
             b"Dear diary,\ntoday I was no scene.\n".to_vec(),
-            &["not a PLY file", "first line"],
+            &["neither a PLY", "nor a .splat"],
         ),
-        ("nothing.ply", Vec::new(), &["before end_header"]),
+        ("nothing.ply", Vec::new(), &["it is empty"]),
         (
             "endless.ply",
             [b"ply\n".to_vec(), vec![b'c'; 100_000]].concat(),

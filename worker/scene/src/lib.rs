@@ -11,6 +11,7 @@ mod range;
 mod rest;
 mod scene;
 mod splat;
+mod spz;
 #[doc(hidden)]
 pub mod testing;
 mod whole;

@@ -2,7 +2,7 @@
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::whole::write_whole;
-use crate::{Error, Result, ply, splat};
+use crate::{Error, Result, ply, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
 /// a format whose files may begin in any way.
-pub(crate) const UNKNOWN: &str = "not a scene: neither a PLY, plain or compressed, nor a .splat, since ";
+pub(crate) const UNKNOWN: &str = "not a scene: neither a PLY, plain or compressed, nor an SPZ, nor a .splat, since ";
 
 /// A scene: what the engine computes with, and the file it came from.
 #[derive(Clone, Debug)]
@@ -55,7 +55,8 @@ impl Scene {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
         let first = source.fill_buf().map_err(Error::io(path))?;
         let (gaussians, source) = match first {
-            ply if ply::begins(ply) => ply::read(path, source, size)?,
+            first if ply::begins(first) => ply::read(path, source, size)?,
+            first if spz::is_spz(first) => spz::read(path, source, size)?,
             _ => splat::read(path, source, size)?,
         };
         Ok(Scene {

@@ -142,6 +142,10 @@ impl Container for Packed {
         Format::CompressedPly
     }
 
+    fn bytes(&self) -> usize {
+        self.header.len() + self.body.len() + size_of_val(&self.chunks[..]) + size_of_val(&self.grids[..])
+    }
+
     fn exact(&self) -> bool {
         false
     }

@@ -114,6 +114,10 @@ impl Container for Splat {
         Format::Splat
     }
 
+    fn bytes(&self) -> usize {
+        self.body.len()
+    }
+
     fn exact(&self) -> bool {
         false
     }
