@@ -12,6 +12,7 @@ mod rest;
 mod scene;
 mod splat;
 mod spz;
+mod summary;
 #[doc(hidden)]
 pub mod testing;
 mod whole;
@@ -20,4 +21,5 @@ pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
 pub use scene::Scene;
+pub use summary::{HEAD, Summary, summary};
 pub use whole::write_whole;

@@ -17,6 +17,7 @@ use crate::gaussians::{Gaussians, Sh};
 use crate::ply::fields::file_index;
 use crate::range::Range;
 use crate::scene::bad;
+use crate::summary::Summary;
 use decode::{Chunk, word};
 use layout::Layout;
 use ply_rs::ply::Header;
@@ -69,6 +70,18 @@ pub(crate) fn read(
         grids,
     };
     Ok((gaussians, Arc::new(packed)))
+}
+
+/// What the header of a file of `size` bytes says, `left` of which follow it; `Err` is the reason for which it is none.
+pub(crate) fn summary(parsed: &Header, size: u64, left: u64) -> Result<Summary, String> {
+    let layout = Layout::find(parsed)?;
+    layout.check_size(left)?;
+    Ok(Summary {
+        format: Format::CompressedPly,
+        gaussians: layout.gaussians.count as u64,
+        degree: layout.degree as u64,
+        file: size,
+    })
 }
 
 impl Packed {

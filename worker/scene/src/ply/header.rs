@@ -7,7 +7,7 @@ use ply_rs::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, Sc
 use std::io::{BufRead, Read};
 
 /// Longest header, bytes. A scene of degree 4 with all usual properties needs under 3,000.
-const MAX_HEADER: u64 = 64 * 1024;
+pub(crate) const MAX_HEADER: u64 = 64 * 1024;
 /// Most characters of somebody else's message or line that are repeated in ours.
 const MAX_QUOTE: usize = 200;
 

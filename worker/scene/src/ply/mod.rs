@@ -12,6 +12,7 @@ use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::rest::rest;
 use crate::scene::bad;
+use crate::summary::Summary;
 use crate::{Error, Result, packed};
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
@@ -52,6 +53,24 @@ pub(crate) fn read(
     let body = rest(path, source, left)?;
     let gaussians = body::decode(&layout, &body).map_err(|reason| bad(path, reason))?;
     Ok((gaussians, Arc::new(Ply { header, layout, body })))
+}
+
+/// What the head of a PLY of `size` bytes says, plain or compressed; `Err` is the reason for which it is none.
+pub(crate) fn summary(mut head: &[u8], size: u64) -> Result<Summary, String> {
+    let header = header::read_header(&mut head).map_err(|error| error.to_string())??;
+    let parsed = header::parse(&header)?;
+    let left = size.saturating_sub(header.len() as u64);
+    if packed::announced(&parsed) {
+        return packed::summary(&parsed, size, left);
+    }
+    let layout = layout::Layout::find(&parsed)?;
+    layout.check_size(left)?;
+    Ok(Summary {
+        format: Format::Ply,
+        gaussians: layout.rows,
+        degree: layout.fields.degree as u64,
+        file: size,
+    })
 }
 
 impl Container for Ply {

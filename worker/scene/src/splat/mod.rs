@@ -9,6 +9,7 @@ use crate::ply::fields::Rows;
 use crate::range::{Range, logit};
 use crate::rest::rest;
 use crate::scene::{UNKNOWN, bad};
+use crate::summary::Summary;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -44,6 +45,21 @@ pub(crate) fn read(
     check_size(body.len() as u64).map_err(refused)?;
     let gaussians = decode(&body).map_err(refused)?;
     Ok((gaussians, Arc::new(Splat { body })))
+}
+
+/// What the head of a file of `size` bytes says: its rows must look like Gaussians, as all must when it is read. `Err`
+/// is the reason for which it is none.
+pub(crate) fn summary(head: &[u8], size: u64) -> Result<Summary, String> {
+    let rows = &head[..head.len() / ROW * ROW];
+    check_size(size)
+        .and_then(|()| check_rows(rows))
+        .map_err(|reason| format!("{UNKNOWN}{reason}"))?;
+    Ok(Summary {
+        format: Format::Splat,
+        gaussians: size / ROW as u64,
+        degree: 0,
+        file: size,
+    })
 }
 
 fn check_size(size: u64) -> Result<(), String> {

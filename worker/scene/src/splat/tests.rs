@@ -1,6 +1,7 @@
 //! Tests of files without a header.
 use super::*;
 use crate::range::tests::wild;
+use crate::summary::tests::agrees;
 use crate::{Error, Format, Scene};
 use proptest::prelude::*;
 
@@ -16,7 +17,9 @@ fn usual() -> Vec<u8> {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::parse(Path::new("test.splat"), bytes)
+    let scene = Scene::parse(Path::new("test.splat"), bytes)?;
+    agrees(bytes, &scene);
+    Ok(scene)
 }
 
 fn refused(bytes: &[u8]) -> String {

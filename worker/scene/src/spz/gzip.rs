@@ -66,8 +66,18 @@ impl From<io::Error> for Failure {
     }
 }
 
-/// Everything that was compressed, of which no more is taken than the header and the `size` of the file allow.
-fn inflate(decoder: &mut GzDecoder<impl BufRead>, size: u64) -> Result<(Header, Vec<u8>), Failure> {
+/// The header at the start of a stream that is a file of `size` bytes, and the bytes that are kept of it uncompressed,
+/// at least; `Err` is the reason for which there is none.
+pub(super) fn header(head: &[u8], size: u64) -> Result<(Header, u64), String> {
+    match begin(&mut GzDecoder::new(head), size) {
+        Ok((header, content, promised)) => Ok((header, content.len() as u64 + promised)),
+        Err(Failure::Bad(reason)) => Err(reason),
+        Err(Failure::Io(error)) => Err(error.to_string()),
+    }
+}
+
+/// The header, its bytes, and the number of those that it promises after it, if the `size` of the file allows so many.
+fn begin(decoder: &mut GzDecoder<impl BufRead>, size: u64) -> Result<(Header, Vec<u8>, u64), Failure> {
     let mut content = Vec::new();
     decoder.take(HEADER as u64).read_to_end(&mut content)?;
     let Some(start) = content.first_chunk() else {
@@ -77,6 +87,12 @@ fn inflate(decoder: &mut GzDecoder<impl BufRead>, size: u64) -> Result<(Header, 
     let header = Header::parse(start, &VERSIONS, "a gzip stream")?;
     let promised = header.sections().iter().sum();
     limits::check(promised, size)?;
+    Ok((header, content, promised))
+}
+
+/// Everything that was compressed, of which no more is taken than the header and the `size` of the file allow.
+fn inflate(decoder: &mut GzDecoder<impl BufRead>, size: u64) -> Result<(Header, Vec<u8>), Failure> {
+    let (header, mut content, promised) = begin(decoder, size)?;
     usize::try_from(promised)
         .ok()
         .and_then(|promised| content.try_reserve_exact(promised).ok())

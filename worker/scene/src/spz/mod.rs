@@ -20,8 +20,9 @@ mod limits;
 mod streams;
 
 use crate::Result;
-use crate::container::Container;
+use crate::container::{Container, Format};
 use crate::gaussians::Gaussians;
+use crate::summary::Summary;
 use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
@@ -42,6 +43,21 @@ pub(crate) fn read(
     } else {
         streams::read(path, source, size)
     }
+}
+
+/// What the head of a file of `size` bytes says, for which [`is_spz`] holds; `Err` is the reason for which it is none.
+pub(crate) fn summary(head: &[u8], size: u64) -> Result<Summary, String> {
+    let (header, file) = if head.starts_with(&gzip::MAGIC) {
+        gzip::header(head, size)?
+    } else {
+        streams::header(head, size)?
+    };
+    Ok(Summary {
+        format: Format::Spz,
+        gaussians: header.points as u64,
+        degree: header.degree as u64,
+        file,
+    })
 }
 
 #[cfg(test)]

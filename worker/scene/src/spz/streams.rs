@@ -52,15 +52,29 @@ pub(super) fn read(
     Ok((gaussians, Arc::new(streams)))
 }
 
-/// Understands a whole file; `Err` is the reason why not.
-fn parse(file: Vec<u8>) -> Result<(Gaussians, Streams), String> {
-    let Some(start) = file.first_chunk::<HEADER>().filter(|_| file.len() >= WHOLE_HEADER) else {
-        let there = file.len();
+/// The header at the start of a file of `size` bytes, and the bytes that are kept of it: those that are there, and
+/// colours uncompressed. `Err` is the reason for which there is none.
+pub(super) fn header(head: &[u8], size: u64) -> Result<(Header, u64), String> {
+    let header = begin(head, size)?;
+    let sizes = header.sections();
+    Ok((header, size.saturating_add(sizes[COLOURS] + sizes[HARMONICS])))
+}
+
+/// The header, if the `size` of the file allows as many bytes as it promises.
+fn begin(head: &[u8], size: u64) -> Result<Header, String> {
+    let Some(start) = head.first_chunk::<HEADER>().filter(|_| head.len() >= WHOLE_HEADER) else {
+        let there = head.len();
         return Err(format!("truncated: {there} bytes of a header of {WHOLE_HEADER}"));
     };
     let header = Header::parse(start, &VERSIONS, "a file without gzip")?;
+    limits::check(header.sections().iter().sum(), size)?;
+    Ok(header)
+}
+
+/// Understands a whole file; `Err` is the reason why not.
+fn parse(file: Vec<u8>) -> Result<(Gaussians, Streams), String> {
+    let header = begin(&file, file.len() as u64)?;
     let sizes = header.sections();
-    limits::check(sizes.iter().sum(), file.len() as u64)?;
     let layout = Layout::find(&file, &sizes)?;
     let mut sections: [Vec<u8>; 6] = Default::default();
     for i in 0..sections.len() {

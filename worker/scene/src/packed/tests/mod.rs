@@ -4,6 +4,7 @@ mod refusals;
 mod round_trips;
 mod values;
 
+use crate::summary::tests::agrees;
 use crate::{Error, Result, Scene, Sh};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -164,7 +165,9 @@ impl File {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::parse(Path::new("test.compressed.ply"), bytes)
+    let scene = Scene::parse(Path::new("test.compressed.ply"), bytes)?;
+    agrees(bytes, &scene);
+    Ok(scene)
 }
 
 fn refused(bytes: &[u8]) -> String {

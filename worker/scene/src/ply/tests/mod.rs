@@ -4,6 +4,7 @@ mod refusals;
 mod round_trips;
 
 use super::fields::rest_count;
+use crate::summary::tests::agrees;
 use crate::{Error, MAX_DEGREE, Result, Scene, Sh};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -134,7 +135,9 @@ impl File {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::parse(Path::new("test.ply"), bytes)
+    let scene = Scene::parse(Path::new("test.ply"), bytes)?;
+    agrees(bytes, &scene);
+    Ok(scene)
 }
 
 fn refused(bytes: &[u8]) -> String {

@@ -6,6 +6,7 @@ mod real;
 mod refusals;
 mod round_trips;
 
+use crate::summary::tests::agrees;
 use crate::{Error, Result, Scene, Sh};
 use flate2::Compression;
 use flate2::read::GzDecoder;
@@ -157,7 +158,9 @@ fn plain(file: &[u8]) -> Vec<Vec<u8>> {
 }
 
 fn read(bytes: &[u8]) -> Result<Scene> {
-    Scene::parse(Path::new("test.spz"), bytes)
+    let scene = Scene::parse(Path::new("test.spz"), bytes)?;
+    agrees(bytes, &scene);
+    Ok(scene)
 }
 
 fn refused(bytes: &[u8]) -> String {
