@@ -1,4 +1,5 @@
 //! What can go wrong, told to people on standard error and to programs as JSON.
+use std::collections::BTreeMap;
 use std::error::Error as _;
 use std::path::{Path, PathBuf};
 
@@ -83,6 +84,8 @@ struct Report {
     reason: Option<String>,
     field_violations: Vec<Violation>,
     resource: Option<String>,
+    /// Figures and names that go with the server's reason, as it spells them.
+    metadata: Option<BTreeMap<String, String>>,
     retry_after_seconds: Option<f64>,
     job: Option<String>,
 }
@@ -130,6 +133,7 @@ impl Error {
                 reason,
                 field_violations: details.as_ref().map(|d| d.field_violations.clone()).unwrap_or_default(),
                 resource: details.as_ref().and_then(|d| d.resource.clone()),
+                metadata: details.as_ref().map(|d| d.metadata.clone()),
                 retry_after_seconds: details.as_ref().and_then(|d| d.retry_after_seconds),
                 job,
             },

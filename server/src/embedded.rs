@@ -55,19 +55,17 @@ impl WorkerProcess {
         let program = std::path::absolute(program).map_err(|error| Error::internal("finding the worker", error))?;
         let url = format!("http://{}", reachable(address));
         let device = settings.worker_device.as_str();
-        let arguments = [
-            "run",
-            "--server",
-            &url,
-            "--stop-with-stdin",
-            "--device",
-            device,
-            "--name",
-            &name(),
-        ];
+        let mut arguments = ["run", "--server", &url, "--stop-with-stdin", "--device", device].to_vec();
+        let memory = settings.max_job_memory_mebibytes;
+        let mebibytes = memory.to_string();
+        if memory > 0 {
+            arguments.extend(["--memory", &mebibytes]);
+        }
+        let name = name();
+        arguments.extend(["--name", &name]);
         Ok(Self {
             program,
-            arguments: arguments.map(OsString::from).to_vec(),
+            arguments: arguments.into_iter().map(OsString::from).collect(),
         })
     }
 

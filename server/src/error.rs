@@ -71,6 +71,22 @@ pub enum Error {
         /// When to try again.
         retry_after: Duration,
     },
+    /// A scene that takes more memory than a job may.
+    #[error("{}", does_not_fit(.name, *.gaussians, *.degree, [*.needed, *.likely, *.limit]))]
+    SceneDoesNotFit {
+        /// The artifact's full name.
+        name: String,
+        /// Its Gaussians.
+        gaussians: u64,
+        /// Degree of spherical harmonics that it has room for.
+        degree: u64,
+        /// Bytes that it takes at least.
+        needed: u64,
+        /// Bytes that it probably takes.
+        likely: u64,
+        /// Bytes that a job may take.
+        limit: u64,
+    },
     /// The server is going down.
     #[error("the server is stopping")]
     Stopping,
@@ -125,6 +141,20 @@ impl Error {
             source: source.into(),
         }
     }
+}
+
+fn does_not_fit(name: &str, gaussians: u64, degree: u64, bytes: [u64; 3]) -> String {
+    // Limits are set in whole mebibytes; what is needed is rounded up, so that it is seen to be more.
+    let [needed, likely, limit] = bytes.map(|bytes| bytes.div_ceil(1 << 20));
+    let more = if likely > needed {
+        format!(", and probably {likely} MiB or more")
+    } else {
+        String::new()
+    };
+    format!(
+        "{name} does not fit: {gaussians} Gaussians with spherical harmonics of degree {degree} take {needed} MiB of \
+         memory at least{more}; a job may take {limit} MiB (max_job_memory_mebibytes)"
+    )
 }
 
 fn list(violations: &[Violation]) -> String {

@@ -154,6 +154,7 @@ fn limits(settings: &Settings) -> Limits {
         // Its limit is far below.
         max_attempts: i32::try_from(settings.max_attempts).unwrap_or(i32::MAX),
         max_queued: settings.max_queued_jobs,
+        max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
         abandoned_after: settings.abandoned_after(),
     }

@@ -295,6 +295,7 @@ fn what_a_refused_job_would_have_used_is_deleted() {
         (&"INVALID_ARGUMENT".into(), &"INVALID_FIELD".into())
     );
     assert_eq!(error["field_violations"][0]["field"], "job.embed.size");
+    assert_eq!(error["metadata"], serde_json::json!({"limit": "4096"}));
     assert!(
         ran.err.contains("\n  job.embed.size: must be 16 to 4096"),
         "{}",

@@ -1,6 +1,4 @@
 //! `JobService`: work that is queued and carried out by workers.
-use std::time::Duration;
-
 use futures::stream::BoxStream;
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::{
@@ -17,8 +15,6 @@ use super::{Api, clock, convert, fingerprint, message, page, watch};
 use crate::error::{Error, Result};
 use crate::ledger::NewJob;
 
-/// When a submitter tries again while the queue is full.
-const QUEUE_RETRY: Duration = Duration::from_secs(10);
 /// A page ends early rather than come near the largest message that clients read by default.
 const MAX_PAGE_BYTES: usize = 2 << 20;
 
@@ -69,16 +65,7 @@ impl Api {
                 message::check(field, text, key.bits)?;
             }
         }
-        // A request that has its job already takes no more room.
-        let limit = self.limits().max_queued;
-        if u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit
-            && !self.is_known(submission.request_id).await?
-        {
-            return Err(Error::QueueFull {
-                limit,
-                retry_after: QUEUE_RETRY,
-            });
-        }
+        self.admit(&submission).await?;
         let fingerprint = self.fingerprint(&submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
@@ -105,14 +92,6 @@ impl Api {
             }
         }
         Ok(fingerprint::whole(&submission.asked, &inputs))
-    }
-
-    /// Whether a request made a job before.
-    async fn is_known(&self, request: Option<Uuid>) -> Result<bool> {
-        match request {
-            Some(request) => Ok(self.ledger().find_request(request).await?.is_some()),
-            None => Ok(false),
-        }
     }
 
     async fn list(&self, request: &ListJobsRequest) -> Result<ListJobsResponse> {

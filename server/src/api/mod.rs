@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::ledger::Ledger;
 use crate::secrets::MasterKey;
 
+mod admission;
 mod artifacts;
 mod changes;
 mod clock;
@@ -59,6 +60,8 @@ pub struct Limits {
     pub max_attempts: i32,
     /// Jobs that may wait; more are refused.
     pub max_queued: u64,
+    /// Bytes of memory that a job may take; one whose scene takes more is refused. `None` leaves that to the workers.
+    pub max_job_memory: Option<u64>,
     /// An upload of which nothing arrives for so long is broken off.
     pub upload_idle: Duration,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
@@ -71,6 +74,7 @@ impl Default for Limits {
             lease: Duration::from_secs(30),
             max_attempts: 3,
             max_queued: 10_000,
+            max_job_memory: None,
             upload_idle: Duration::from_secs(60),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
         }

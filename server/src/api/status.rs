@@ -34,6 +34,7 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::Finished { .. } => (Code::FailedPrecondition, "JOB_FINISHED"),
         Error::NotCancelled { .. } => (Code::FailedPrecondition, "CANCEL_NOT_REQUESTED"),
         Error::InUse { .. } => (Code::FailedPrecondition, "ARTIFACT_IN_USE"),
+        Error::SceneDoesNotFit { .. } => (Code::FailedPrecondition, "SCENE_DOES_NOT_FIT"),
         Error::LeaseLost { .. } => (Code::Aborted, "LEASE_LOST"),
         Error::QueueFull { .. } => (Code::ResourceExhausted, "QUEUE_FULL"),
         Error::NoSpace => (Code::ResourceExhausted, "NO_SPACE"),
@@ -48,17 +49,31 @@ fn kind(error: &Error) -> (Code, &'static str) {
 
 /// What `google.rpc.ErrorInfo` says besides the reason.
 fn metadata(error: &Error) -> HashMap<String, String> {
-    let entry = match error {
-        Error::InUse { name, job } => {
-            return HashMap::from([("name", name), ("job", job)].map(|(key, value)| (key.to_owned(), value.clone())));
-        }
-        Error::Finished { name } | Error::LeaseLost { name } => ("name", name.clone()),
-        Error::NotFound { name, .. } | Error::NotCancelled { name } => ("name", name.clone()),
-        Error::RequestIdReused { request_id } => ("request_id", request_id.to_string()),
-        Error::QueueFull { limit, .. } => ("limit", limit.to_string()),
-        _ => return HashMap::new(),
+    let entries = match error {
+        Error::InUse { name, job } => vec![("name", name.clone()), ("job", job.clone())],
+        Error::Finished { name } | Error::LeaseLost { name } => vec![("name", name.clone())],
+        Error::NotFound { name, .. } | Error::NotCancelled { name } => vec![("name", name.clone())],
+        Error::RequestIdReused { request_id } => vec![("request_id", request_id.to_string())],
+        Error::QueueFull { limit, .. } => vec![("limit", limit.to_string())],
+        Error::SceneDoesNotFit {
+            name,
+            gaussians,
+            degree,
+            needed,
+            likely,
+            limit,
+        } => vec![
+            ("name", name.clone()),
+            ("gaussians", gaussians.to_string()),
+            ("sh_degree", degree.to_string()),
+            ("needed_bytes", needed.to_string()),
+            ("likely_bytes", likely.to_string()),
+            ("limit_bytes", limit.to_string()),
+        ],
+        _ => Vec::new(),
     };
-    HashMap::from([(entry.0.to_owned(), entry.1)])
+    let entries = entries.into_iter().map(|(key, value)| (key.to_owned(), value));
+    entries.collect()
 }
 
 fn add_details(details: &mut ErrorDetails, error: &Error) {
@@ -73,7 +88,10 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         Error::NotFound { kind, name } => {
             details.set_resource_info(format!("guardsplat.v1/{kind}"), name, "", error.to_string());
         }
-        Error::Finished { name } | Error::InUse { name, .. } | Error::NotCancelled { name } => {
+        Error::Finished { name }
+        | Error::InUse { name, .. }
+        | Error::NotCancelled { name }
+        | Error::SceneDoesNotFit { name, .. } => {
             let violation = PreconditionViolation::new(kind(error).1, name, error.to_string());
             details.set_precondition_failure(vec![violation]);
         }

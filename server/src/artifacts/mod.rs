@@ -15,6 +15,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use object_store::{ObjectStore, ObjectStoreExt};
+use prost::bytes::Bytes;
 
 pub use check::{Announced, Check};
 pub use error::{StoreError, StoreResult};
@@ -61,6 +62,13 @@ impl ArtifactStore {
     /// Begins to read an artifact from byte `offset`, which may be its end.
     pub async fn read(&self, path: &ArtifactPath, offset: u64) -> StoreResult<Reader> {
         Reader::open(self.store.clone(), path.as_object_path().clone(), offset).await
+    }
+
+    /// The first bytes of an artifact, at most `most`, and its length.
+    pub async fn head(&self, path: &ArtifactPath, most: usize) -> StoreResult<(Bytes, u64)> {
+        let mut reader = self.read(path, 0).await?;
+        let head = reader.up_to(most).await?;
+        Ok((head.unwrap_or_default(), reader.size()))
     }
 
     /// Deletes an artifact. One that is not there is none the less deleted.

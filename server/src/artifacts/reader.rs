@@ -38,10 +38,15 @@ impl Reader {
     /// The next bytes, at most [`CHUNK_BYTES`]; nothing at the end. They are read when they are asked for, so a slow
     /// reader holds one chunk, whatever the artifact's length.
     pub async fn chunk(&mut self) -> StoreResult<Option<Bytes>> {
+        self.up_to(CHUNK_BYTES).await
+    }
+
+    /// As [`Self::chunk`], at most `most` bytes.
+    pub(super) async fn up_to(&mut self, most: usize) -> StoreResult<Option<Bytes>> {
         if self.offset == self.size {
             return Ok(None);
         }
-        let end = self.size.min(self.offset + CHUNK_BYTES as u64);
+        let end = self.size.min(self.offset + most as u64);
         let chunk = self.store.get_range(&self.path, self.offset..end).await?;
         self.offset = end;
         Ok(Some(chunk))

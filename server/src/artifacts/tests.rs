@@ -95,6 +95,11 @@ async fn what_was_written_is_read_from_any_byte_in_chunks() {
         assert!(read.concat() == data[offset..], "from {offset}");
     }
     assert_eq!(store.read(&path, 0).await.unwrap().size(), data.len() as u64);
+    for most in [1, 700, CHUNK_BYTES + 1, data.len(), data.len() + 1] {
+        let (head, size) = store.head(&path, most).await.unwrap();
+        assert!(head[..] == data[..most.min(data.len())], "{most}");
+        assert_eq!(size, data.len() as u64);
+    }
     let error = get(&store, &path, data.len() as u64 + 1).await.unwrap_err();
     assert!(
         matches!(error, StoreError::BadOffset { offset, size } if offset == size + 1),

@@ -187,6 +187,14 @@ fn the_command_line_is_the_workers() {
         name,
     ];
     assert_eq!(shown, expected);
+    let limited = Settings {
+        max_job_memory_mebibytes: 2048,
+        ..settings
+    };
+    let limited = WorkerProcess::new(&limited, "0.0.0.0:7001".parse().unwrap()).unwrap();
+    let shown: Vec<_> = limited.arguments.iter().map(|a| a.to_str().unwrap()).collect();
+    let memory = ["--memory", "2048"];
+    assert_eq!(shown, [&expected[..6], &memory, &expected[6..]].concat());
     assert!(name.starts_with("embedded-") && name.ends_with(&std::process::id().to_string()) && name.len() <= 63);
     for (listens, reached) in [
         ("[::]:1", "[::1]:1"),

@@ -29,6 +29,9 @@ pub struct Flags {
     /// Most jobs that may wait [default: 10000]
     #[arg(long, value_name = "JOBS")]
     pub max_queued_jobs: Option<u64>,
+    /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
+    #[arg(long, value_name = "MEBIBYTES")]
+    pub max_job_memory_mebibytes: Option<u64>,
     /// Seconds until a worker that says nothing is given up [default: 30]
     #[arg(long, value_name = "SECONDS")]
     pub lease_seconds: Option<u64>,
@@ -74,6 +77,7 @@ impl Flags {
             data_dir,
             max_artifact_bytes,
             max_queued_jobs,
+            max_job_memory_mebibytes,
             lease_seconds,
             max_attempts,
             upload_timeout_seconds,
@@ -90,6 +94,7 @@ impl Flags {
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
+        set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);

@@ -13,6 +13,7 @@ impl Settings {
         let numbers = [
             ("max_artifact_bytes", self.max_artifact_bytes, 1, 1 << 40),
             ("max_queued_jobs", self.max_queued_jobs, 1, 1_000_000),
+            ("max_job_memory_mebibytes", self.max_job_memory_mebibytes, 0, 1 << 24),
             ("lease_seconds", self.lease_seconds, 1, DAY),
             ("max_attempts", self.max_attempts.into(), 1, 100),
             ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),

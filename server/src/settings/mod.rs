@@ -27,6 +27,8 @@ pub struct Settings {
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
     pub max_queued_jobs: u64,
+    /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
+    pub max_job_memory_mebibytes: u64,
     /// Seconds until a worker that says nothing is given up.
     pub lease_seconds: u64,
     /// How often a job is tried.
@@ -94,6 +96,7 @@ impl Default for Settings {
             data_dir: "guardsplat-data".into(),
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
+            max_job_memory_mebibytes: 0,
             lease_seconds: 30,
             max_attempts: 3,
             upload_timeout_seconds: 60,
@@ -111,6 +114,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Bytes of memory that a job may take, where that is limited.
+    pub fn max_job_memory(&self) -> Option<u64> {
+        Some(self.max_job_memory_mebibytes << 20).filter(|bytes| *bytes > 0)
+    }
+
     /// When a worker that says nothing is given up.
     pub fn lease(&self) -> Duration {
         Duration::from_secs(self.lease_seconds)

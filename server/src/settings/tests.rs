@@ -67,6 +67,7 @@ fn every_setting_can_be_set_everywhere() {
         ("data_dir", "/data"),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
+        ("max_job_memory_mebibytes", "2000"),
         ("lease_seconds", "6"),
         ("max_attempts", "7"),
         ("upload_timeout_seconds", "8"),
@@ -134,6 +135,13 @@ fn the_documented_file_equals_the_defaults() {
 }
 
 #[test]
+fn the_memory_of_jobs_is_limited_where_that_is_set() {
+    assert_eq!(Settings::default().max_job_memory(), None);
+    let settings = layers("max_job_memory_mebibytes = 3", &[], &[]).unwrap();
+    assert_eq!(settings.max_job_memory(), Some(3 << 20));
+}
+
+#[test]
 fn unknown_settings_are_named() {
     let text = error("max_atempts = 3", &[], &[]);
     assert!(text.contains("unknown field `max_atempts`"), "{text}");
@@ -176,6 +184,10 @@ fn bad_values_are_told_with_setting_and_limit() {
     assert_eq!(
         error("", &[("GUARDSPLAT_MAX_ATTEMPTS", "101")], &[]),
         "setting max_attempts: 101 is not between 1 and 100"
+    );
+    assert_eq!(
+        error("", &[("GUARDSPLAT_MAX_JOB_MEMORY_MEBIBYTES", "16777217")], &[]),
+        "setting max_job_memory_mebibytes: 16777217 is not between 0 and 16777216"
     );
     assert_eq!(error("data_dir = \"\"", &[], &[]), "setting data_dir: an empty path");
     assert!(error("log_filter = \"info,=[\"", &[], &[]).starts_with("setting log_filter: "));

@@ -1,4 +1,5 @@
 //! The API over a real socket, with a real ledger and a real folder, called through generated clients.
+mod admission;
 mod artifacts;
 mod harness;
 mod housekeeping;

@@ -1,0 +1,94 @@
+//! Whether there is room for a job: in the queue, and for its scene in the memory that a job may take.
+use std::path::Path;
+use std::time::Duration;
+
+use guardsplat_scene::{HEAD, Summary};
+
+use super::Api;
+use super::names::Kind;
+use super::submission::Submission;
+use crate::artifacts::{ArtifactPath, StoreError};
+use crate::error::{Error, Result};
+use crate::ledger::{ArtifactId, JobKind};
+
+/// When a submitter tries again while the queue is full.
+const QUEUE_RETRY: Duration = Duration::from_secs(10);
+
+impl Api {
+    /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
+    pub(super) async fn admit(&self, submission: &Submission) -> Result<()> {
+        let limit = self.limits().max_queued;
+        let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
+        let memory = self.limits().max_job_memory.zip(scene_of(submission));
+        if !full && memory.is_none() || self.is_known(submission).await? {
+            return Ok(());
+        }
+        if full {
+            return Err(Error::QueueFull {
+                limit,
+                retry_after: QUEUE_RETRY,
+            });
+        }
+        if let Some((limit, scene)) = memory
+            && let Some(summary) = self.summary(scene).await?
+        {
+            check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a request made a job before.
+    async fn is_known(&self, submission: &Submission) -> Result<bool> {
+        match submission.request_id {
+            Some(request) => Ok(self.ledger().find_request(request).await?.is_some()),
+            None => Ok(false),
+        }
+    }
+
+    /// What the first bytes of an artifact tell of a scene. What is none, or not there any more, is for others to
+    /// refuse, who know more of it.
+    async fn summary(&self, id: ArtifactId) -> Result<Option<Summary>> {
+        let Some(row) = self.ledger().get_artifact(id).await? else {
+            return Ok(None);
+        };
+        let path = ArtifactPath::parse(&row.path)?;
+        let (head, size) = match self.store().head(&path, HEAD).await {
+            Err(StoreError::Gone { .. }) => return Ok(None),
+            head => head?,
+        };
+        let name = Kind::Artifact.name(id);
+        Ok(
+            guardsplat_scene::summary(Path::new(&name), &head, size).unwrap_or_else(|refusal| {
+                tracing::debug!(%refusal, "not known to be a scene");
+                None
+            }),
+        )
+    }
+}
+
+/// The artifact that is a scene, or may be one: a worker takes several suspects for pictures.
+fn scene_of(submission: &Submission) -> Option<ArtifactId> {
+    match (submission.kind, &submission.inputs[..]) {
+        (JobKind::Embed | JobKind::Verify, [scene]) => Some(*scene),
+        _ => None,
+    }
+}
+
+/// Refuses a scene that takes more than `limit` bytes, whatever else its job asks for.
+fn check(name: &str, kind: JobKind, summary: &Summary, limit: u64) -> Result<()> {
+    let (needed, likely) = match kind {
+        JobKind::Embed => (summary.least_to_mark(), summary.likely_to_mark()),
+        JobKind::Verify | JobKind::CreateKey => (summary.least_to_read(), summary.likely_to_read()),
+    };
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::SceneDoesNotFit {
+        name: name.to_owned(),
+        gaussians: summary.gaussians,
+        degree: summary.degree,
+        needed,
+        likely,
+        limit,
+    })
+}
