@@ -7,6 +7,7 @@ mod error;
 mod gaussians;
 mod ply;
 mod scene;
+mod sog;
 #[doc(hidden)]
 pub mod testing;
 mod whole;

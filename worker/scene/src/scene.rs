@@ -2,7 +2,7 @@
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::whole::write_whole;
-use crate::{Error, Result, ply};
+use crate::{Error, Result, ply, sog};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -49,8 +49,11 @@ impl Scene {
     /// Reads a scene of `size` bytes; `path` is for messages.
     fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
-        let _first = source.fill_buf().map_err(Error::io(path))?;
-        let (gaussians, source) = ply::read(path, source, size)?;
+        let first = source.fill_buf().map_err(Error::io(path))?;
+        let (gaussians, source) = match first {
+            _ if sog::detect(first) => sog::read(path, source, size)?,
+            _ => ply::read(path, source, size)?,
+        };
         Ok(Scene {
             gaussians,
             source: Some(source),
