@@ -29,6 +29,10 @@ impl<'a> Archive<'a> {
         let mut packed = 0u64;
         for i in 0..zip.len() {
             let entry = zip.by_index_raw(i).map_err(broken)?;
+            // Copied entries lose the mark of it.
+            if entry.encrypted() {
+                return Err(format!("a ZIP whose entry {i} is encrypted"));
+            }
             let end = entry
                 .data_start()
                 .and_then(|start| start.checked_add(entry.compressed_size()));

@@ -159,6 +159,23 @@ fn bands_that_nobody_uses_are_in_the_file_only() {
 }
 
 #[test]
+fn one_coefficient_is_a_band() {
+    for (place, degree) in [(0, 1), (2, 1), (3, 2), (7, 2), (8, 3), (14, 3)] {
+        let mut file = File::new(2, 3, 6)
+            .with("/shN/codebook/9", 0.0.into())
+            .pixel("shN_labels", 4, [7, 0, 0, 0]);
+        file.pixels("shN_centroids").fill([9; 4]);
+        let file = file.pixel("shN_centroids", 7 * 15 + place, [9, 9, 8, 9]);
+        let sh = file.read().unwrap().gaussians.sh;
+        assert_eq!(sh.degree, degree, "place {place}");
+        close(
+            sh.coefficients[4 * sh.per_gaussian() + 3 * (place + 1) + 2],
+            0.05 * 8.0 - 2.5,
+        );
+    }
+}
+
+#[test]
 fn no_gaussians_are_read() {
     for version in [1, 2] {
         let scene = File::new(version, 2, 0).read().unwrap();

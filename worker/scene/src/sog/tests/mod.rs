@@ -188,7 +188,8 @@ fn read(bytes: &[u8]) -> Result<Scene> {
 fn refused(bytes: &[u8]) -> String {
     match read(bytes) {
         Err(Error::BadScene { reason, .. }) => reason,
-        other => panic!("{other:?}"),
+        Err(other) => panic!("{other}"),
+        Ok(scene) => panic!("{} Gaussians were read", scene.gaussians.len()),
     }
 }
 
