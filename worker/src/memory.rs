@@ -39,7 +39,10 @@ impl Memory {
 
     /// All of it.
     pub fn total(&self) -> u64 {
-        self.parts().iter().map(|(_, bytes)| bytes).fold(0, |sum, b| sum.saturating_add(*b))
+        self.parts()
+            .iter()
+            .map(|(_, bytes)| bytes)
+            .fold(0, |sum, b| sum.saturating_add(*b))
     }
 
     fn parts(&self) -> [(&'static str, u64); 7] {
@@ -111,7 +114,11 @@ impl Limits {
         if memory.total() <= self.memory {
             return Ok(());
         }
-        let whose = if self.budget { "its budget is" } else { "the machine has" };
+        let whose = if self.budget {
+            "its budget is"
+        } else {
+            "the machine has"
+        };
         Err(Error::DoesNotFit {
             reason: format!("it needs {memory}, {whose} {}", Bytes(self.memory)),
         })
@@ -143,14 +150,20 @@ fn machine() -> u64 {
         0 => u64::MAX, // the system does not tell
         total => total,
     };
-    system.cgroup_limits().map_or(total, |limits| limits.total_memory.min(total))
+    system
+        .cgroup_limits()
+        .map_or(total, |limits| limits.total_memory.min(total))
 }
 
 /// The most memory that this process has had in use at once, in bytes; `None` where the system does not tell.
 pub fn peak() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.split_ascii_whitespace().next()?.parse::<u64>().ok().map(|kib| kib << 10)
+    line.split_ascii_whitespace()
+        .next()?
+        .parse::<u64>()
+        .ok()
+        .map(|kib| kib << 10)
 }
 
 #[cfg(test)]
