@@ -10,6 +10,7 @@ mod ply;
 mod range;
 mod rest;
 mod scene;
+mod sog;
 mod splat;
 mod spz;
 mod summary;

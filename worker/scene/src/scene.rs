@@ -2,7 +2,7 @@
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::whole::write_whole;
-use crate::{Error, Result, ply, splat, spz};
+use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 /// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
 /// a format whose files may begin in any way.
-pub(crate) const UNKNOWN: &str = "not a scene: neither a PLY, plain or compressed, nor an SPZ, nor a .splat, since ";
+pub(crate) const UNKNOWN: &str =
+    "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG or a .splat, since ";
 
 /// A scene: what the engine computes with, and the file it came from.
 #[derive(Clone, Debug)]
@@ -57,6 +58,7 @@ impl Scene {
         let (gaussians, source) = match first {
             first if ply::begins(first) => ply::read(path, source, size)?,
             first if spz::is_spz(first) => spz::read(path, source, size)?,
+            first if sog::detect(first) => sog::read(path, source, size)?,
             _ => splat::read(path, source, size)?,
         };
         Ok(Scene {

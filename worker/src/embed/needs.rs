@@ -71,7 +71,15 @@ impl ViewSize {
     pub fn measure(engine: &Engine, gaussians: &Gaussians, settings: &Settings) -> Result<Self> {
         let sampler = ViewSampler::new(gaussians, settings.seed)?;
         let camera = sampler.camera(Split::Training, 0, settings.size);
-        let view = PooledView::new(engine, gaussians, &camera, settings.enlarged, [1.0; 3])?.view;
+        let view = PooledView::new(
+            engine,
+            gaussians,
+            &camera,
+            settings.enlarged,
+            settings.half_weights,
+            [1.0; 3],
+        )?
+        .view;
         let weights = view.weight_bytes() as f64;
         let side = f64::from(settings.size * settings.enlarged);
         Ok(Self {

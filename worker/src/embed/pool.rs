@@ -33,16 +33,17 @@ pub(super) struct PooledView {
 }
 
 impl PooledView {
-    /// `camera` has the size of the picture.
+    /// `camera` has the size of the picture; `half` keeps what is drawn with in half precision.
     pub fn new(
         engine: &Engine,
         gaussians: &Gaussians,
         camera: &Camera,
         times: u32,
+        half: bool,
         background: [f32; 3],
     ) -> Result<Self> {
         let camera = camera.enlarged(times);
-        let view = prepare(gaussians, &camera, engine.weight_cache(camera.width))?;
+        let view = prepare(gaussians, &camera, engine.weight_cache(camera.width, half))?;
         let colours = sh::colours(&gaussians.sh, None, &view);
         let reference = engine.rasterizer()?.render(&view, &colours, background)?.shrunk(times);
         Ok(Self {
@@ -157,7 +158,14 @@ impl Pool {
         let made = engine.each(&wanted, |&index| {
             let camera = self.sampler.camera(Split::Training, index, self.settings.size);
             let (background, times) = self.chosen(index);
-            let view = PooledView::new(engine, gaussians, &camera, times, background)?;
+            let view = PooledView::new(
+                engine,
+                gaussians,
+                &camera,
+                times,
+                self.settings.half_weights,
+                background,
+            )?;
             Ok(Arc::new(view))
         })?;
         self.next += count as u64;

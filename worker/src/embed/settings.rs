@@ -95,6 +95,8 @@ pub struct Settings {
     pub pool_views: usize,
     /// Memory for kept views, in MiB; the oldest go first.
     pub pool_mebibytes: usize,
+    /// Keeps what views are drawn with in half precision: three bytes a weight instead of five.
+    pub half_weights: bool,
     /// Side of training views in pixels.
     pub size: u32,
     /// Training views are drawn at 1 to so many times their side, and averaged down: a scene looks a little different
@@ -166,6 +168,7 @@ impl Preset {
             views: None,
             pool_views: 150,
             pool_mebibytes: 1024,
+            half_weights: false,
             size: 160,
             enlarged: 3,
             black_backgrounds: 0.1,

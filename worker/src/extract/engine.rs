@@ -167,12 +167,12 @@ impl Engine {
         })
     }
 
-    /// What a view that is drawn repeatedly keeps: weights where they are used and fit.
-    pub fn weight_cache(&self, size: u32) -> WeightCache {
-        if on_cpu(&self.compute) && size <= CACHED_SIDE {
-            WeightCache::Weights
-        } else {
-            WeightCache::None
+    /// What a view that is drawn repeatedly keeps: weights where they are used and fit, in `half` precision if asked for.
+    pub fn weight_cache(&self, size: u32, half: bool) -> WeightCache {
+        match on_cpu(&self.compute) && size <= CACHED_SIDE {
+            true if half => WeightCache::HalfWeights,
+            true => WeightCache::Weights,
+            false => WeightCache::None,
         }
     }
 

@@ -176,6 +176,34 @@ fn cached_and_fresh_weights_give_the_same_bytes() {
     assert_eq!(CpuRasterizer.render(&again, &colours, BACKGROUND).unwrap(), plain.1);
 }
 
+/// Half precision is within its rounding of single: 2^-11 of every weight.
+#[test]
+fn half_precision_is_off_by_its_rounding() {
+    let g = scene(2000, 1);
+    let camera = camera(75);
+    let run = |cache| {
+        let view = prepare(&g, &camera, cache).unwrap();
+        let colours = sh::colours(&g.sh, None, &view);
+        let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
+        let signs: Vec<f32> = (0..picture.pixels.len()).map(|i| (i as f32 * 0.61).sin()).collect();
+        let gradient = CpuRasterizer.backward(&view, &signs).unwrap();
+        (picture.pixels, gradient, view.weight_bytes())
+    };
+    let (single, half) = (run(WeightCache::Weights), run(WeightCache::HalfWeights));
+    let largest = single.0.iter().fold(0.0f32, |m, v| m.max(*v));
+    let worst = single
+        .0
+        .iter()
+        .zip(&half.0)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f32::max);
+    assert!(worst > 0.0 && worst < largest / 2048.0, "{worst} of {largest}");
+    let product = |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum() };
+    let cosine = product(&single.1, &half.1) / (product(&single.1, &single.1) * product(&half.1, &half.1)).sqrt();
+    assert!(cosine > 0.999_999, "{cosine}");
+    assert!(half.2 < single.2 * 7 / 10);
+}
+
 #[test]
 fn the_number_of_threads_changes_nothing() {
     let g = scene(9000, 2);

@@ -107,11 +107,13 @@ impl<'a> Cursor<'a> {
     /// Gives `sink` what [`walk`] would, and returns the next tile's transmittance.
     #[inline(always)]
     fn replay(&mut self, list: &[u32], sink: &mut impl Sink) -> &'a [f32; TILE_PIXELS] {
+        let mut room = [0.0; TILE_PIXELS];
         for (place, &splat) in list.iter().enumerate() {
             let end = self.band.ends[self.slot + place] as usize;
             sink.begin(place, splat);
             let range = self.entry..end;
-            for (pixel, weight) in self.band.pixels[range.clone()].iter().zip(&self.band.weights[range]) {
+            let weights = self.band.weights.of(range.clone(), &mut room);
+            for (pixel, weight) in self.band.pixels[range].iter().zip(weights) {
                 sink.add(*pixel as usize, *weight);
             }
             sink.end(place, false);

@@ -7,6 +7,7 @@ use crate::scene::Gaussians;
 use crate::view::Camera;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// Largest picture side; keeps all products of tiles and pixels well within 32 bits.
 pub const MAX_SIDE: u32 = 16_384;
@@ -20,6 +21,19 @@ pub enum WeightCache {
     None,
     /// Every weight (5 bytes each): drawing and its gradient become sparse products. For pictures drawn repeatedly.
     Weights,
+    /// Every weight in half precision (3 bytes each).
+    HalfWeights,
+}
+
+/// Where the time of [`prepare`] went.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PrepareTimes {
+    /// Projecting and culling.
+    pub project: Duration,
+    /// Sorting into tiles.
+    pub sort: Duration,
+    /// Computing the weights that are kept, and what follows from them.
+    pub weights: Duration,
 }
 
 /// Tells views apart that a rasteriser keeps on a device; says nothing about their content.
@@ -95,7 +109,22 @@ impl PreparedView {
 /// [`Error::BadOption`] when the camera's size or focal length is out of range, or the view has too many
 /// (Gaussian, tile) pairs for 32-bit lists.
 pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Result<PreparedView> {
+    prepare_timed(gaussians, camera, cache).map(|(view, _)| view)
+}
+
+/// [`prepare`], and where its time went.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_timed(
+    gaussians: &Gaussians,
+    camera: &Camera,
+    cache: WeightCache,
+) -> Result<(PreparedView, PrepareTimes)> {
     check_camera(camera)?;
+    let mut clock = Instant::now();
+    let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed();
+    let mut times = PrepareTimes::default();
     let projector = Projector::new(camera);
     let n = gaussians.len();
     let chunks: Vec<Vec<(u32, (Splat2d, TileRect))>> = (0..n.div_ceil(CHUNK))
@@ -113,12 +142,15 @@ pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Re
         visible.push(row);
         projected.push(one);
     }
+    times.project = lap();
     let (columns, rows) = (camera.width.div_ceil(TILE), camera.height.div_ceil(TILE));
     let mut tiles = TileLists::new(columns, rows, &projected)?;
     let mut splats: Vec<Splat2d> = projected.into_iter().map(|(splat, _)| splat).collect();
+    times.sort = lap();
     let mut weights = None;
-    if cache == WeightCache::Weights {
-        let (kept, keep) = SparseWeights::new(camera, &tiles, &splats)?;
+    if cache != WeightCache::None {
+        let half = cache == WeightCache::HalfWeights;
+        let (kept, keep) = SparseWeights::new(camera, &tiles, &splats, half)?;
         let mut used = vec![false; splats.len()];
         for (slot, splat) in tiles.splats.iter().enumerate() {
             used[*splat as usize] |= keep[slot];
@@ -144,7 +176,8 @@ pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Re
         .with_min_len(CHUNK)
         .map(|row| projector.direction(gaussians, *row as usize))
         .collect();
-    Ok(PreparedView {
+    times.weights = lap();
+    let view = PreparedView {
         camera: camera.clone(),
         visible,
         splats,
@@ -152,7 +185,8 @@ pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Re
         tiles,
         weights,
         id: ViewId::next(),
-    })
+    };
+    Ok((view, times))
 }
 
 fn check_camera(camera: &Camera) -> Result<()> {

@@ -4,12 +4,14 @@ use super::tiles::{TILE_PIXELS, TileLists};
 use super::walk::{Sink, TileFrame, walk};
 use crate::error::{Error, Result};
 use crate::view::Camera;
+use half::f16;
+use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
 /// Sparse weights of a view, one part a row of tiles.
 ///
 /// Stored by (splat, tile) pair rather than by pixel: the pixel is then one byte, the colour is read once a pair,
-/// and both the product and its transpose stay within the 4 KiB of a tile. 5 bytes a weight.
+/// and both the product and its transpose stay within the 4 KiB of a tile. 5 bytes a weight, or 3 in half precision.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SparseWeights {
     pub bands: Vec<Band>,
@@ -23,18 +25,74 @@ pub(crate) struct Band {
     /// Pixel of each entry, row-major in its tile.
     pub pixels: Box<[u8]>,
     /// Weight of each entry.
-    pub weights: Box<[f32]>,
+    pub weights: Numbers,
     /// Transmittance behind everything, `[columns][256]`.
     pub transmittance: Vec<[f32; TILE_PIXELS]>,
 }
 
+/// Weights, in either precision.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Numbers {
+    /// As they are computed.
+    Single(Box<[f32]>),
+    /// Rounded to half precision. All are below 1, so none overflows; those below 6e-5 lose digits, and those below
+    /// 3e-8 become 0.
+    Half(Box<[f16]>),
+}
+
+impl Default for Numbers {
+    fn default() -> Self {
+        Numbers::Single(Box::default())
+    }
+}
+
+impl Numbers {
+    fn new(weights: &[f32], half: bool) -> Self {
+        if half {
+            let mut rounded = vec![f16::ZERO; weights.len()].into_boxed_slice();
+            rounded.convert_from_f32_slice(weights);
+            Numbers::Half(rounded)
+        } else {
+            Numbers::Single(weights.into())
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Numbers::Single(all) => all.len(),
+            Numbers::Half(all) => all.len(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Numbers::Single(all) => size_of_val(&all[..]),
+            Numbers::Half(all) => size_of_val(&all[..]),
+        }
+    }
+
+    /// The weights of one pair, at most one a pixel; `room` is where they are widened to.
+    #[inline(always)]
+    pub fn of<'a>(&'a self, range: std::ops::Range<usize>, room: &'a mut [f32; TILE_PIXELS]) -> &'a [f32] {
+        match self {
+            Numbers::Single(all) => &all[range],
+            Numbers::Half(all) => {
+                let room = &mut room[..range.len()];
+                all[range].convert_to_f32_slice(room);
+                room
+            }
+        }
+    }
+}
+
 impl SparseWeights {
-    /// Walks all tiles. Also returns which pairs matter: those with a weight, and those that ended a pixel.
-    pub fn new(camera: &Camera, tiles: &TileLists, splats: &[Splat2d]) -> Result<(Self, Vec<bool>)> {
+    /// Walks all tiles; weights are kept in `half` precision if asked for. Also returns which pairs matter: those with a
+    /// weight, and those that ended a pixel.
+    pub fn new(camera: &Camera, tiles: &TileLists, splats: &[Splat2d], half: bool) -> Result<(Self, Vec<bool>)> {
         let parts: Vec<(Band, Vec<bool>)> = (0..tiles.rows)
             .into_par_iter()
             .map_init(Scratch::default, |scratch, row| {
-                Band::new(camera, tiles, splats, row, scratch)
+                Band::new(camera, tiles, splats, row, half, scratch)
             })
             .collect::<Result<_>>()?;
         let mut keep = Vec::with_capacity(tiles.pairs());
@@ -55,7 +113,7 @@ impl SparseWeights {
     pub fn bytes(&self) -> usize {
         self.bands
             .iter()
-            .map(|b| 4 * b.ends.len() + 5 * b.weights.len() + 4 * TILE_PIXELS * b.transmittance.len())
+            .map(|b| 4 * b.ends.len() + b.pixels.len() + b.weights.bytes() + 4 * TILE_PIXELS * b.transmittance.len())
             .sum()
     }
 }
@@ -67,6 +125,7 @@ impl Band {
         tiles: &TileLists,
         splats: &[Splat2d],
         row: u32,
+        half: bool,
         scratch: &mut Scratch,
     ) -> Result<(Self, Vec<bool>)> {
         let first = (row * tiles.columns) as usize;
@@ -98,7 +157,7 @@ impl Band {
         }
         let Collect { ends, keep, .. } = collect;
         // Copies of the exact size: growing in place would leave up to half of the memory unused.
-        let (pixels, weights) = (scratch.pixels.as_slice().into(), scratch.weights.as_slice().into());
+        let (pixels, weights) = (scratch.pixels.as_slice().into(), Numbers::new(&scratch.weights, half));
         Ok((
             Band {
                 ends,

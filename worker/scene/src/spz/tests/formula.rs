@@ -115,8 +115,12 @@ fn bands_without_anything_are_not_in_memory() {
                 let scene = file.read().unwrap();
                 let sh = &scene.gaussians.sh;
                 let row = harmonics(used) + 3;
-                assert_eq!((sh.degree, sh.coefficients.len()), (used.into(), 3 * row), "{place:?}");
-                assert_eq!(scene.learnable_degree(), used.into());
+                assert_eq!(
+                    (sh.degree, sh.coefficients.len()),
+                    (usize::from(used), 3 * row),
+                    "{place:?}"
+                );
+                assert_eq!(scene.learnable_degree(), usize::from(used));
                 if let Some(place) = place {
                     assert_eq!(sh.coefficients[row + 3 + place], 1.0 / 128.0);
                 }

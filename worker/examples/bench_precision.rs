@@ -1,0 +1,151 @@
+//! What cheaper arithmetic costs, as a table:
+//! `cargo run --release --workspace --example bench_precision -- SCENE KEY MESSAGE [PRESET]`.
+//!
+//! For every setting the scene is marked and the file verified as `embed` does it; pictures and gradients of the first
+//! training views are compared with those in single precision, where the setting changes them.
+use std::path::Path;
+use std::time::Instant;
+
+use guardsplat_worker::clip::{Clip, Parts};
+use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::embed::{Job, Preset, Settings, embed};
+use guardsplat_worker::extract::Engine;
+use guardsplat_worker::message::Key;
+use guardsplat_worker::scene::{Gaussians, Scene};
+use guardsplat_worker::splat::{Learnable, WeightCache, prepare, sh};
+use guardsplat_worker::view::{Split, ViewSampler};
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Views whose pictures and gradients are compared.
+const VIEWS: u64 = 4;
+
+/// How a setting's pictures and gradients differ from single precision.
+struct Difference {
+    max: f64,
+    mean: f64,
+    cosine: f64,
+    bias: f64,
+}
+
+fn main() -> Result<(), Failure> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [scene_path, key_path, message, preset @ ..] = &arguments[..] else {
+        return Err("usage: bench_precision SCENE KEY MESSAGE [PRESET]".into());
+    };
+    let preset: Preset = preset.first().map_or(Ok(Preset::Standard), |name| name.parse())?;
+    let standard = preset.settings();
+    let key = Key::read(Path::new(key_path))?;
+    let message = key.message(message)?;
+    let compute = open(DeviceChoice::Cpu)?;
+    let clip = Clip::shipped(&compute.device, Parts::Image)?;
+    let engine = Engine::new(compute, clip, &key, None)?;
+    let scene = Scene::read(Path::new(scene_path))?.gaussians;
+    let cases = [
+        ("single precision", standard),
+        (
+            "weights in half precision",
+            Settings {
+                half_weights: true,
+                ..standard
+            },
+        ),
+        ("views of 112 px instead of 160", Settings { size: 112, ..standard }),
+        (
+            "views drawn at their size only",
+            Settings {
+                enlarged: 1,
+                ..standard
+            },
+        ),
+        (
+            "128 training views",
+            Settings {
+                views: Some(128),
+                ..standard
+            },
+        ),
+    ];
+    println!(
+        "{scene_path}, {} Gaussians, preset {}, {} threads\n",
+        scene.len(),
+        preset.name(),
+        rayon::current_num_threads()
+    );
+    println!("| setting | bits a picture | PSNR | s | peak so far | picture max | mean | gradient cosine | bias |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let folder = tempfile::tempdir()?;
+    for (name, settings) in cases {
+        let start = Instant::now();
+        let job = Job {
+            input: Path::new(scene_path),
+            output: &folder.path().join("marked"),
+            message: &message,
+            settings: &settings,
+            force: true,
+        };
+        let outcome = embed(&engine, &job, &mut |_| {})?;
+        let seconds = start.elapsed().as_secs_f64();
+        let compared = match settings.half_weights {
+            true => {
+                let d = differences(&engine, &scene, &settings)?;
+                format!(
+                    "{:.1e} | {:.1e} | 1 - {:.0e} | {:.0e}",
+                    d.max,
+                    d.mean,
+                    1.0 - d.cosine,
+                    d.bias
+                )
+            }
+            false => "- | - | - | -".to_owned(),
+        };
+        println!(
+            "| {name} | {:.2} % | {:.2} dB | {seconds:.0} | {:.0} MB | {compared} |",
+            100.0 * outcome.verification.comparison.bit_accuracy,
+            outcome.verification.quality.psnr.psnr_db.unwrap_or(f64::INFINITY),
+            guardsplat_worker::memory::peak().unwrap_or(0) as f64 / 1e6
+        );
+    }
+    Ok(())
+}
+
+fn differences(engine: &Engine, scene: &Gaussians, settings: &Settings) -> Result<Difference, Failure> {
+    let sampler = ViewSampler::new(scene, settings.seed)?;
+    let learnable = Learnable::all(scene);
+    let rasterizer = engine.rasterizer()?;
+    let (mut max, mut sum, mut count) = (0.0f64, 0.0, 0);
+    let mut gradients = [vec![0.0; learnable.len()], vec![0.0; learnable.len()]];
+    for index in 0..VIEWS {
+        let camera = sampler
+            .camera(Split::Training, index, settings.size)
+            .enlarged(settings.enlarged);
+        let mut pictures = Vec::new();
+        for (cache, gradient) in [WeightCache::Weights, WeightCache::HalfWeights]
+            .into_iter()
+            .zip(&mut gradients)
+        {
+            let view = prepare(scene, &camera, cache)?;
+            let colours = sh::colours(&scene.sh, None, &view);
+            let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
+            let signs: Vec<f32> = (0..picture.pixels.len()).map(|i| (i as f32 * 0.61).sin()).collect();
+            let of_colours = rasterizer.backward(&view, &signs)?;
+            sh::backward(&learnable, &view, &colours, &of_colours, gradient);
+            pictures.push(picture.pixels);
+        }
+        for (a, b) in pictures[0].iter().zip(&pictures[1]) {
+            let difference = f64::from((a - b).abs());
+            max = max.max(difference);
+            sum += difference;
+            count += 1;
+        }
+    }
+    let [single, half] = &gradients;
+    let product = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
+    let total = |a: &[f32]| a.iter().map(|v| f64::from(v.abs())).sum::<f64>();
+    Ok(Difference {
+        max,
+        mean: sum / f64::from(count),
+        cosine: product(single, half) / (product(single, single) * product(half, half)).sqrt(),
+        bias: (total(half) - total(single)) / total(single),
+    })
+}

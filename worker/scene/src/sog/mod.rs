@@ -1,0 +1,184 @@
+//! SOG files of PlayCanvas: a ZIP of `meta.json` and lossless WebP pictures, a pixel a Gaussian, of versions 1 and 2.
+//!
+//! A written file differs from the one read in nothing but the red, green and blue of the picture `sh0`: indices into
+//! a table of 256 values a channel, which stays as it is. Higher bands are a palette that Gaussians share, and stay
+//! as they are too. Every other entry of the ZIP keeps its bytes.
+mod archive;
+mod budget;
+mod codebook;
+mod decode;
+mod json;
+mod meta;
+mod palette;
+mod picture;
+
+use crate::container::{Container, Format};
+use crate::gaussians::{Gaussians, Sh};
+use crate::scene::bad;
+use crate::{Error, Result};
+use archive::Archive;
+use budget::Budget;
+use codebook::Codebook;
+use meta::{Meta, Role};
+use palette::Palette;
+use picture::Picture;
+use std::io::{self, BufReader, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// How a ZIP starts whose first entry starts with its first byte.
+const ZIP: &[u8] = b"PK\x03\x04";
+
+/// Largest `meta.json`: four tables of 256 numbers are 40 KiB at most.
+const MAX_META: u64 = 1 << 20;
+
+/// A SOG as it was read.
+#[derive(Debug)]
+struct Sog {
+    /// The ZIP.
+    file: Vec<u8>,
+    /// Name of the entry of the picture of colours.
+    sh0: String,
+    /// That picture: three indices of [`Sog::dc`], and opacity.
+    colours: Picture,
+    /// What the indices stand for.
+    dc: [Codebook; 3],
+    /// Higher bands.
+    palette: Option<Palette>,
+}
+
+/// Whether a file that starts so is a SOG, or the `meta.json` of one that is a folder, which [`read`] explains.
+pub(crate) fn detect(first: &[u8]) -> bool {
+    first.starts_with(ZIP) || loose(first)
+}
+
+/// Whether a file that starts so is a `meta.json` without its pictures, or the index of a streamed SOG.
+fn loose(first: &[u8]) -> bool {
+    let has = |word: &[u8]| first.windows(word.len()).any(|part| part == word);
+    first.trim_ascii_start().starts_with(b"{") && (has(b"\"means\"") || has(b"\"lodLevels\""))
+}
+
+/// Reads a SOG of `size` bytes from its first byte; `path` is for messages.
+pub(crate) fn read(
+    path: &Path,
+    source: &mut BufReader<impl Read>,
+    size: u64,
+) -> Result<(Gaussians, Arc<dyn Container>)> {
+    let mut file = Vec::new();
+    usize::try_from(size)
+        .ok()
+        .and_then(|size| file.try_reserve_exact(size).ok())
+        .ok_or_else(|| bad(path, format!("{size} bytes do not fit in memory")))?;
+    source.take(size).read_to_end(&mut file).map_err(Error::io(path))?;
+    let (gaussians, sog) = parse(file).map_err(|reason| bad(path, reason))?;
+    Ok((gaussians, Arc::new(sog)))
+}
+
+fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
+    if !file.starts_with(ZIP) {
+        return Err("the meta.json of an SOG without its pictures; bundle the folder into one .sog file first".into());
+    }
+    let mut budget = Budget::new(file.len() as u64);
+    let mut archive = Archive::open(&file)?;
+    let meta = archive.unpack("meta.json", "meta.json", MAX_META, &mut budget)?;
+    let meta = meta::parse(&meta).map_err(|reason| format!("meta.json: {reason}"))?;
+    let mut size = None;
+    let mut picture = |role: Role, name: &str, budget: &mut Budget| -> Result<Picture, String> {
+        let webp = archive.unpack(name, role.name(), u64::MAX, budget)?;
+        let picture = Picture::decode(webp, |this| {
+            if role != Role::Centroids {
+                role.check_size(this, *size.get_or_insert(this), meta.count)?;
+            }
+            budget.spend(this.bytes())
+        });
+        picture.map_err(|reason| format!("picture {}: {reason}", role.name()))
+    };
+    let palette = match &meta.rest {
+        None => None,
+        Some(rest) => {
+            let labels = picture(Role::Labels, &rest.labels, &mut budget)?;
+            let centroids = picture(Role::Centroids, &rest.centroids, &mut budget)?;
+            Palette::decode(rest, &labels, &centroids, meta.count as usize)?
+        }
+    };
+    let degree = palette.as_ref().map_or(0, Palette::degree);
+    budget.spend(meta.count.saturating_mul(decode::bytes_per_gaussian(degree)))?;
+    let count = meta.count as usize;
+    let positions = decode::positions(
+        &picture(Role::Lower, &meta.lower, &mut budget)?,
+        &picture(Role::Upper, &meta.upper, &mut budget)?,
+        &meta.ranges,
+        count,
+    );
+    let rotations = decode::rotations(&picture(Role::Quats, &meta.quats, &mut budget)?, count)?;
+    let log_scales = decode::log_scales(&picture(Role::Scales, &meta.scales, &mut budget)?, &meta.sizes, count)?;
+    let colours = picture(Role::Sh0, &meta.sh0, &mut budget)?;
+    let gaussians = Gaussians {
+        positions,
+        rotations,
+        log_scales,
+        opacity_logits: decode::opacity_logits(&colours, &meta.opacity, count),
+        sh: decode::sh(&colours, &meta.dc, palette.as_ref(), count)?,
+    };
+    let Meta { sh0, dc, .. } = meta;
+    // What cannot be written again is refused now, not when its marks are to be saved.
+    archive::replace(&file, &sh0, b"")?;
+    let sog = Sog {
+        file,
+        sh0,
+        colours,
+        dc,
+        palette,
+    };
+    Ok((gaussians, sog))
+}
+
+impl Container for Sog {
+    fn format(&self) -> Format {
+        Format::Sog
+    }
+
+    fn bytes(&self) -> usize {
+        // The palette is what else is kept; it is small beside the pictures.
+        self.file.len() + self.colours.bytes()
+    }
+
+    fn exact(&self) -> bool {
+        false
+    }
+
+    /// Constant colour only: Gaussians share the palette of higher bands.
+    fn learnable_degree(&self, _scene: usize) -> usize {
+        0
+    }
+
+    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+        let texel = self.colours.texel(row);
+        for ((value, byte), table) in coefficients.iter_mut().zip(texel).zip(&self.dc) {
+            *value = table.value(table.nearest(byte, *value));
+        }
+        if let Some(palette) = &self.palette {
+            coefficients[3..].copy_from_slice(palette.row(row));
+        }
+    }
+
+    fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {
+        let mut colours = self.colours.clone();
+        let rows = sh.coefficients.chunks_exact(sh.per_gaussian()).enumerate();
+        for (row, coefficients) in rows {
+            let texel = colours.texel_mut(row);
+            for ((byte, value), table) in texel.iter_mut().zip(coefficients).zip(&self.dc) {
+                *byte = table.nearest(*byte, *value);
+            }
+        }
+        if colours == self.colours {
+            return out.write_all(&self.file);
+        }
+        let webp = colours.encode()?;
+        let file = archive::replace(&self.file, &self.sh0, &webp).map_err(io::Error::other)?;
+        out.write_all(&file)
+    }
+}
+
+#[cfg(test)]
+mod tests;
