@@ -4,6 +4,7 @@ mod bad_input;
 mod crashes;
 mod languages;
 mod main_job;
+mod memory;
 mod queue;
 mod restarts;
 #[path = "../../../worker/tests/support/tiny.rs"]

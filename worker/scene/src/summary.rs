@@ -2,13 +2,11 @@
 //! large before it is read, or queued.
 use crate::container::Format;
 use crate::scene::bad;
-use crate::{Result, ply, splat, spz};
+use crate::{Result, ply, sog, splat, spz};
 use std::path::Path;
 
 /// How many of its first bytes tell what there is to tell of a file.
 pub const HEAD: usize = ply::header::MAX_HEADER as usize;
-/// How a ZIP begins, and so a SOG: what it holds is told at its end.
-const ZIP: &[u8] = b"PK\x03\x04";
 /// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
 const GEOMETRY: u64 = 11;
 /// Arrays that the optimiser has, each as large as the coefficients: learned changes, their gradient, two moments.
@@ -28,7 +26,7 @@ pub struct Summary {
 }
 
 /// What `head` says, the first [`HEAD`] bytes of a file of `size` bytes, or all of a smaller one; `name` is for
-/// messages. `None` where it says nothing: what may be a SOG has its figures elsewhere.
+/// messages. `None` where it says nothing: a SOG has its figures anywhere.
 ///
 /// # Errors
 /// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read`](crate::Scene::read) would refuse after as many
@@ -37,7 +35,7 @@ pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
     let said = match head {
         _ if ply::begins(head) => ply::summary(head, size),
         _ if spz::is_spz(head) => spz::summary(head, size),
-        _ if head.starts_with(ZIP) => return Ok(None),
+        _ if sog::detect(head) => return Ok(None),
         _ => splat::summary(head, size),
     };
     said.map(Some).map_err(|reason| bad(name, reason))

@@ -12,7 +12,7 @@ use guardsplat_worker::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Exit, print_json, print_line};
+use super::{Budget, Exit, print_json, print_line};
 use crate::work::settings::chosen;
 use crate::work::{load, sheet};
 
@@ -39,6 +39,8 @@ pub struct Arguments {
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
+    #[command(flatten)]
+    budget: Budget,
     /// Side of training views and of those of the verification, in pixels
     #[arg(long, value_name = "PX")]
     size: Option<u32>,
@@ -98,6 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         arguments.clip.as_deref(),
         open(arguments.device)?,
         true,
+        arguments.budget.bytes(),
     )?;
     if settings.lambda.lpips > 0.0 && !engine.has_lpips() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");

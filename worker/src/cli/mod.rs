@@ -12,7 +12,7 @@ use std::error::Error as _;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use guardsplat_worker::{Error, Result};
 use tracing_subscriber::EnvFilter;
 
@@ -68,6 +68,21 @@ enum Command {
     Models(models::Command),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
+}
+
+/// How much memory a command may take.
+#[derive(Clone, Copy, Debug, Args)]
+struct Budget {
+    /// Most mebibytes of memory that a job may take; all that the machine has unless given
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    memory: Option<u64>,
+}
+
+impl Budget {
+    /// In bytes, where there is one.
+    fn bytes(self) -> Option<u64> {
+        self.memory.map(|mebibytes| mebibytes << 20)
+    }
 }
 
 /// What is behind a scene.
@@ -176,12 +191,12 @@ mod tests {
     fn the_promised_commands_parse() {
         for line in [
             "key create --bits 32 --seed 7 -o K",
-            "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json",
+            "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json --memory 2048",
             "embed IN OUT --key K --message 0123abcd --force --report R",
-            "verify A B C --key K --message 0123abcd --json",
-            "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3",
+            "verify A B C --key K --message 0123abcd --json --memory 1",
+            "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
-            "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D",
+            "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",
             "models list",
             "models verify",
         ] {
@@ -195,6 +210,10 @@ mod tests {
         let device = wrong("embed IN OUT --key K --message 0 --device cuda");
         assert!(device.contains("must be auto, wgpu or cpu"), "{device}");
         assert!(wrong("verify --key K").contains("PATH"));
+        for memory in ["0", "16777217", "-1", "1GB"] {
+            let line = format!("verify A --key K --memory={memory}");
+            assert!(wrong(&line).contains("--memory"), "{line}");
+        }
     }
 
     #[test]

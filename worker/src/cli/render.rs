@@ -1,9 +1,11 @@
 //! `render`.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::extract::rasterizer;
+use guardsplat_worker::memory::{Limits, Memory};
 use guardsplat_worker::quality::write_picture;
 use guardsplat_worker::scene::Scene;
 use guardsplat_worker::splat::{WeightCache, prepare, sh};
@@ -11,7 +13,7 @@ use guardsplat_worker::view::{Camera, Split, ViewSampler, read_cameras, write_ca
 use guardsplat_worker::{Error, Result};
 
 use super::display::Display;
-use super::{Background, Exit, print_line};
+use super::{Background, Budget, Exit, print_line};
 
 /// Side of views where neither a size nor a camera file says otherwise.
 const DEFAULT_SIZE: u32 = 512;
@@ -55,22 +57,29 @@ pub struct Arguments {
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
+    #[command(flatten)]
+    budget: Budget,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let size = arguments.size.unwrap_or(DEFAULT_SIZE);
+    let given = arguments.cameras.as_ref().map(|path| from_file(path, arguments));
+    let given: Option<Vec<Camera>> = given.transpose()?;
+    let pictures = match &given {
+        Some(cameras) => cameras.iter().map(|c| picture_bytes(c.width, c.height)).max(),
+        None => Some(picture_bytes(size, size)),
+    };
+    let rest = Memory {
+        pictures: pictures.unwrap_or(0),
+        ..Memory::of_program()
+    };
+    let limits = Limits::of_machine(arguments.budget.bytes());
+    admission::to_read(&arguments.input, &limits, rest)?;
     let scene = Scene::read(&arguments.input)?.gaussians;
-    let cameras = match &arguments.cameras {
-        Some(path) => {
-            let mut cameras = read_cameras(path)?;
-            cameras.truncate(arguments.views.unwrap_or(u32::MAX) as usize);
-            if let Some(size) = arguments.size {
-                cameras.iter_mut().for_each(|camera| resize(camera, size));
-            }
-            cameras
-        }
+    let cameras = match given {
+        Some(cameras) => cameras,
         None => {
             let sampler = ViewSampler::new(&scene, arguments.seed)?;
-            let size = arguments.size.unwrap_or(DEFAULT_SIZE);
             let views = 0..u64::from(arguments.views.unwrap_or(1));
             views.map(|index| sampler.camera(Split::HeldOut, index, size)).collect()
         }
@@ -98,6 +107,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         folder.display()
     ));
     Ok(Exit::Done)
+}
+
+/// The cameras of a file, as many and as large as asked for.
+fn from_file(path: &Path, arguments: &Arguments) -> Result<Vec<Camera>> {
+    let mut cameras = read_cameras(path)?;
+    cameras.truncate(arguments.views.unwrap_or(u32::MAX) as usize);
+    if let Some(size) = arguments.size {
+        cameras.iter_mut().for_each(|camera| resize(camera, size));
+    }
+    Ok(cameras)
 }
 
 /// Scales a camera so that its longer side has `size` pixels.

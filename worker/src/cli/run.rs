@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use clap::Args;
 use guardsplat_worker::device::DeviceChoice;
 
-use super::Exit;
+use super::{Budget, Exit};
 use crate::jobs;
 
 #[derive(Args)]
@@ -15,6 +15,8 @@ pub struct Arguments {
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
+    #[command(flatten)]
+    budget: Budget,
     /// What the worker calls itself; the machine's name and the process's number unless given
     #[arg(long)]
     name: Option<String>,
@@ -30,6 +32,7 @@ pub fn run(arguments: Arguments) -> Exit {
     let options = jobs::Options {
         server: arguments.server,
         device: arguments.device,
+        memory: arguments.budget.bytes(),
         name: arguments.name,
         stop_with_stdin: arguments.stop_with_stdin,
         work_dir: arguments.work_dir,

@@ -10,7 +10,7 @@ use guardsplat_worker::message::{Key, Verdict};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Background, Exit, print_json, print_line};
+use super::{Background, Budget, Exit, print_json, print_line};
 use crate::work::findings::{Findings, Views, read};
 use crate::work::load;
 
@@ -28,6 +28,8 @@ pub struct Arguments {
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
+    #[command(flatten)]
+    budget: Budget,
     /// Views that a scene is read from
     #[arg(long, default_value_t = DEFAULT_VIEWS as u32, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
@@ -68,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         arguments.clip.as_deref(),
         open(arguments.device)?,
         false,
+        arguments.budget.bytes(),
     )?;
     let views = Views {
         count: arguments.views as usize,

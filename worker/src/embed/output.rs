@@ -8,6 +8,7 @@ use super::optimise::optimise;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::verify::{Verification, verify};
+use crate::admission;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::memory::Memory;
@@ -62,6 +63,11 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     job.settings.check()?;
     let stop = &engine.stop;
     stop.check()?;
+    let rest = Memory {
+        models: engine.model_bytes(job.settings.lambda.lpips > 0.0),
+        ..Memory::of_program()
+    };
+    admission::to_mark(job.input, &engine.limits, rest)?;
     let scene = Scene::read(job.input)?;
     stop.check()?;
     let memory = admit(engine, &scene, job.settings)?;

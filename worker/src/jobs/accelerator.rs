@@ -21,15 +21,16 @@ pub struct Accelerator {
 }
 
 impl Accelerator {
-    /// Starts the thread and opens the device on it; the device's name comes back too.
+    /// Starts the thread and opens the device on it, for jobs that may take `budget` bytes of memory; the device's name
+    /// comes back too.
     ///
     /// # Errors
     /// Those of opening the device.
-    pub async fn start(device: DeviceChoice) -> Result<(Self, String)> {
+    pub async fn start(device: DeviceChoice, budget: Option<u64>) -> Result<(Self, String)> {
         let (queue, waiting) = mpsc::channel::<Work>();
         let (opened, is_open) = oneshot::channel();
         let run = move || {
-            let mut bench = match Bench::open(device) {
+            let mut bench = match Bench::open(device, budget) {
                 Ok(bench) => bench,
                 Err(error) => {
                     let _ = opened.send(Err(error));
@@ -100,7 +101,7 @@ mod tests {
 
     #[tokio::test]
     async fn work_is_done_elsewhere_and_in_order() {
-        let (accelerator, name) = Accelerator::start(DeviceChoice::Cpu).await.unwrap();
+        let (accelerator, name) = Accelerator::start(DeviceChoice::Cpu, None).await.unwrap();
         assert_eq!(name, "cpu");
         let here = std::thread::current().id();
         let there = accelerator.run(|_| std::thread::current().id()).await.unwrap();
@@ -118,7 +119,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_panic_is_an_error_with_its_words_and_the_end() {
-        let (accelerator, _) = Accelerator::start(DeviceChoice::Cpu).await.unwrap();
+        let (accelerator, _) = Accelerator::start(DeviceChoice::Cpu, None).await.unwrap();
         let result: Result<()> = accelerator.run(|_| panic!("device on fire")).await;
         let error = result.unwrap_err();
         assert_eq!(error.to_string(), "the engine panicked: device on fire");

@@ -12,15 +12,18 @@ use crate::work::load;
 /// A device with an engine on it.
 pub struct Bench {
     compute: Compute,
+    /// Bytes of memory that a job may take, if not all of the machine's.
+    budget: Option<u64>,
     /// The key's id, and its engine.
     loaded: Option<(String, Engine)>,
 }
 
 impl Bench {
-    /// Opens the device.
-    pub fn open(device: DeviceChoice) -> Result<Self> {
+    /// Opens the device, for jobs that may take so many bytes of memory.
+    pub fn open(device: DeviceChoice, budget: Option<u64>) -> Result<Self> {
         Ok(Self {
             compute: open(device)?,
+            budget,
             loaded: None,
         })
     }
@@ -43,7 +46,7 @@ impl Bench {
         let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
         let engine = match kept {
             Some((_, engine)) => engine,
-            None => load::engine(Path::new(name), key, None, self.compute.clone(), true)?,
+            None => load::engine(Path::new(name), key, None, self.compute.clone(), true, self.budget)?,
         };
         let (_, engine) = self.loaded.insert((id, engine));
         engine.stop = stop.clone();

@@ -37,6 +37,8 @@ pub struct Options {
     pub server: String,
     /// Where to compute.
     pub device: DeviceChoice,
+    /// Bytes of memory that a job may take; all that the machine has unless given.
+    pub memory: Option<u64>,
     /// What the worker calls itself.
     pub name: Option<String>,
     /// Whether the end of standard input asks the worker to leave.
@@ -64,7 +66,7 @@ async fn work(options: &Options) -> Result<()> {
     let leaving = signals::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
     let parent = options.work_dir.clone().unwrap_or_else(std::env::temp_dir);
     let folder = Folder::new(&parent)?;
-    let (accelerator, device) = Accelerator::start(options.device).await?;
+    let (accelerator, device) = Accelerator::start(options.device, options.memory).await?;
     let name = options.name.clone().unwrap_or_else(default_name);
     tracing::info!(worker = name, device, server = options.server, "ready for jobs");
     let mut worker = Worker {

@@ -1,6 +1,8 @@
 //! What a verification finds: reads a scene or pictures, and says whether the message is there.
 use guardsplat_worker::Result;
+use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::extract::{Comparison, Engine, Reading, Source, default_size, read_scene};
+use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Verdict;
 use guardsplat_worker::quality::read_picture;
 use guardsplat_worker::scene::Scene;
@@ -30,8 +32,14 @@ pub fn read(
 ) -> Result<Reading> {
     match source {
         Source::Scene(path) => {
-            let scene = Scene::read(path)?.gaussians;
             let size = views.size.unwrap_or_else(|| default_size(engine));
+            let rest = Memory {
+                models: engine.model_bytes(false),
+                pictures: picture_bytes(size, size),
+                ..Memory::of_program()
+            };
+            admission::to_read(path, &engine.limits, rest)?;
+            let scene = Scene::read(path)?.gaussians;
             read_scene(
                 engine,
                 &scene,

@@ -5,6 +5,7 @@ use guardsplat_worker::Result;
 use guardsplat_worker::clip::{Clip, Parts};
 use guardsplat_worker::device::Compute;
 use guardsplat_worker::extract::Engine;
+use guardsplat_worker::memory::Limits;
 use guardsplat_worker::message::{ClipIdentity, Key};
 use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
 
@@ -34,11 +35,23 @@ fn lpips() -> Option<PathBuf> {
 }
 
 /// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names. `path` names the
-/// key in messages.
-pub fn engine(path: &Path, key: &Key, clip_name: Option<&str>, compute: Compute, with_lpips: bool) -> Result<Engine> {
+/// key in messages, and `budget` is how many bytes of memory a job may take, if not all of the machine's.
+pub fn engine(
+    path: &Path,
+    key: &Key,
+    clip_name: Option<&str>,
+    compute: Compute,
+    with_lpips: bool,
+    budget: Option<u64>,
+) -> Result<Engine> {
     let name = clip_name.unwrap_or(&key.clip.name);
     let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
     key.require_clip(path, &identity)?;
     let lpips = if with_lpips { lpips() } else { None };
-    Engine::new(compute, clip, key, lpips)
+    let mut engine = Engine::new(compute, clip, key, lpips)?;
+    engine.limits = Limits {
+        buffer: engine.limits.buffer,
+        ..Limits::of_machine(budget)
+    };
+    Ok(engine)
 }

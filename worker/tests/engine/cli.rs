@@ -198,6 +198,42 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
     assert!(told.contains("key k.key: it belongs to the CLIP"), "{told}");
 }
 
+/// A scene that can't fit is refused by its first bytes: the rest of it is not even on the disk.
+#[test]
+fn a_budget_of_memory_is_kept() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 50 --sh-degree 0", 0);
+    bench.exits("key create --bits 8 --seed 7 -o k.key --device cpu", 0);
+    let small = std::fs::read(bench.path("in.ply")).unwrap();
+    let header = small.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    let text = std::str::from_utf8(&small[..header]).unwrap();
+    let row = 4 * text.matches("property float ").count() as u64;
+    let promised = text.replace("element vertex 50\n", "element vertex 20000000\n");
+    write(&bench.path("vast.ply"), &promised);
+    let vast = std::fs::File::options()
+        .write(true)
+        .open(bench.path("vast.ply"))
+        .unwrap();
+    vast.set_len(promised.len() as u64 + 20_000_000 * row).unwrap();
+
+    let before = files(bench.0.path());
+    for line in [
+        "embed vast.ply out.ply --key k.key --message 5c --device cpu",
+        "verify vast.ply --key k.key --message 5c --device cpu",
+        "render vast.ply views --views 1 --device cpu",
+    ] {
+        let told = bench.fails(&format!("{line} --memory 1024"));
+        for words in ["does not fit", "20000000 Gaussians", "GiB", "its budget is 1.0 GiB"] {
+            assert!(told.contains(words), "{line}: {told}");
+        }
+        assert_eq!(files(bench.0.path()), before, "{line}");
+    }
+    // The same budget is enough for a small scene, and the least is too little.
+    bench.exits("render in.ply views --views 1 --size 32 --device cpu --memory 1024", 0);
+    let told = bench.fails("verify in.ply --key k.key --message 5c --device cpu --memory 1");
+    assert!(told.contains("its budget is 1 MiB"), "{told}");
+}
+
 #[test]
 fn eight_bits_can_never_be_conclusive_and_models_are_listed() {
     let bench = Bench::new();

@@ -14,7 +14,7 @@ mod server;
 use server::Event;
 
 async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
-    let (accelerator, _) = Accelerator::start(DeviceChoice::Cpu).await.unwrap();
+    let (accelerator, _) = Accelerator::start(DeviceChoice::Cpu, None).await.unwrap();
     Worker {
         server: Server::new(&format!("http://{}", server.address)).unwrap(),
         leaving: signals::listen(false).unwrap(),
