@@ -5,11 +5,13 @@
 mod container;
 mod error;
 mod gaussians;
+mod names;
 mod packed;
 mod ply;
 mod range;
 mod rest;
 mod scene;
+mod sniff;
 mod splat;
 mod spz;
 #[doc(hidden)]
@@ -20,4 +22,5 @@ pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
 pub use scene::Scene;
+pub use sniff::{HEAD, is_loose_sog, sniff};
 pub use whole::write_whole;
