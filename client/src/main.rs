@@ -8,6 +8,7 @@ mod create;
 mod details;
 mod error;
 mod interrupt;
+mod kind;
 mod names;
 mod output;
 mod report;

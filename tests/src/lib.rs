@@ -1,14 +1,17 @@
 //! Helpers of the end-to-end tests: the programs, a folder to run them in, and the scenes to run them on.
 pub mod bench;
+mod installed;
 pub mod ply;
 pub mod process;
 pub mod python;
+pub mod readers;
 pub mod service;
 
 use std::path::PathBuf;
 
 pub use bench::Bench;
 pub use process::Process;
+pub use readers::Reader;
 pub use service::Service;
 
 /// A program of the project, from the same build as the tests.

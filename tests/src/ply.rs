@@ -1,4 +1,5 @@
-//! Small 3DGS scene files, made by hand so that one thing at a time can be wrong with them.
+//! Small 3DGS scene files, made by hand so that one thing at a time can be wrong with them; and a reader of what other
+//! programs write, which shares nothing with the engine's.
 
 /// A binary scene file in the layout of the reference implementation.
 #[derive(Clone, Debug)]
@@ -29,12 +30,61 @@ impl Ply {
         }
     }
 
+    /// Reads a binary file of one element, whose properties are all floats.
+    ///
+    /// # Panics
+    /// When it is something else.
+    pub fn parse(bytes: &[u8]) -> Self {
+        let end = b"end_header\n";
+        let at = bytes.windows(end.len()).position(|part| part == end);
+        let (header, body) = bytes.split_at(at.expect("a header with an end") + end.len());
+        let header = std::str::from_utf8(header).expect("a header of text");
+        let (mut promised, mut properties) = (String::new(), Vec::new());
+        for line in header.lines() {
+            match line.split(' ').collect::<Vec<_>>()[..] {
+                ["format", kind, _] => assert_eq!(kind, "binary_little_endian"),
+                ["element", "vertex", count] => promised = count.to_owned(),
+                ["property", "float", name] => properties.push(name.to_owned()),
+                ["ply" | "end_header"] | ["comment", ..] => {}
+                _ => panic!("{line}"),
+            }
+        }
+        let values = body.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        let values: Vec<f32> = values.collect();
+        let rows: Vec<Vec<f32>> = values.chunks(properties.len()).map(<[f32]>::to_vec).collect();
+        assert_eq!(
+            (rows.len().to_string(), body.len()),
+            (promised.clone(), 4 * values.len())
+        );
+        Self {
+            promised,
+            properties,
+            rows,
+        }
+    }
+
+    /// Where a property is in every row, if it is there.
+    pub fn find(&self, property: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p == property)
+    }
+
+    /// Where these properties are in every row.
+    ///
+    /// # Panics
+    /// When one is missing.
+    pub fn columns<const N: usize>(&self, properties: [&str; N]) -> [usize; N] {
+        properties.map(|name| {
+            self.find(name)
+                .unwrap_or_else(|| panic!("no {name} in {:?}", self.properties))
+        })
+    }
+
     /// Gives a row's property another value.
     ///
     /// # Panics
     /// When there is no such property or row.
     pub fn set(mut self, row: usize, property: &str, value: f32) -> Self {
-        let column = self.properties.iter().position(|p| p == property);
+        let column = self.find(property);
         self.rows[row][column.expect("a property of the scene")] = value;
         self
     }

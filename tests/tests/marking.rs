@@ -226,7 +226,7 @@ fn what_does_not_fit_the_key_is_refused() {
         ),
         (
             verify("k.key --key k.key --message c0ffee42"),
-            &["neither a scene", "nor a picture"],
+            &["k.key: not a PNG", "and not a scene"],
         ),
         (verify("in.ply bad.png --key k.key --message c0ffee42"), &["on its own"]),
         (

@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use guardsplat_proto::v1::{EmbedSpec, Job, Key, embed_spec};
+use guardsplat_scene::Format;
 use serde::Serialize;
 
 use super::{key, suspects};
 use crate::arguments::Submission;
 use crate::context::Context;
 use crate::create::{create_with, leave, missed_target, no_result, succeeded, wait};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::interrupt::Stage;
+use crate::kind::Kind;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
 use crate::transfer::{Destination, download};
@@ -40,10 +42,10 @@ impl From<Preset> for embed_spec::Preset {
 /// Arguments of `embed`.
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene to mark, a 3DGS PLY; or one that is there already, artifacts/ID
+    /// The scene to mark: PLY, compressed PLY, SPZ, SOG or .splat; or one that is there already, artifacts/ID
     #[arg(value_name = "IN")]
     input: String,
-    /// Where to write the marked scene
+    /// Where to write the marked scene, in the format of IN
     #[arg(short, long, value_name = "OUT", required_unless_present = "no_wait")]
     output: Option<PathBuf>,
     /// The key: keys/ID, its id, or its display name where no other key has the same
@@ -97,9 +99,13 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
             Destination::check(path)?;
         }
     }
+    let input = suspects::Input::scene(&arguments.input);
+    if let suspects::Input::File(path) = &input {
+        check_format(path, arguments.output.as_deref())?;
+    }
     let key = key::find(context, &arguments.key).await?;
     let message = key::message(&key, &arguments.message)?;
-    let inputs = suspects::send(context, &[suspects::Input::scene(&arguments.input)]).await?;
+    let inputs = suspects::send(context, &[input]).await?;
     let spec = spec(arguments, &key, message, &inputs);
     let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {
@@ -111,6 +117,18 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         Some(missed) => Ok(tell_missed(context, &job, &key, missed)),
         None => finish(context, arguments, succeeded(job)?, &key).await,
     }
+}
+
+/// Whether the file is a scene, and what comes of it may be called so.
+fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
+    let Kind::Scene(format) = Kind::of(input)? else {
+        return Err(Error::io(input)(std::io::Error::other("a picture, and no scene")));
+    };
+    let suits = output.map_or(Ok(()), |output| format.check_name(output));
+    suits.map_err(|reason| Error::BadOption {
+        field: "--output",
+        reason,
+    })
 }
 
 fn spec(arguments: &Arguments, key: &Key, message: String, inputs: &suspects::Inputs) -> Spec {
@@ -136,12 +154,18 @@ async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -
     if let Some(path) = &arguments.comparison {
         download(context, &result.comparison, path).await?;
     }
+    let mut misnamed = None;
     // The scene comes last: where it is, all is.
     if let Some(path) = &arguments.output {
-        download(context, &result.scene, path).await?;
+        let scene = download(context, &result.scene, path).await?;
+        misnamed = Format::of_name(Path::new(&scene.display_name)).and_then(|format| format.check_name(path).err());
     }
     context.enter(Stage::Nothing);
     context.console.clear();
+    // Of an artifact's format nothing is known before.
+    if let Some(reason) = misnamed {
+        say(&format!("note: {}", printable(&reason)));
+    }
     let report = EmbedReport::from(result);
     let missed = report.missed().to_vec();
     if context.json {

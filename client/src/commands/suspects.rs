@@ -3,12 +3,13 @@ use std::path::{Path, PathBuf};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::names;
 use crate::transfer::{Source, discard, upload};
 
 /// Most pictures of one job; the server takes no more.
 const MOST: usize = 1000;
-/// Pictures that the service reads.
+/// Names of pictures in folders.
 const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
 /// One thing that is handed in.
@@ -82,7 +83,8 @@ pub async fn send(context: &Context, inputs: &[Input]) -> Result<Inputs> {
     Ok(known)
 }
 
-/// What the paths of `verify` name: one scene, or pictures and folders of them.
+/// What the paths of `verify` name: one scene, or pictures and folders of them. Files are what their content says; in
+/// folders, which may hold other things too, names say which are pictures.
 pub fn find(paths: &[String]) -> Result<Vec<Input>> {
     let mut found = Vec::new();
     for text in paths {
@@ -93,19 +95,14 @@ pub fn find(paths: &[String]) -> Result<Vec<Input>> {
                 continue;
             }
         };
-        let metadata = std::fs::metadata(&path).map_err(Error::io(&path))?;
-        if metadata.is_dir() {
+        if path.is_dir() {
             found.extend(folder(&path)?.into_iter().map(Input::File));
-        } else if has(&path, &["ply"]) {
-            if paths.len() > 1 {
-                return Err(bad(&path, "a scene is read on its own: give one scene, or pictures"));
-            }
-            found.push(Input::File(path));
-        } else if has(&path, &PICTURES) {
-            found.push(Input::File(path));
-        } else {
-            return Err(bad(&path, "neither a scene (ply) nor a picture (png, jpg, webp)"));
+            continue;
         }
+        if matches!(Kind::of(&path)?, Kind::Scene(_)) && paths.len() > 1 {
+            return Err(bad(&path, "a scene is read on its own: give one scene, or pictures"));
+        }
+        found.push(Input::File(path));
     }
     if found.len() > MOST {
         return Err(Error::BadOption {
@@ -116,12 +113,18 @@ pub fn find(paths: &[String]) -> Result<Vec<Input>> {
     Ok(found)
 }
 
-/// The pictures of a folder, by name; it may hold other things too.
+/// The pictures of a folder, by name.
 fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+    if guardsplat_scene::is_loose_sog(path) {
+        return Err(bad(
+            path,
+            "the parts of an SOG scene, whose pictures are no views; bundle them into one .sog file first",
+        ));
+    }
     let mut pictures = Vec::new();
     for entry in std::fs::read_dir(path).map_err(Error::io(path))? {
         let file = entry.map_err(Error::io(path))?.path();
-        if file.is_file() && has(&file, &PICTURES) {
+        if file.is_file() && is_picture(&file) {
             pictures.push(file);
         }
     }
@@ -132,9 +135,9 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(pictures)
 }
 
-fn has(path: &Path, extensions: &[&str]) -> bool {
+fn is_picture(path: &Path) -> bool {
     path.extension()
-        .is_some_and(|found| extensions.iter().any(|e| found.eq_ignore_ascii_case(e)))
+        .is_some_and(|found| PICTURES.iter().any(|e| found.eq_ignore_ascii_case(e)))
 }
 
 fn bad(path: &Path, reason: &str) -> Error {
@@ -158,14 +161,19 @@ mod tests {
         let found = find(&[text(folder.path().into())]).unwrap();
         let expected = ["a.jpg", "b.PNG", "c.webp"].map(|n| Input::File(folder.path().join(n)));
         assert_eq!(found, expected);
+        for name in ["meta.json", "means_l.webp"] {
+            std::fs::write(folder.path().join(name), "x").unwrap();
+        }
+        let told = find(&[text(folder.path().into())]).unwrap_err().to_string();
+        assert!(told.contains("no views"), "{told}");
     }
 
     #[test]
     fn a_scene_stands_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let (scene, picture) = (folder.path().join("a.ply"), folder.path().join("a.png"));
-        std::fs::write(&scene, "x").unwrap();
-        std::fs::write(&picture, "x").unwrap();
+        let (scene, picture) = (folder.path().join("a"), folder.path().join("b"));
+        std::fs::write(&scene, "ply\n").unwrap();
+        std::fs::write(&picture, b"\x89PNG\r\n\x1a\n").unwrap();
         assert_eq!(find(&[text(scene.clone())]).unwrap(), [Input::File(scene.clone())]);
         let both = find(&[text(picture), text(scene)]).unwrap_err().to_string();
         assert!(both.contains("on its own"), "{both}");
@@ -182,7 +190,7 @@ mod tests {
             find(&[text(notes)])
                 .unwrap_err()
                 .to_string()
-                .contains("notes.txt: neither")
+                .contains("notes.txt: not a PNG")
         );
         let missing = find(&[text(folder.path().join("missing.png"))])
             .unwrap_err()

@@ -15,7 +15,8 @@ use crate::report::VerifyReport;
 /// Arguments of `verify`.
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene (PLY), or pictures (PNG, JPEG, WebP) and folders of them; or such that are there already, artifacts/ID
+    /// A scene (PLY, compressed PLY, SPZ, SOG, .splat), or pictures (PNG, JPEG, WebP) and folders of them; or such that
+    /// are there already, artifacts/ID
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<String>,
     /// The key: keys/ID, its id, or its display name where no other key has the same

@@ -8,13 +8,14 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
 use super::fake::{KEY, failure, figures, job, send, success};
-use super::run::Bench;
+use super::run::{Bench, PICTURE};
 
 const LINE: &str = "embed in.ply -o out.ply --key website --message C0FFEE42";
 
 /// More than two chunks, and no multiple of one.
 fn scene() -> Vec<u8> {
-    (0..600_001u32).map(|i| (i % 251) as u8).collect()
+    let body = (0..600_001u32).map(|i| (i % 251) as u8);
+    b"ply\n".iter().copied().chain(body).collect()
 }
 
 fn spec_of(bench: &Bench) -> EmbedSpec {
@@ -244,12 +245,30 @@ fn a_scene_that_is_there_already_is_not_sent() {
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert_eq!(spec_of(&bench).scene, name);
     assert_eq!(bench.fake.state().uploads, 0);
+    assert!(!ran.err.contains("note"), "{}", ran.err);
+}
+
+/// What is in an artifact is not known before; the worker names what it made of it.
+#[test]
+fn a_name_of_another_format_is_told_of() {
+    let bench = bench(&[]);
+    let name = bench.fake.store("in.ply", b"ply");
+    let ran = bench.run(&format!("embed {name} -o out.spz --key website --message c0ffee42"));
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(
+        ran.err.contains("note: out.spz would pass for SPZ") && ran.err.contains("name it *.ply"),
+        "{}",
+        ran.err
+    );
+    assert!(bench.path("out.spz").is_file());
 }
 
 #[test]
 fn mistakes_are_found_before_anything_is_sent() {
     let bench = Bench::new();
     bench.file("in.ply", b"ply");
+    bench.file("photo.ply", PICTURE);
+    bench.file("notes.ply", b"Dear diary");
     for (line, told) in [
         (
             "embed in.ply -o out.ply --key website --message c0ffee",
@@ -268,13 +287,25 @@ fn mistakes_are_found_before_anything_is_sent() {
             "embed in.ply -o out.ply --key other --message c0ffee42",
             "there is no key `other`",
         ),
+        (
+            "embed in.ply -o out.splat --key website --message c0ffee42",
+            "--output: out.splat would pass for .splat",
+        ),
+        (
+            "embed photo.ply -o out.ply --key website --message c0ffee42",
+            "photo.ply: a picture, and no scene",
+        ),
+        (
+            "embed notes.ply -o out.ply --key website --message c0ffee42",
+            "notes.ply: not a PNG, JPEG or WebP picture, and not a scene: neither a PLY",
+        ),
     ] {
         let ran = bench.run(line);
         assert_eq!(ran.code, 1, "{line}");
         assert!(ran.err.contains(told), "{line}: {}", ran.err);
     }
     assert_eq!(bench.fake.state().uploads, 0);
-    assert_eq!(bench.files(), ["in.ply"]);
+    assert_eq!(bench.files(), ["in.ply", "notes.ply", "photo.ply"]);
 }
 
 #[test]

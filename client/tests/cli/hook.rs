@@ -91,7 +91,7 @@ fn one_name_with_other_bytes_is_refused() {
     let bench = bench();
     plan_success(&bench);
     assert_eq!(call(&bench, "7", &[]).code, 0);
-    bench.file("in.ply", b"another");
+    bench.file("in.ply", b"ply of another");
     let ran = call(&bench, "7", &[]);
     assert_eq!(ran.code, 1);
     let report = std::fs::read_to_string(bench.path("out.ply.json")).unwrap();

@@ -3,7 +3,7 @@ use guardsplat_proto::v1::KeyResult;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 
 use super::fake::{KEY, key, success};
-use super::run::Bench;
+use super::run::{Bench, PICTURE};
 
 #[test]
 fn a_key_is_made_and_told() {
@@ -56,7 +56,7 @@ fn keys_are_listed_over_pages() {
 fn a_display_name_that_two_keys_have_is_not_guessed() {
     let bench = Bench::new();
     bench.fake.state().keys.push(key("keys/1", "website", 32));
-    bench.file("a.png", b"png");
+    bench.file("a.png", PICTURE);
     let ran = bench.run("verify a.png --key website");
     assert_eq!(ran.code, 1);
     assert!(ran.err.contains("2 keys are called `website`"), "{}", ran.err);

@@ -6,7 +6,7 @@ use tonic::Status;
 
 use super::fake::{Fake, Step, figures, job, send, success};
 use super::proxy::Proxy;
-use super::run::{Bench, finish, until};
+use super::run::{Bench, PICTURE, finish, until};
 
 const VERIFY: &str = "verify in.png --key website --message c0ffee42 --json";
 
@@ -21,7 +21,7 @@ fn a_watch_goes_on_behind_its_last_cursor_when_the_connection_is_cut() {
     let fake = Fake::start();
     let proxy = Proxy::to(fake.address);
     let bench = Bench::at(fake, proxy.url());
-    bench.file("in.png", b"png");
+    bench.file("in.png", PICTURE);
     bench
         .fake
         .plan([send(job(State::Queued)), send(job(State::Running)), Step::Hang]);
@@ -48,7 +48,7 @@ fn a_watch_goes_on_behind_its_last_cursor_when_the_connection_is_cut() {
 #[test]
 fn a_stream_that_ends_before_the_job_is_opened_again() {
     let bench = Bench::new();
-    bench.file("in.png", b"png");
+    bench.file("in.png", PICTURE);
     bench.fake.plan([send(job(State::Running))]);
     bench
         .fake
@@ -63,7 +63,7 @@ fn a_stream_that_ends_before_the_job_is_opened_again() {
 #[test]
 fn a_server_that_stays_away_is_given_up_with_what_to_do() {
     let bench = Bench::new();
-    bench.file("in.png", b"png");
+    bench.file("in.png", PICTURE);
     for _ in 0..10 {
         bench.fake.plan([Step::Fail(Status::unavailable("gone"))]);
     }
@@ -76,7 +76,7 @@ fn a_server_that_stays_away_is_given_up_with_what_to_do() {
 #[test]
 fn another_kind_of_error_is_not_tried_again() {
     let bench = Bench::new();
-    bench.file("in.png", b"png");
+    bench.file("in.png", PICTURE);
     bench.fake.plan([Step::Fail(Status::internal("a bug"))]);
     let ran = bench.run(VERIFY);
     assert_eq!(ran.code, 1);
@@ -87,7 +87,7 @@ fn another_kind_of_error_is_not_tried_again() {
 #[test]
 fn a_job_whose_answer_was_lost_is_not_made_twice() {
     let bench = Bench::new();
-    bench.file("in.png", b"png");
+    bench.file("in.png", PICTURE);
     bench.fake.plan([verified()]);
     for _ in 0..2 {
         bench.fake.state().create_errors.push_back(Status::unavailable("lost"));
@@ -103,14 +103,15 @@ fn a_job_whose_answer_was_lost_is_not_made_twice() {
 #[test]
 fn an_upload_that_broke_off_is_sent_again() {
     let bench = Bench::new();
-    bench.file("in.png", &[3; 500_000]);
+    let picture = [PICTURE, &[3; 500_000]].concat();
+    bench.file("in.png", &picture);
     bench.fake.plan([verified()]);
     bench.fake.state().upload_errors.push_back(Status::unavailable("lost"));
     let ran = bench.run(VERIFY);
     assert_eq!(ran.code, 0, "{}", ran.err);
     let state = bench.fake.state();
     assert_eq!(state.uploads, 2);
-    assert_eq!(state.artifacts.values().next().unwrap().1, [3; 500_000]);
+    assert_eq!(state.artifacts.values().next().unwrap().1, picture);
 }
 
 #[test]

@@ -8,6 +8,9 @@ use tempfile::TempDir;
 
 use super::fake::Fake;
 
+/// What a picture begins with; the fake server looks no further.
+pub const PICTURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
 /// A folder to run in, and the server to talk to.
 pub struct Bench {
     /// The server.

@@ -4,7 +4,7 @@ use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use guardsplat_proto::v1::verify_result::Verdict;
 
 use super::fake::{KEY, success};
-use super::run::Bench;
+use super::run::{Bench, PICTURE};
 
 fn result(verdict: Verdict) -> VerifyResult {
     let mut result = VerifyResult {
@@ -38,7 +38,7 @@ fn bench(verdict: Verdict) -> Bench {
     for name in ["b.png", "a.jpg", "notes.txt"] {
         bench.file(&format!("views/{name}"), name.as_bytes());
     }
-    bench.file("c.webp", b"c.webp");
+    bench.file("c.webp", PICTURE);
     bench
 }
 
@@ -62,7 +62,7 @@ fn a_match_exits_with_0_and_tells_the_figures() {
         panic!("{:?}", state.created);
     };
     let sent: Vec<&[u8]> = spec.suspects.iter().map(|name| &state.artifacts[name].1[..]).collect();
-    assert_eq!(sent, [b"a.jpg" as &[u8], b"b.png", b"c.webp"]);
+    assert_eq!(sent, [b"a.jpg" as &[u8], b"b.png", PICTURE]);
     assert_eq!((spec.views, spec.size, spec.message.as_str()), (0, 0, "c0ffee42"));
 }
 
@@ -91,8 +91,9 @@ fn nothing_decided_exits_with_3() {
 #[test]
 fn views_of_a_scene_can_be_chosen() {
     let bench = bench(Verdict::Match);
-    bench.file("s.ply", b"ply");
-    let ran = bench.run("verify s.ply --key website --message c0ffee42 --views 5 --size 64 --seed 3");
+    // By its first bytes a scene; names say nothing.
+    bench.file("s.png", b"NGSP and so on");
+    let ran = bench.run("verify s.png --key website --message c0ffee42 --views 5 --size 64 --seed 3");
     assert_eq!(ran.code, 0, "{}", ran.err);
     let created = bench.fake.state().created[0].job.clone().unwrap();
     let Some(Spec::Verify(spec)) = created.spec else {

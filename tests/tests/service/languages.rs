@@ -7,7 +7,7 @@ use crate::bench;
 
 #[test]
 fn a_client_of_another_language_works_from_reflection_alone() {
-    let Some(python) = python::python() else {
+    let Some(python) = python::python("grpc") else {
         return;
     };
     let service = Service::start(bench(), "--embedded-worker true");

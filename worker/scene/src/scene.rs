@@ -1,6 +1,7 @@
 //! A scene and the file it came from, whatever its format.
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::sniff::announced;
 use crate::whole::write_whole;
 use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
@@ -55,10 +56,10 @@ impl Scene {
     fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
         let first = source.fill_buf().map_err(Error::io(path))?;
-        let (gaussians, source) = match first {
-            first if ply::begins(first) => ply::read(path, source, size)?,
-            first if spz::is_spz(first) => spz::read(path, source, size)?,
-            first if sog::detect(first) => sog::read(path, source, size)?,
+        let (gaussians, source) = match announced(first) {
+            Some(Format::Ply | Format::CompressedPly) => ply::read(path, source, size)?,
+            Some(Format::Spz) => spz::read(path, source, size)?,
+            Some(Format::Sog) => sog::read(path, source, size)?,
             _ => splat::read(path, source, size)?,
         };
         Ok(Scene {

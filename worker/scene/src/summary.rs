@@ -5,8 +5,6 @@ use crate::scene::bad;
 use crate::{Result, ply, sog, splat, spz};
 use std::path::Path;
 
-/// How many of its first bytes tell what there is to tell of a file.
-pub const HEAD: usize = ply::header::MAX_HEADER as usize;
 /// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
 const GEOMETRY: u64 = 11;
 /// Arrays that the optimiser has, each as large as the coefficients: learned changes, their gradient, two moments.
@@ -25,7 +23,7 @@ pub struct Summary {
     pub file: u64,
 }
 
-/// What `head` says, the first [`HEAD`] bytes of a file of `size` bytes, or all of a smaller one; `name` is for
+/// What `head` says, the first [`HEAD`](crate::HEAD) bytes of a file of `size` bytes, or all of a smaller one; `name` is for
 /// messages. `None` where it says nothing: a SOG has its figures anywhere.
 ///
 /// # Errors
@@ -86,6 +84,7 @@ fn coefficients(degree: u64) -> u64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::HEAD;
     use crate::testing::scene_path;
     use crate::{Error, Scene};
 

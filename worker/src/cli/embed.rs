@@ -18,10 +18,10 @@ use crate::work::{load, sheet};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene to mark, a 3DGS PLY
+    /// The scene to mark: PLY, compressed PLY, SPZ, SOG or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// Where to write the marked scene
+    /// Where to write the marked scene, in the format of IN
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// The key file

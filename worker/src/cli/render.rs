@@ -30,7 +30,7 @@ enum Format {
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene, a 3DGS PLY
+    /// The scene: PLY, compressed PLY, SPZ, SOG or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A folder for the pictures and their cameras

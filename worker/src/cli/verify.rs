@@ -16,7 +16,7 @@ use crate::work::load;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene (PLY), or pictures (PNG, JPEG, WebP) and folders of them
+    /// A scene (PLY, compressed PLY, SPZ, SOG, .splat), or pictures (PNG, JPEG, WebP, OpenEXR) and folders of them
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<PathBuf>,
     /// The key file

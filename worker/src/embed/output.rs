@@ -13,13 +13,13 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::memory::Memory;
 use crate::message::Message;
-use crate::scene::Scene;
+use crate::scene::{Format, Scene};
 
 /// What to embed where.
 pub struct Job<'a> {
     /// The scene file to mark.
     pub input: &'a Path,
-    /// Where the marked scene goes; a file there is replaced.
+    /// Where the marked scene goes, in the format of the input; a file there is replaced.
     pub output: &'a Path,
     /// The message, of the key's length.
     pub message: &'a Message,
@@ -38,6 +38,8 @@ pub struct Outcome {
     pub missed: Vec<String>,
     /// Whether the output was written.
     pub written: bool,
+    /// The format of input and output.
+    pub format: Format,
     /// Steps taken.
     pub steps: usize,
     /// Views drawn in all steps.
@@ -99,6 +101,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         verification,
         missed,
         written,
+        format: scene.format(),
         steps: optimised.steps,
         view_steps: optimised.view_steps,
         gaussians: scene.gaussians.len(),
@@ -118,9 +121,12 @@ fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<Memory> 
     Ok(memory)
 }
 
-/// A file beside the output that holds as much as the output will. A folder that is missing, read-only or full is
-/// thereby known before the work, not after it. It is deleted when dropped.
+/// A file beside the output that holds as much as the output will; about as much in formats that are compressed. A
+/// folder that is missing, read-only or full is thereby known before the work, not after it, as is a name that says
+/// another format. It is deleted when dropped.
 fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
+    let suits = scene.format().check_name(job.output);
+    suits.map_err(|reason| Error::BadOption { field: "OUT", reason })?;
     let refuse = |reason: &str| Err(Error::io(job.output)(std::io::Error::other(reason.to_owned())));
     match std::fs::metadata(job.output) {
         Ok(there) if !there.is_file() => return refuse("exists and is not a regular file"),
@@ -207,6 +213,11 @@ mod tests {
         let reason = |output: &Path| reserve(output).unwrap_err().to_string();
         assert!(reason(&input).contains("is the input"));
         assert!(reason(folder.path()).contains("not a regular file"));
+        let other = reason(&folder.path().join("out.spz"));
+        assert!(
+            other.contains("out.spz would pass for SPZ") && other.contains("PLY: name it *.ply"),
+            "{other}"
+        );
         let missing = folder.path().join("none/out.ply");
         assert!(reason(&missing).starts_with(missing.to_str().unwrap()));
         let aside = reserve(&folder.path().join("out.ply")).unwrap();

@@ -1,9 +1,11 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
+mod kind;
 mod pictures;
 mod reading;
 
 pub use engine::{Engine, rasterizer};
+pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use reading::{Comparison, Reading};
 

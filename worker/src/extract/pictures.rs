@@ -1,8 +1,10 @@
 //! What there is to read on disk: one scene, or picture files and folders of them.
 use std::path::{Path, PathBuf};
 
+use super::kind::Kind;
 use crate::error::{Error, Result};
 use crate::quality::PictureFormat;
+use crate::scene::is_loose_sog;
 
 /// Most pictures of one reading.
 pub const MAX_PICTURES: usize = 10_000;
@@ -10,49 +12,31 @@ pub const MAX_PICTURES: usize = 10_000;
 /// What paths name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// A scene file.
+    /// A scene file, of any format.
     Scene(PathBuf),
     /// Picture files, those of a folder by name.
     Pictures(Vec<PathBuf>),
 }
 
-/// Sorts out `paths`: a single scene (`.ply`), or any number of pictures and folders of pictures.
+/// Sorts out `paths`: a single scene of any format, or any number of pictures and folders of pictures. Files are what
+/// their content says; in folders, which may hold other things too, names say which are pictures.
 ///
 /// # Errors
 /// A path that is not there, several scenes or scenes among pictures, a folder without pictures, a file of another
 /// kind, or more than [`MAX_PICTURES`].
 pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
-    if let [path] = paths
-        && is_scene(path)
-    {
-        return Ok(Source::Scene(path.clone()));
-    }
     let mut pictures = Vec::new();
     for path in paths {
-        let metadata = std::fs::metadata(path).map_err(Error::io(path))?;
-        if metadata.is_dir() {
-            let before = pictures.len();
-            let entries = std::fs::read_dir(path).map_err(Error::io(path))?;
-            for entry in entries {
-                let file = entry.map_err(Error::io(path))?.path();
-                // A folder may hold other things too, such as the cameras.
-                if file.is_file() && is_picture(&file) {
-                    pictures.push(file);
-                }
-                check_count(pictures.len())?;
-            }
-            if pictures.len() == before {
-                return Err(bad(path, "a folder without png, jpg, webp or exr pictures"));
-            }
-            pictures[before..].sort();
-        } else if is_scene(path) {
-            return Err(bad(path, "a scene is read on its own: give one scene, or pictures"));
-        } else if is_picture(path) {
-            pictures.push(path.clone());
-            check_count(pictures.len())?;
-        } else {
-            return Err(bad(path, "neither a scene (ply) nor a picture (png, jpg, webp, exr)"));
+        if path.is_dir() {
+            add_folder(path, &mut pictures)?;
+            continue;
         }
+        match Kind::of(path)? {
+            Kind::Scene if paths.len() == 1 => return Ok(Source::Scene(path.clone())),
+            Kind::Scene => return Err(bad(path, "a scene is read on its own: give one scene, or pictures")),
+            Kind::Picture => pictures.push(path.clone()),
+        }
+        check_count(pictures.len())?;
     }
     if pictures.is_empty() {
         return Err(Error::BadOption {
@@ -63,8 +47,27 @@ pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
     Ok(Source::Pictures(pictures))
 }
 
-fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+/// Adds the pictures of a folder by name.
+fn add_folder(path: &Path, pictures: &mut Vec<PathBuf>) -> Result<()> {
+    if is_loose_sog(path) {
+        return Err(bad(
+            path,
+            "the parts of an SOG scene, whose pictures are no views; bundle them into one .sog file first",
+        ));
+    }
+    let before = pictures.len();
+    for entry in std::fs::read_dir(path).map_err(Error::io(path))? {
+        let file = entry.map_err(Error::io(path))?.path();
+        if file.is_file() && is_picture(&file) {
+            pictures.push(file);
+        }
+        check_count(pictures.len())?;
+    }
+    if pictures.len() == before {
+        return Err(bad(path, "a folder without png, jpg, webp or exr pictures"));
+    }
+    pictures[before..].sort();
+    Ok(())
 }
 
 fn is_picture(path: &Path) -> bool {
@@ -95,21 +98,22 @@ mod tests {
     #[test]
     fn folders_give_their_pictures_by_name_and_scenes_stand_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| {
+        let at = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
-            std::fs::write(&path, "").unwrap();
+            std::fs::write(&path, bytes).unwrap();
             path
         };
-        let (b, a, c) = (at("b.png"), at("a.JPG"), at("c.webp"));
-        let (text, scene) = (at("cameras.json"), at("s.PLY"));
+        let png = b"\x89PNG\r\n\x1a\n";
+        let (b, a, c) = (at("b.png", png), at("a.JPG", b"damaged"), at("c.webp", png));
+        let (text, scene, picture) = (at("cameras.json", b"[]"), at("s", b"ply\n"), at("p", png));
         let folder_path = folder.path().to_path_buf();
         assert_eq!(
             find_source(std::slice::from_ref(&folder_path)).unwrap(),
-            Source::Pictures(vec![a, b.clone(), c.clone()])
+            Source::Pictures(vec![a.clone(), b.clone(), c.clone()])
         );
         assert_eq!(
-            find_source(&[c.clone(), b.clone()]).unwrap(),
-            Source::Pictures(vec![c.clone(), b])
+            find_source(&[c.clone(), picture.clone()]).unwrap(),
+            Source::Pictures(vec![c.clone(), picture])
         );
         assert_eq!(
             find_source(std::slice::from_ref(&scene)).unwrap(),
@@ -117,11 +121,16 @@ mod tests {
         );
         let reason = |paths: &[PathBuf]| find_source(paths).unwrap_err().to_string();
         assert!(reason(&[scene.clone(), scene.clone()]).contains("on its own"));
-        assert!(reason(&[c, scene]).contains("on its own"));
-        assert!(reason(&[text]).contains("neither a scene"));
+        assert!(reason(&[c.clone(), scene.clone()]).contains("on its own"));
+        assert!(reason(&[folder_path.clone(), scene]).contains("on its own"));
+        assert!(reason(&[c, text]).contains("not a scene"));
+        assert!(reason(&[a]).contains("a.JPG: not a PNG"));
         assert!(reason(&[]).contains("give a scene"));
         assert!(reason(&[folder_path.join("none.png")]).contains("none.png"));
         let empty = tempfile::tempdir().unwrap();
         assert!(reason(&[empty.path().into()]).contains("without png"));
+        at("meta.json", b"{}");
+        at("means_l.webp", png);
+        assert!(reason(&[folder_path]).contains("no views"));
     }
 }

@@ -28,7 +28,8 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
     let settings = convert::settings(spec)?;
     let input = attempt.download(&[&spec.scene]).await?.swap_remove(0);
     let key_file = attempt.download_key().await?;
-    let output = attempt.folder.join("marked.ply");
+    // Its format, and so its name, is known when it is there.
+    let output = attempt.folder.join("marked");
     let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
     let marked_file = Content::File(output.clone());
     let work = attempt.compute(move |bench, stop, reporter| {
@@ -67,7 +68,8 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
         })
     });
     let marked = work.await?;
-    let scene = attempt.upload("marked.ply", marked_file, false).await?;
+    let marked_name = format!("marked.{}", marked.outcome.format.extension());
+    let scene = attempt.upload(&marked_name, marked_file, false).await?;
     let comparison = attempt.upload(sheet::NAME, Content::Bytes(marked.sheet), false).await?;
     Ok(Done::EmbedResult(EmbedResult {
         scene,

@@ -1,21 +1,16 @@
 //! `verify` jobs: whose is this scene, or are these pictures?
-use std::io::Read;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{VerifyResult, VerifySpec};
-use guardsplat_worker::extract::{MAX_PICTURES, Source};
+use guardsplat_worker::extract::{MAX_PICTURES, find_source};
 use guardsplat_worker::message::Key;
 
 use super::attempt::Attempt;
 use super::convert;
 use super::error::{Error, Result};
 use crate::work::findings::{Findings, read};
-
-/// What every PLY begins with.
-const PLY: &[u8] = b"ply";
 
 /// A reading that was compared.
 struct Verified {
@@ -36,11 +31,11 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<D
     }
     let names: Vec<&str> = spec.suspects.iter().map(String::as_str).collect();
     let paths = attempt.download(&names).await?;
-    let source = source(paths)?;
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
     let work = attempt.compute(move |bench, stop, reporter| {
         let start = Instant::now();
+        let source = find_source(&paths)?;
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         // Nothing to compare with is no message of no bits.
@@ -66,56 +61,4 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<D
         clip: verified.clip,
         ..convert::verify_result(verified.findings)
     }))
-}
-
-/// What the files are, by their first bytes: artifacts need no extensions.
-fn source(mut paths: Vec<PathBuf>) -> Result<Source> {
-    let scenes = paths.iter().map(|path| is_scene(path)).collect::<Result<Vec<bool>>>()?;
-    if !scenes.contains(&true) {
-        return Ok(Source::Pictures(paths));
-    }
-    match paths.pop() {
-        Some(scene) if paths.is_empty() => Ok(Source::Scene(scene)),
-        _ => Err(Error::BadJob(
-            "suspects: a scene is read on its own: give one scene, or pictures".into(),
-        )),
-    }
-}
-
-fn is_scene(path: &Path) -> Result<bool> {
-    let mut start = Vec::new();
-    let file = std::fs::File::open(path).map_err(Error::io(path))?;
-    file.take(PLY.len() as u64)
-        .read_to_end(&mut start)
-        .map_err(Error::io(path))?;
-    Ok(start == PLY)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_scene_or_pictures() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = |name: &str, bytes: &[u8]| {
-            let path = folder.path().join(name);
-            std::fs::write(&path, bytes).unwrap();
-            path
-        };
-        let (scene, picture, empty) = (
-            file("input-0", b"ply\nformat"),
-            file("input-1", b"\x89PNG"),
-            file("input-2", b""),
-        );
-        let of = |paths: &[&PathBuf]| source(paths.iter().map(|p| (*p).clone()).collect());
-        assert_eq!(of(&[&scene]).unwrap(), Source::Scene(scene.clone()));
-        assert_eq!(
-            of(&[&picture, &empty]).unwrap(),
-            Source::Pictures(vec![picture.clone(), empty])
-        );
-        for mixed in [[&scene, &picture], [&picture, &scene], [&scene, &scene]] {
-            assert!(of(&mixed).unwrap_err().to_string().contains("on its own"));
-        }
-    }
 }

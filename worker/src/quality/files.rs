@@ -94,6 +94,12 @@ pub fn encode_picture(picture: &Picture, format: PictureFormat) -> Result<Vec<u8
     Ok(bytes.into_inner())
 }
 
+/// Whether a file that begins with these bytes is a picture of one of the four formats, if one that may be damaged.
+pub fn is_picture(head: &[u8]) -> bool {
+    use ImageFormat::{Jpeg, OpenExr, Png, WebP};
+    matches!(image::guess_format(head), Ok(Png | Jpeg | WebP | OpenExr))
+}
+
 /// A picture from a file's bytes, whatever of the four formats they are in. The camera's orientation is applied, and
 /// transparent pixels show `background` through.
 ///

@@ -10,7 +10,7 @@ pub mod ssim;
 
 pub use batch::{batch, unbatch};
 pub use compare::{contact_sheet, difference};
-pub use files::{PictureFormat, decode_picture, encode_picture, read_picture, write_picture};
+pub use files::{PictureFormat, decode_picture, encode_picture, is_picture, read_picture, write_picture};
 pub use lpips::Lpips;
 pub use measure::{Quality, measure};
 pub use psnr::{MeanPsnr, Psnr, mean_psnr, psnr};

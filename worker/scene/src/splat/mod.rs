@@ -62,6 +62,12 @@ pub(crate) fn summary(head: &[u8], size: u64) -> Result<Summary, String> {
     })
 }
 
+/// Whether a file of `size` bytes that begins with `head` may be one: at least one row is there, and all look like it.
+pub(crate) fn looks_like(head: &[u8], size: u64) -> bool {
+    let rows = &head[..head.len() - head.len() % ROW];
+    check_size(size).is_ok() && !rows.is_empty() && check_rows(rows).is_ok()
+}
+
 fn check_size(size: u64) -> Result<(), String> {
     if size == 0 {
         return Err("it is empty".to_string());
