@@ -16,7 +16,7 @@ fn scenes_that_do_not_fit_are_refused_with_the_numbers() {
     service.json(KEY, 0);
 
     // One that can't fit is not even queued.
-    let line = |scene: &str| format!("embed {scene} --key site --message c0ffee42 --size 32");
+    let line = |scene: &str| format!("embed {scene} -o out.ply --key site --message c0ffee42 --size 32");
     let error = &service.json(&line("vast.ply"), 1)["error"];
     assert_eq!(
         (&error["code"], &error["reason"]),

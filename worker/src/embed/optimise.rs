@@ -302,10 +302,14 @@ mod tests {
                 let pairs = start.iter().zip(&gradient);
                 at(pairs.map(|(o, g)| o + step * g / length).collect()).0
             };
-            let step = 0.02;
-            let slope = (moved(step) - moved(-step)) / (2.0 * f64::from(step));
-            let ratio = slope / f64::from(length);
-            assert!((ratio - 1.0).abs() < 0.02, "{message_weight} {weight}: {ratio}");
+            // A large step crosses kinks of the tower, a small one drowns in rounding: some step in between agrees.
+            let ratio = |step: f32| {
+                let slope = (moved(step) - moved(-step)) / (2.0 * f64::from(step));
+                slope / f64::from(length)
+            };
+            let ratios = [0.02, 0.01, 0.005, 0.0025].map(ratio);
+            let off = ratios.iter().map(|r| (r - 1.0).abs()).fold(f64::INFINITY, f64::min);
+            assert!(off < 0.02, "{message_weight} {weight}: {ratios:?}");
         }
     }
 }

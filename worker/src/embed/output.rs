@@ -73,8 +73,8 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     let scene = Scene::read(job.input)?;
     stop.check()?;
     let memory = admit(engine, &scene, job.settings)?;
-    progress(Progress::Admitted(memory));
     let aside = reserve(job, &scene)?;
+    progress(Progress::Admitted(memory));
     let optimised = optimise(engine, &scene, job.message, job.settings, progress)?;
 
     stop.check()?;

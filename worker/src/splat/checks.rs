@@ -200,7 +200,8 @@ fn half_precision_is_off_by_its_rounding() {
     assert!(worst > 0.0 && worst < largest / 2048.0, "{worst} of {largest}");
     let product = |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum() };
     let cosine = product(&single.1, &half.1) / (product(&single.1, &single.1) * product(&half.1, &half.1)).sqrt();
-    assert!(cosine > 0.999_999, "{cosine}");
+    // The signs of the picture's gradient cancel most of it, and what is left shows the rounding more.
+    assert!(cosine > 0.999_99, "{cosine}");
     assert!(half.2 < single.2 * 7 / 10);
 }
 

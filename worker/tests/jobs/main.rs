@@ -225,7 +225,7 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
             false,
             "holiday.png (artifacts/3): not a PNG",
         ),
-        (verify(&[&picture, &scene], ""), InvalidInput, false, "on its own"),
+        (verify(&[&picture, &scene], ""), InvalidInput, false, "and not a scene"),
         (too_many_views, InvalidInput, false, "views: 10001"),
         (
             Spec::CreateKey(KeySpec { bits: 76, seed: None }),
