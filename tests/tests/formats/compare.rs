@@ -103,7 +103,8 @@ pub fn agrees(scene: &Scene, theirs: &Ply, turned: bool) {
 
 /// NaN is apart from everything, an infinity from all but itself.
 fn apart(a: f32, b: f32, tolerance: f32) -> bool {
-    a != b && !((a - b).abs() <= tolerance)
+    let distance = (a - b).abs();
+    a != b && (distance.is_nan() || distance > tolerance)
 }
 
 fn cosine(a: [f32; 4], b: [f32; 4]) -> f32 {
