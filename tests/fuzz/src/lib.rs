@@ -1,0 +1,1 @@
+//! Fuzz targets for everything that reads what a stranger may have written.
