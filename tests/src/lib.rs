@@ -1,6 +1,7 @@
 //! Helpers of the end-to-end tests: the programs, a folder to run them in, and the scenes to run them on.
 pub mod bench;
 mod installed;
+pub mod memory;
 pub mod ply;
 pub mod process;
 pub mod python;
@@ -10,6 +11,7 @@ pub mod service;
 use std::path::PathBuf;
 
 pub use bench::Bench;
+pub use memory::Footprint;
 pub use process::Process;
 pub use readers::Reader;
 pub use service::Service;

@@ -62,7 +62,7 @@ fn head(path: &Path) -> Option<(Vec<u8>, u64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embed::{Preset, SceneSize, ViewSize, needs};
+    use crate::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs};
     use crate::sample::sample;
     use crate::scene::Scene;
 
@@ -135,7 +135,12 @@ mod tests {
             let scene = sample(2000, degree, 1).unwrap();
             scene.write(&path, &scene.gaussians.sh).unwrap();
             let scene = Scene::read(&path).unwrap();
-            let needed = needs(SceneSize::of(&scene), view, &Preset::Draft.settings(), 0);
+            let needed = needs(
+                SceneSize::of(&scene),
+                view,
+                &Preset::Draft.settings(),
+                ModelBytes::default(),
+            );
             to_mark(&path, &up_to(needed.total()), Memory::of_program()).unwrap();
             to_read(&path, &up_to(needed.program + needed.scene), Memory::of_program()).unwrap();
         }

@@ -1,7 +1,8 @@
 //! Memory: how much a job will need, before it begins; how much there may be; how much was used.
 //!
 //! What is needed is predicted from the sizes of arrays, not from what was measured on some machine: the few constants
-//! that no array explains are said where they stand. `examples/bench_memory.rs` holds predictions against peaks.
+//! that no array explains are said where they stand. `memory-bench` (a program of the tests) holds predictions against
+//! peaks.
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -103,6 +104,15 @@ impl Limits {
             memory: budget.map_or(machine, |budget| budget.min(machine)),
             budget: budget.is_some_and(|budget| budget <= machine),
             buffer: None,
+        }
+    }
+
+    /// Of nothing but a GPU's buffers.
+    pub fn of_buffers(buffer: u64) -> Self {
+        Self {
+            memory: u64::MAX,
+            budget: false,
+            buffer: Some(buffer),
         }
     }
 

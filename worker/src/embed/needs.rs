@@ -98,8 +98,27 @@ impl ViewSize {
     }
 }
 
+/// Bytes of the models that are loaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModelBytes {
+    /// While changes are learned.
+    pub learning: u64,
+    /// When the marked scene is verified: the perceptual distance is then measured, whether or not it is learned from.
+    pub verifying: u64,
+}
+
+impl ModelBytes {
+    /// Of an engine's models with these settings.
+    pub fn of(engine: &Engine, settings: &Settings) -> Self {
+        Self {
+            learning: engine.model_bytes(settings.lambda.lpips > 0.0),
+            verifying: engine.model_bytes(true),
+        }
+    }
+}
+
 /// Predicts the most memory that an embedding has in use at once.
-pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: u64) -> Memory {
+pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: ModelBytes) -> Memory {
     let threads = rayon::current_num_threads() as u64;
     let learned = 4 * scene.gaussians * coefficients(scene.learned_degree);
     let mean = view.mean(settings);
@@ -112,7 +131,7 @@ pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: u64)
     let drawn = 2.0 * 12.0 * largest * settings.views_per_step as f64;
     let picture = 12 * u64::from(settings.size).pow(2);
     let optimising = Memory {
-        models,
+        models: models.learning,
         scene: scene.bytes(),
         offsets: 2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians,
         optimiser: 2 * learned + 4 * scene.gaussians,
@@ -122,7 +141,7 @@ pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: u64)
     };
     // When the marked scene is verified, views and optimiser are gone, and there are two scenes.
     let verifying = Memory {
-        models,
+        models: models.verifying,
         scene: 2 * scene.bytes(),
         offsets: optimising.offsets - learned,
         pictures: 2 * settings.verify.views as u64 * picture + threads * SCRATCH,

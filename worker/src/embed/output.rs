@@ -3,7 +3,7 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::needs::{SceneSize, ViewSize, needs};
+use super::needs::{ModelBytes, SceneSize, ViewSize, needs};
 use super::optimise::optimise;
 use super::progress::Progress;
 use super::settings::Settings;
@@ -66,7 +66,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     let stop = &engine.stop;
     stop.check()?;
     let rest = Memory {
-        models: engine.model_bytes(job.settings.lambda.lpips > 0.0),
+        models: ModelBytes::of(engine, job.settings).learning,
         ..Memory::of_program()
     };
     admission::to_mark(job.input, &engine.limits, rest)?;
@@ -115,8 +115,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
 /// Predicts what memory the job will need, and refuses one that does not fit.
 fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<Memory> {
     let view = ViewSize::measure(engine, &scene.gaussians, settings)?;
-    let models = engine.model_bytes(settings.lambda.lpips > 0.0);
-    let memory = needs(SceneSize::of(scene), view, settings, models);
+    let memory = needs(SceneSize::of(scene), view, settings, ModelBytes::of(engine, settings));
     engine.limits.admit(&memory)?;
     Ok(memory)
 }

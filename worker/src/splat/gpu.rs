@@ -4,6 +4,7 @@ use super::tiles::TILE;
 use super::uploads::{Uploaded, Uploads};
 use super::{PreparedView, Rasterizer};
 use crate::error::{Error, Result};
+use crate::memory::Limits;
 use crate::picture::Picture;
 use burn::backend::{BackendTensor, DispatchTensorKind};
 use burn::tensor::{Device, Tensor};
@@ -52,15 +53,11 @@ impl GpuRasterizer {
         }
     }
 
-    /// Refuses a buffer that the device cannot bind, before anything is allocated.
+    /// Refuses a buffer that the device cannot bind, before anything is allocated. An embedding draws a view before it
+    /// begins, so a scene that can't fit is refused at its admission.
     fn check(&self, what: &str, bytes: usize) -> Result<()> {
         let limit = self.client.properties().memory.max_page_size;
-        if bytes as u64 <= limit {
-            return Ok(());
-        }
-        Err(self.failed(format_args!(
-            "the view's {what} need {bytes} bytes, the device's limit for one buffer is {limit}; render a smaller picture"
-        )))
+        Limits::of_buffers(limit).admit_buffer(what, bytes as u64)
     }
 
     fn upload(&self, view: &PreparedView) -> Result<Uploaded> {
@@ -68,9 +65,9 @@ impl GpuRasterizer {
         let mut uploads = self.uploads.lock().unwrap_or_else(PoisonError::into_inner);
         uploads.get_or_insert(view.id, || {
             let tiles = &view.tiles;
-            self.check("splats", size_of_val(&view.splats[..]))?;
-            self.check("gradient slots", 12 * tiles.pairs())?;
-            self.check("pixels", 4 * view.picture_len())?;
+            self.check("the list of what a view shows", size_of_val(&view.splats[..]))?;
+            self.check("the gradient of a view", 12 * tiles.pairs())?;
+            self.check("a picture", 4 * view.picture_len())?;
             Ok(Uploaded {
                 bytes: size_of_val(&view.splats[..]) + tiles.bytes(),
                 splats: self.buffer(bytemuck::cast_slice(&view.splats)),
