@@ -101,7 +101,7 @@ mod tests {
         };
         let others = rest().total();
         let told = to_read(&path, &up_to(8 << 30), rest()).unwrap_err().to_string();
-        let words = "the scene does not fit: 100000000 Gaussians are too many: it needs 10.5 GiB (program 30 MiB, models \
+        let words = "the scene does not fit: 100000000 Gaussians are too many: it needs 10.5 GiB (program 36 MiB, models \
                      1 MiB, scene 10.4 GiB), its budget is 8.0 GiB";
         assert_eq!(told, words);
         // To the byte.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 
 /// What the program takes before it has read anything: its code, the tensor library, threads.
-const PROGRAM: u64 = 30 << 20;
+const PROGRAM: u64 = 36 << 20;
 
 /// Bytes that a job needs at once, by what they are for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -25,7 +25,7 @@ pub struct Memory {
     pub optimiser: u64,
     /// Prepared views that are kept.
     pub views: u64,
-    /// Pictures, and what differentiation keeps of them.
+    /// Pictures and what differentiation keeps of them, or what views are prepared in, if that is more.
     pub pictures: u64,
 }
 

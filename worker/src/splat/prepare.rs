@@ -170,6 +170,9 @@ pub fn prepare_timed(
         tiles = tiles.pruned(&keep, &renumber);
         weights = Some(kept);
     }
+    // Views are kept: what their lists have grown beyond their length would more than double them.
+    visible.shrink_to_fit();
+    splats.shrink_to_fit();
     let tiles = tiles.with_slots(visible.len());
     let directions = visible
         .par_iter()
