@@ -146,3 +146,75 @@ impl Sieve {
         ignored
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    /// Gaussians without the rows `bad`.
+    pub(crate) fn without(all: &Gaussians, bad: &BTreeSet<usize>) -> Gaussians {
+        let good = || (0..all.len()).filter(|row| !bad.contains(row));
+        let colour = all.sh.per_gaussian();
+        let mut sh = Sh {
+            degree: all.sh.degree,
+            coefficients: good()
+                .flat_map(|row| all.sh.coefficients[row * colour..(row + 1) * colour].to_vec())
+                .collect(),
+        };
+        sh.trim();
+        Gaussians {
+            positions: good().map(|row| all.positions[row]).collect(),
+            rotations: good().map(|row| all.rotations[row]).collect(),
+            log_scales: good().map(|row| all.log_scales[row]).collect(),
+            opacity_logits: good().map(|row| all.opacity_logits[row]).collect(),
+            sh,
+        }
+    }
+
+    fn of(rows: impl IntoIterator<Item = usize>) -> Ignored {
+        let mut sieve = Sieve::new(BadRows::Ignore);
+        for row in rows {
+            sieve.reject(row, || format!("row {row}")).unwrap();
+        }
+        sieve.finish()
+    }
+
+    #[test]
+    fn the_first_row_is_told_whenever_it_was_found() {
+        let ignored = of([7, 3, 9, 3]);
+        assert_eq!((ignored.count(), ignored.first()), (3, "row 3"));
+        assert_eq!(ignored.to_string(), "3 rows ignored, the first since row 3");
+        assert_eq!(of([5]).to_string(), "1 row ignored: row 5");
+        assert_eq!(of([]).if_any(), None);
+        let mut sieve = Sieve::new(BadRows::default());
+        assert_eq!(sieve.reject(4, || "why".into()), Err("why".into()));
+        assert_eq!(sieve.finish(), Ignored::default());
+    }
+
+    proptest! {
+        #[test]
+        fn rows_of_scene_and_file_are_the_same(rows in 0..40usize, bad in prop::collection::btree_set(0..40usize, 0..40)) {
+            let bad: BTreeSet<usize> = bad.into_iter().filter(|row| *row < rows).collect();
+            let ignored = of(bad.iter().rev().copied());
+            let good: Vec<usize> = (0..rows).filter(|row| !bad.contains(row)).collect();
+            let found: Vec<usize> = (0..good.len()).map(|row| ignored.file_row(row)).collect();
+            prop_assert_eq!(&found, &good);
+            // Every colour is the number of its row.
+            let all = Gaussians {
+                positions: (0..rows).map(|row| [row as f32; 3]).collect(),
+                rotations: vec![[1.0; 4]; rows],
+                log_scales: vec![[0.0; 3]; rows],
+                opacity_logits: (0..rows).map(|row| row as f32).collect(),
+                sh: Sh { degree: 0, coefficients: (0..3 * rows).map(|i| (i / 3) as f32).collect() },
+            };
+            let mut kept = all.clone();
+            ignored.take_from(&mut kept);
+            prop_assert_eq!(&kept, &without(&all, &bad));
+            let spread: Vec<Option<f32>> = ignored.spread(&kept.sh).map(|colour| Some(colour?[2])).collect();
+            let expected: Vec<Option<f32>> = (0..rows).map(|row| (!bad.contains(&row)).then_some(row as f32)).collect();
+            prop_assert_eq!(spread, expected);
+        }
+    }
+}

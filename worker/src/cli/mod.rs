@@ -192,9 +192,9 @@ mod tests {
         for line in [
             "key create --bits 32 --seed 7 -o K",
             "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json --memory 2048",
-            "embed IN OUT --key K --message 0123abcd --force --report R",
-            "verify A B C --key K --message 0123abcd --json --memory 1",
-            "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
+            "embed IN OUT --key K --message 0123abcd --force --report R --ignore-bad-rows",
+            "verify A B C --key K --message 0123abcd --json --memory 1 --ignore-bad-rows",
+            "render IN DIR --ignore-bad-rows --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
             "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",
             "models list",
