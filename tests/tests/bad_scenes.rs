@@ -111,3 +111,92 @@ fn embedding_and_verifying_a_bad_scene_names_what_is_wrong() {
         bench.refuses(&format!("verify {name} --key k.key --message 5c --device cpu"), &named);
     }
 }
+
+/// A scene with two bad rows among others, and where they are.
+fn with_bad_rows() -> (Ply, [usize; 2]) {
+    let scene = Ply::new(40, 9)
+        .set(3, "y", f32::NAN)
+        .set(3, "rot_2", f32::INFINITY)
+        .set(17, "f_rest_7", f32::NAN);
+    (scene, [3, 17])
+}
+
+const TOLD: &str = "2 rows ignored, the first since property y of row 3 is NaN";
+
+#[test]
+fn bad_rows_are_left_out_of_pictures_when_that_is_asked_for() {
+    let bench = Bench::new();
+    let (scene, bad) = with_bad_rows();
+    bench.write("nan.ply", scene.bytes());
+    let line = |name: &str| format!("render {name}.ply {name} --views 2 --size 32 --device cpu");
+    bench.refuses(&line("nan"), &["nan.ply", "property y of row 3 is NaN"]);
+    let told = bench.exits(&(line("nan") + " --ignore-bad-rows"), 0);
+    assert!(told.ends_with(&format!("{TOLD}\n")), "{told}");
+
+    let mut without = scene.clone();
+    without.rows = (0..40)
+        .filter(|row| !bad.contains(row))
+        .map(|row| scene.rows[row].clone())
+        .collect();
+    bench.write("good.ply", without.promise("38").bytes());
+    let told = bench.exits(&(line("good") + " --ignore-bad-rows"), 0);
+    assert!(!told.contains("ignored"), "{told}");
+    for name in ["view_000.png", "view_001.png", "cameras.json"] {
+        let [nan, good] = ["nan", "good"].map(|folder| bench.read(&format!("{folder}/{name}")));
+        assert!(nan == good, "{name}");
+    }
+
+    let hopeless = (0..5).fold(Ply::new(5, 0), |scene, row| scene.set(row, "x", f32::NAN));
+    bench.write("none.ply", hopeless.bytes());
+    let words = "none of 5 rows is left, the first since property x of row 0 is NaN";
+    bench.refuses(&(line("none") + " --ignore-bad-rows"), &["none.ply", words]);
+}
+
+#[test]
+fn bad_rows_are_written_as_they_were() {
+    let bench = Bench::new();
+    bench.exits("key create --bits 8 --seed 3 -o k.key --device cpu", 0);
+    let (scene, bad) = with_bad_rows();
+    bench.write("in.ply", scene.bytes());
+    bench.write(
+        "hasty.json",
+        r#"{"steps": 3, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
+            "verify": {"views": 3, "message_views": 2}, "target": {"bit_accuracy": 0, "psnr_db": 0, "message": false}}"#,
+    );
+    let embed =
+        "embed in.ply out.ply --key k.key --message 5c --settings hasty.json --size 32 --preset draft --device cpu";
+    let reason = "property y of row 3 is NaN";
+    bench.refuses(embed, &["in.ply", reason]);
+    let report = bench.json(&format!("{embed} --ignore-bad-rows --json"), 0);
+    assert_eq!((&report["ignored_rows"], &report["gaussians"]), (&2.into(), &38.into()));
+    let changed = report["changed_gaussians"].as_u64().unwrap();
+    assert!(changed > 0, "{report}");
+
+    // Colours of good rows may differ, and nothing else: NaN by its bytes.
+    let (before, after) = (scene.bytes(), bench.read("out.ply"));
+    assert_eq!(before.len(), after.len());
+    let row = 4 * scene.properties.len();
+    let header = before.len() - 40 * row;
+    assert_eq!(before[..header], after[..header]);
+    let mut rows = before[header..]
+        .chunks(row)
+        .zip(after[header..].chunks(row))
+        .enumerate();
+    let differ = rows.by_ref().filter(|(i, (before, after))| {
+        let colours = 12..24;
+        assert_eq!(before[..colours.start], after[..colours.start], "row {i}");
+        assert_eq!(before[colours.end..], after[colours.end..], "row {i}");
+        assert!(!bad.contains(i) || before == after, "row {i}");
+        before != after
+    });
+    assert_eq!(differ.count() as u64, changed);
+
+    bench.refuses(
+        "verify out.ply --key k.key --message 5c --device cpu",
+        &["out.ply", reason],
+    );
+    let verify = "verify out.ply --key k.key --message 5c --views 2 --device cpu --ignore-bad-rows";
+    // Eight bits decide nothing.
+    assert_eq!(bench.json(&format!("{verify} --json"), 3)["ignored_rows"], 2);
+    assert!(bench.exits(verify, 3).contains(TOLD));
+}

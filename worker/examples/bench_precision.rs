@@ -11,7 +11,7 @@ use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::{Job, Preset, Settings, embed};
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::Key;
-use guardsplat_worker::scene::{Gaussians, Scene};
+use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
 use guardsplat_worker::splat::{Learnable, WeightCache, prepare, sh};
 use guardsplat_worker::view::{Split, ViewSampler};
 
@@ -83,6 +83,7 @@ fn main() -> Result<(), Failure> {
             message: &message,
             settings: &settings,
             force: true,
+            bad_rows: BadRows::Refuse,
         };
         let outcome = embed(&engine, &job, &mut |_| {})?;
         let seconds = start.elapsed().as_secs_f64();

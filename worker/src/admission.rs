@@ -33,8 +33,14 @@ pub fn picture_bytes(width: u32, height: u32) -> u64 {
     2 * 12 * u64::from(width) * u64::from(height)
 }
 
+/// What the first bytes of a file say of its scene, if it is one and they do.
+pub fn summary_of(path: &Path) -> Option<Summary> {
+    let (head, size) = head(path)?;
+    summary(path, &head, size).ok()?
+}
+
 fn admit(path: &Path, limits: &Limits, rest: Memory, least: impl Fn(&Summary) -> u64) -> Result<()> {
-    let Some(summary) = head(path).and_then(|(head, size)| summary(path, &head, size).ok()?) else {
+    let Some(summary) = summary_of(path) else {
         return Ok(());
     };
     let memory = Memory {

@@ -12,7 +12,7 @@ use guardsplat_worker::embed::{
 use guardsplat_worker::extract::{Engine, read_pictures, read_scene};
 use guardsplat_worker::message::{ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions};
 use guardsplat_worker::sample::sample;
-use guardsplat_worker::scene::{Gaussians, Scene};
+use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
 use guardsplat_worker::stop::Stop;
 use guardsplat_worker::testing::scene_path;
 use guardsplat_worker::view::{Split, ViewSampler};
@@ -127,6 +127,7 @@ fn run(engine: &Engine, input: &Path, output: &Path, settings: &Settings, force:
         message: &message(),
         settings,
         force,
+        bad_rows: BadRows::Refuse,
     };
     embed(engine, &job, &mut |_| {})
 }

@@ -66,6 +66,9 @@ pub struct Arguments {
     /// Writes the scene even when it misses its target; the exit code says 3 all the same
     #[arg(long)]
     force: bool,
+    /// Leaves Gaussians with NaN and other impossible values alone instead of refusing the scene
+    #[arg(long)]
+    ignore_bad_rows: bool,
     /// Where to write a picture of original, marked and ten times their difference
     #[arg(long, value_name = "FILE")]
     comparison: Option<PathBuf>,
@@ -140,6 +143,7 @@ fn spec(arguments: &Arguments, key: &Key, message: String, inputs: &suspects::In
         seed: arguments.seed,
         size: arguments.size.unwrap_or_default(),
         force: arguments.force,
+        ignore_bad_rows: arguments.ignore_bad_rows,
         ..EmbedSpec::default()
     };
     spec.set_preset(arguments.preset.into());

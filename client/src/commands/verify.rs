@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Decides the views of a scene
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
+    /// Leaves out Gaussians of a scene with NaN and other impossible values instead of refusing it
+    #[arg(long)]
+    ignore_bad_rows: bool,
     #[command(flatten)]
     submission: Submission,
 }
@@ -60,6 +63,7 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         views: arguments.views.unwrap_or_default(),
         size: arguments.size.unwrap_or_default(),
         seed: arguments.seed,
+        ignore_bad_rows: arguments.ignore_bad_rows,
     });
     let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {

@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 use serde::Serialize;
 
-use super::seconds;
+use super::{rows_ignored, seconds};
 use crate::output::printable;
 
 /// What came of a job that marked a scene.
@@ -26,6 +26,7 @@ pub struct EmbedReport {
     clip: String,
     gaussians: u64,
     changed_gaussians: u64,
+    ignored_rows: u64,
     target_missed: Vec<String>,
 }
 
@@ -49,6 +50,7 @@ impl From<&EmbedResult> for EmbedReport {
             clip: result.clip.clone(),
             gaussians: result.gaussians,
             changed_gaussians: result.changed_gaussians,
+            ignored_rows: result.ignored_rows,
             target_missed: result.target_missed.clone(),
         }
     }
@@ -77,6 +79,6 @@ impl EmbedReport {
             self.steps,
             self.seconds,
             printable(&self.device)
-        )
+        ) + &rows_ignored(self.ignored_rows)
     }
 }

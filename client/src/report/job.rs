@@ -40,6 +40,7 @@ enum SpecReport {
         seed: u64,
         size: Option<u32>,
         force: bool,
+        ignore_bad_rows: bool,
     },
     Verify {
         suspects: Vec<String>,
@@ -48,6 +49,7 @@ enum SpecReport {
         views: Option<u32>,
         size: Option<u32>,
         seed: u64,
+        ignore_bad_rows: bool,
     },
     CreateKey {
         bits: u32,
@@ -129,6 +131,7 @@ impl From<&Spec> for SpecReport {
                 seed: spec.seed,
                 size: given(spec.size),
                 force: spec.force,
+                ignore_bad_rows: spec.ignore_bad_rows,
             },
             Spec::Verify(spec) => verify(spec, given(spec.views), given(spec.size)),
             // A seed is as good as the key: it is not printed.
@@ -148,6 +151,7 @@ fn verify(spec: &VerifySpec, views: Option<u32>, size: Option<u32>) -> SpecRepor
         views,
         size,
         seed: spec.seed,
+        ignore_bad_rows: spec.ignore_bad_rows,
     }
 }
 

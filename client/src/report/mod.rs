@@ -31,6 +31,15 @@ fn some(text: &str) -> Option<String> {
     (!text.is_empty()).then(|| text.to_owned())
 }
 
+/// A line of its own where rows of a scene were ignored.
+fn rows_ignored(count: u64) -> String {
+    match count {
+        0 => String::new(),
+        1 => "\n1 row ignored".into(),
+        count => format!("\n{count} rows ignored"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@ use guardsplat_proto::v1::VerifyResult;
 use guardsplat_proto::v1::verify_result::Verdict;
 use serde::Serialize;
 
-use super::{seconds, some, word};
+use super::{rows_ignored, seconds, some, word};
 use crate::output::{Exit, printable};
 
 /// What came of a job that verified a suspect.
@@ -23,6 +23,7 @@ pub struct VerifyReport {
     mean_abs_logit: f64,
     view_agreement: f64,
     reason: Option<String>,
+    ignored_rows: u64,
     seconds: f64,
     device: String,
     clip: String,
@@ -46,6 +47,7 @@ impl From<&VerifyResult> for VerifyReport {
             mean_abs_logit: result.mean_abs_logit,
             view_agreement: result.view_agreement,
             reason: some(&result.reason),
+            ignored_rows: result.ignored_rows,
             seconds: seconds(result.duration),
             device: result.device.clone(),
             clip: result.clip.clone(),
@@ -88,7 +90,7 @@ impl VerifyReport {
             text.push('\n');
             text.push_str(&printable(reason));
         }
-        text
+        text + &rows_ignored(self.ignored_rows)
     }
 }
 
@@ -126,5 +128,9 @@ mod tests {
         assert!(text.ends_with("\nnothing to compare with"), "{text}");
         let json = serde_json::to_value(&report).unwrap();
         assert!(json["p_value"].is_null() && json.get("exit").is_none());
+        assert_eq!(json["ignored_rows"], 0);
+        result.ignored_rows = 3;
+        let text = VerifyReport::from(&result).lines();
+        assert!(text.ends_with("compare with\n3 rows ignored"), "{text}");
     }
 }

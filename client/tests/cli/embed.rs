@@ -70,7 +70,7 @@ fn bench(missed: &[&str]) -> Bench {
 fn a_scene_goes_there_and_comes_back_marked() {
     let bench = bench(&[]);
     let ran = bench.run(&format!(
-        "{LINE} --preset draft --seed 9 --size 128 --comparison c.png --json"
+        "{LINE} --preset draft --seed 9 --size 128 --ignore-bad-rows --comparison c.png --json"
     ));
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
@@ -111,6 +111,7 @@ fn a_scene_goes_there_and_comes_back_marked() {
         (spec.preset(), spec.seed, spec.size, spec.force),
         (Preset::Draft, 9, 128, false)
     );
+    assert!(spec.ignore_bad_rows && json["ignored_rows"] == 2);
     let request = state.created.last().unwrap();
     assert_eq!(request.job.as_ref().unwrap().display_name, "in.ply");
     assert!(uuid::Uuid::try_parse(&request.request_id).is_ok());
@@ -121,7 +122,7 @@ fn progress_goes_to_standard_error_as_lines() {
     let ran = bench(&[]).run(LINE);
     assert_eq!(ran.code, 0, "{}", ran.err);
     let expected = "bits 97.50 % (worst view 93.75 %), message c0ffee42 recovered, PSNR 36.50 dB, SSIM 0.9700; 600 \
-                    steps, 12 s on cpu\nwritten to out.ply\n";
+                    steps, 12 s on cpu\n2 rows ignored\nwritten to out.ply\n";
     assert_eq!(ran.out, expected);
     for line in [
         "upload 600005/600005 bytes",

@@ -218,6 +218,7 @@ pub fn figures(scene: &str, comparison: &str) -> EmbedResult {
         clip: "guardsplat".into(),
         gaussians: 1000,
         changed_gaussians: 900,
+        ignored_rows: 2,
         ..EmbedResult::default()
     }
 }

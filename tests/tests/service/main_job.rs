@@ -81,6 +81,26 @@ fn one_server_and_the_client_are_enough() {
     assert_eq!(verifies(&service, "views", &read, 0)["views"], 5);
     verifies(&service, "views", &opposite(&read), 2);
 
+    // A row with NaN is an error, unless it is to be left out: here the last, which ends with a rotation.
+    let mut poisoned = service.bench.read("in.ply");
+    let last = poisoned.len() - 4;
+    poisoned[last..].copy_from_slice(&f32::NAN.to_le_bytes());
+    service.bench.write("nan.ply", &poisoned);
+    let error = &service.json("verify nan.ply --key site", 1)["error"];
+    assert_eq!(error["reason"], "invalid_input", "{error}");
+    assert!(error["message"].as_str().unwrap().contains("row 499 is NaN"), "{error}");
+    let read = reading(&service.bench, "nan.ply --ignore-bad-rows");
+    assert_eq!(
+        verifies(&service, "nan.ply --ignore-bad-rows", &read, 0)["ignored_rows"],
+        1
+    );
+    let embed = EMBED.replace("in.ply", "nan.ply --ignore-bad-rows");
+    let marked = service.json(&format!("{embed} draft -o nan-out.ply"), MISSED);
+    assert_eq!(
+        (&marked["ignored_rows"], &marked["gaussians"]),
+        (&1.into(), &499.into())
+    );
+
     // A target that is missed is no result, unless it was forced.
     let missed = service.json(&format!("{} draft -o no.ply", EMBED.replace("--force ", "")), MISSED);
     assert_eq!((&missed["written"], missed["output"].is_null()), (&false.into(), true));

@@ -1,5 +1,5 @@
 //! What a file is besides its Gaussians: how it is written again with other colours, and which colours it can keep.
-use crate::Sh;
+use crate::{Ignored, Sh};
 use std::fmt::Debug;
 use std::io::{self, Write};
 
@@ -57,6 +57,11 @@ pub(crate) trait Container: Debug + Send + Sync {
     /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what the file keeps of them.
     fn keep(&self, row: usize, coefficients: &mut [f32]) {
         let _ = (row, coefficients);
+    }
+
+    /// Rows of the file that are no Gaussians of the scene, where some were ignored. They are written as they were.
+    fn ignored(&self) -> Option<&Ignored> {
+        None
     }
 
     /// Writes the file with the colours `sh`: finite, of the degree and the rows of the scene that was read.

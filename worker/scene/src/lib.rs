@@ -5,6 +5,7 @@
 mod container;
 mod error;
 mod gaussians;
+mod ignored;
 mod names;
 mod packed;
 mod ply;
@@ -23,6 +24,7 @@ mod whole;
 pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
+pub use ignored::{BadRows, Ignored};
 pub use scene::Scene;
 pub use sniff::{HEAD, is_loose_sog, sniff};
 pub use summary::{Summary, summary};

@@ -1,6 +1,7 @@
 //! A scene and the file it came from, whatever its format.
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::ignored::{BadRows, Ignored};
 use crate::sniff::announced;
 use crate::whole::write_whole;
 use crate::{Error, Result, ply, sog, splat, spz};
@@ -17,8 +18,9 @@ pub(crate) const UNKNOWN: &str =
 /// A scene: what the engine computes with, and the file it came from.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The Gaussians in the order of the file. The degree of their colours is that of the highest band in which any
-    /// Gaussian has a coefficient other than 0, which may be lower than what the file has room for.
+    /// The Gaussians in the order of the file, without the rows of [`Scene::ignored`]. The degree of their colours is
+    /// that of the highest band in which any Gaussian has a coefficient other than 0, which may be lower than what the
+    /// file has room for.
     pub gaussians: Gaussians,
     /// `None` for a scene that was not read from a file.
     source: Option<Arc<dyn Container>>,
@@ -36,12 +38,27 @@ impl Scene {
     /// other than those of opacity and of flat axes (a log scale of minus infinity), more bytes uncompressed than
     /// allowed. Counts are compared with the file before anything is allocated.
     pub fn read(path: &Path) -> Result<Scene> {
+        Scene::read_with(path, BadRows::Refuse)
+    }
+
+    /// Reads a scene as [`Scene::read`], in which values that are not legal may be no reason to refuse it, but to leave
+    /// their rows out: [`Scene::ignored`] tells of them.
+    ///
+    /// Only what is wrong with a single row is ignored: NaN and infinities of PLY and `.splat`, words that are no
+    /// numbers in an ASCII PLY, negative deviations in a `.splat`, and indices that stand for no number in a SOG. What
+    /// many rows share (a chunk's range, the numbers of `meta.json`) and whatever leaves in doubt where rows are is
+    /// refused all the same. No byte of an SPZ can be wrong.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read`]; [`Error::BadScene`] where no row is left.
+    pub fn read_with(path: &Path, bad_rows: BadRows) -> Result<Scene> {
         let file = File::open(path).map_err(Error::io(path))?;
         let metadata = file.metadata().map_err(Error::io(path))?;
         if !metadata.is_file() {
             return Err(bad(path, "not a regular file".to_string()));
         }
-        Scene::read_from(path, &mut BufReader::with_capacity(1 << 16, file), metadata.len())
+        let mut source = BufReader::with_capacity(1 << 16, file);
+        Scene::read_from(path, &mut source, metadata.len(), bad_rows)
     }
 
     /// Reads a scene from memory; `name` is for messages.
@@ -49,19 +66,34 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::read`].
     pub fn parse(name: &Path, bytes: &[u8]) -> Result<Scene> {
-        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64)
+        Scene::parse_with(name, bytes, BadRows::Refuse)
+    }
+
+    /// Reads a scene from memory as [`Scene::read_with`]; `name` is for messages.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read_with`].
+    pub fn parse_with(name: &Path, bytes: &[u8], bad_rows: BadRows) -> Result<Scene> {
+        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64, bad_rows)
     }
 
     /// Reads a scene of `size` bytes; `path` is for messages.
-    fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64) -> Result<Scene> {
+    fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64, bad_rows: BadRows) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
         let first = source.fill_buf().map_err(Error::io(path))?;
         let (gaussians, source) = match announced(first) {
-            Some(Format::Ply | Format::CompressedPly) => ply::read(path, source, size)?,
+            Some(Format::Ply | Format::CompressedPly) => ply::read(path, source, size, bad_rows)?,
             Some(Format::Spz) => spz::read(path, source, size)?,
-            Some(Format::Sog) => sog::read(path, source, size)?,
-            _ => splat::read(path, source, size)?,
+            Some(Format::Sog) => sog::read(path, source, size, bad_rows)?,
+            _ => splat::read(path, source, size, bad_rows)?,
         };
+        if let Some(ignored) = source.ignored().filter(|_| gaussians.is_empty()) {
+            let (count, first) = (ignored.count(), ignored.first());
+            return Err(bad(
+                path,
+                format!("none of {count} rows is left, the first since {first}"),
+            ));
+        }
         Ok(Scene {
             gaussians,
             source: Some(source),
@@ -71,8 +103,8 @@ impl Scene {
     /// Writes the scene with the colours `sh` in place of its own, whole or not at all, in the format that it was
     /// read from.
     ///
-    /// A scene from a file is written as that file with its colours changed, whatever else was done to
-    /// [`Scene::gaussians`]; one that was made in memory, as a PLY in the layout of the reference implementation.
+    /// A scene from a file is written as that file with its colours changed, rows that were ignored as they were,
+    /// whatever else was done to [`Scene::gaussians`]; one that was made in memory, as a PLY in the layout of the reference implementation.
     ///
     /// # Errors
     /// [`Error::BadScene`] where `sh` has another degree or number of rows than the scene, or a value that is not
@@ -116,6 +148,11 @@ impl Scene {
     /// The format that [`Scene::write`] writes.
     pub fn format(&self) -> Format {
         self.source.as_ref().map_or(Format::Ply, |source| source.format())
+    }
+
+    /// The rows of the file that were left out, if any.
+    pub fn ignored(&self) -> Option<&Ignored> {
+        self.source.as_ref().and_then(|source| source.ignored())
     }
 
     /// Bytes of the file that are in memory, uncompressed.

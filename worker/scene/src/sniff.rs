@@ -1,5 +1,6 @@
 //! Which format a file is of, told by its first bytes and never by its name.
 use crate::container::Format;
+use crate::ignored::BadRows;
 use crate::scene::bad;
 use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
@@ -63,7 +64,7 @@ impl Format {
         }
         // What does not look like one at its beginning may still be one, and else is told why not.
         let mut source = BufReader::new(head.chain(file));
-        splat::read(path, &mut source, metadata.len()).map(|_| Format::Splat)
+        splat::read(path, &mut source, metadata.len(), BadRows::Ignore).map(|_| Format::Splat)
     }
 }
 

@@ -15,7 +15,7 @@ const LEARNED: u64 = 4;
 pub struct Summary {
     /// The format.
     pub format: Format,
-    /// Gaussians.
+    /// Gaussians, rows that may have to be ignored included.
     pub gaussians: u64,
     /// Degree of the spherical harmonics that the file has room for; those in use may be of a lower one.
     pub degree: u64,
@@ -27,8 +27,8 @@ pub struct Summary {
 /// messages. `None` where it says nothing: a SOG has its figures anywhere.
 ///
 /// # Errors
-/// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read`](crate::Scene::read) would refuse after as many
-/// bytes: not a scene, or one that is shorter than its header promises.
+/// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read_with`](crate::Scene::read_with) would refuse after
+/// as many bytes, bad rows being ignored: not a scene, or one that is shorter than its header promises.
 pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
     let said = match head {
         _ if ply::begins(head) => ply::summary(head, size),

@@ -8,6 +8,7 @@ use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verific
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Key;
 use guardsplat_worker::quality::{Quality, write_picture};
+use guardsplat_worker::scene::{BadRows, Ignored};
 use guardsplat_worker::{Error, Result};
 use serde::Serialize;
 
@@ -47,6 +48,9 @@ pub struct Arguments {
     /// Writes the scene even when it misses its target
     #[arg(long)]
     force: bool,
+    /// Leaves Gaussians with NaN and other impossible values alone instead of refusing the scene
+    #[arg(long)]
+    ignore_bad_rows: bool,
     /// A folder for pictures of original, marked and ten times their difference
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -81,6 +85,7 @@ struct Report<'a> {
     gaussians: usize,
     seen_gaussians: usize,
     changed_gaussians: usize,
+    ignored_rows: usize,
     covering_views: usize,
     predicted_memory_bytes: u64,
     predicted_memory: Memory,
@@ -111,6 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         message: &message,
         settings: &settings,
         force: arguments.force,
+        bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
     let mut display = Display::new("embedding");
     let mut verifying = None;
@@ -197,6 +203,7 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
         gaussians: outcome.gaussians,
         seen_gaussians: outcome.seen,
         changed_gaussians: outcome.changed,
+        ignored_rows: outcome.ignored.as_ref().map_or(0, Ignored::count),
         covering_views: outcome.covering_views,
         predicted_memory_bytes: outcome.memory.total(),
         predicted_memory: outcome.memory,
@@ -226,6 +233,9 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
             outcome.steps,
             report.seconds
         ));
+        if let Some(ignored) = &outcome.ignored {
+            print_line(&ignored.to_string());
+        }
         if outcome.written {
             print_line(&format!("written to {}", arguments.output.display()));
         }

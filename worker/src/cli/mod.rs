@@ -1,6 +1,7 @@
 //! The command line: what there is to say, and what the process exits with.
 mod display;
 mod embed;
+mod inspect;
 mod key;
 mod models;
 mod render;
@@ -61,6 +62,8 @@ enum Command {
     Verify(verify::Arguments),
     /// Renders views of a scene
     Render(render::Arguments),
+    /// Tells what a scene file holds, and whether marking it fits in memory
+    Inspect(inspect::Arguments),
     /// Makes a small scene to try things with
     Sample(sample::Arguments),
     /// Weights of other CLIP models and of LPIPS
@@ -141,6 +144,7 @@ fn carry_out(command: Command) -> Result<Exit> {
         Command::Embed(arguments) => embed::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Models(command) => models::run(command),
         Command::Run(arguments) => Ok(run::run(arguments)),
@@ -192,9 +196,10 @@ mod tests {
         for line in [
             "key create --bits 32 --seed 7 -o K",
             "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json --memory 2048",
-            "embed IN OUT --key K --message 0123abcd --force --report R",
-            "verify A B C --key K --message 0123abcd --json --memory 1",
-            "render IN DIR --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
+            "embed IN OUT --key K --message 0123abcd --force --report R --ignore-bad-rows",
+            "verify A B C --key K --message 0123abcd --json --memory 1 --ignore-bad-rows",
+            "render IN DIR --ignore-bad-rows --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
+            "inspect SCENE --json --memory 7 --views 16 --ignore-bad-rows",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
             "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",
             "models list",

@@ -7,7 +7,7 @@ use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::extract::rasterizer;
 use guardsplat_worker::memory::{Limits, Memory};
 use guardsplat_worker::quality::write_picture;
-use guardsplat_worker::scene::Scene;
+use guardsplat_worker::scene::{BadRows, Scene};
 use guardsplat_worker::splat::{WeightCache, prepare, sh};
 use guardsplat_worker::view::{Camera, Split, ViewSampler, read_cameras, write_cameras};
 use guardsplat_worker::{Error, Result};
@@ -54,6 +54,9 @@ pub struct Arguments {
     /// Decides the views. No embedding uses any of them, whatever its seed
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Leaves out Gaussians with NaN and other impossible values instead of refusing the scene
+    #[arg(long)]
+    ignore_bad_rows: bool,
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
@@ -75,7 +78,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let limits = Limits::of_machine(arguments.budget.bytes());
     admission::to_read(&arguments.input, &limits, rest)?;
-    let scene = Scene::read(&arguments.input)?.gaussians;
+    let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
+    let scene = Scene::read_with(&arguments.input, bad_rows)?;
+    let ignored = scene.ignored().cloned();
+    let scene = scene.gaussians;
     let cameras = match given {
         Some(cameras) => cameras,
         None => {
@@ -106,6 +112,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         cameras.len(),
         folder.display()
     ));
+    if let Some(ignored) = ignored {
+        print_line(&ignored.to_string());
+    }
     Ok(Exit::Done)
 }
 

@@ -7,6 +7,7 @@ use guardsplat_worker::Result;
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::extract::{Comparison, DEFAULT_VIEWS, find_source};
 use guardsplat_worker::message::{Key, Verdict};
+use guardsplat_worker::scene::{BadRows, Ignored};
 use serde::Serialize;
 
 use super::display::Display;
@@ -42,6 +43,9 @@ pub struct Arguments {
     /// Decides the views of a scene
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Leaves out Gaussians of a scene with NaN and other impossible values instead of refusing it
+    #[arg(long)]
+    ignore_bad_rows: bool,
     /// A CLIP that was added with `models add`, instead of the one that the key names
     #[arg(long)]
     clip: Option<String>,
@@ -77,15 +81,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         size: arguments.size,
         background: arguments.background.rgb(),
         seed: arguments.seed,
+        bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
     let mut display = Display::new("reading");
-    let reading = read(&engine, &source, &views, |done, total| {
+    let (reading, ignored) = read(&engine, &source, &views, |done, total| {
         display.set(done, total, String::new);
     })?;
     drop(display);
     let comparison = message.map(|message| reading.compare(&message)).transpose()?;
     let report = Report {
-        findings: Findings::new(&reading, comparison.as_ref())?,
+        findings: Findings::new(&reading, comparison.as_ref(), ignored.as_ref())?,
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,
         clip: &key.clip.name,
@@ -93,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         print_json(&report)?;
     } else {
-        tell(&report.findings, comparison.as_ref());
+        tell(&report.findings, comparison.as_ref(), ignored.as_ref());
     }
     Ok(match report.findings.verdict {
         Verdict::Match => Exit::Done,
@@ -102,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-fn tell(report: &Findings, comparison: Option<&Comparison>) {
+fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: Option<&Ignored>) {
     let verdict = match report.verdict {
         Verdict::Match => "match",
         Verdict::NoMatch => "no match",
@@ -129,5 +134,8 @@ fn tell(report: &Findings, comparison: Option<&Comparison>) {
     });
     if let Some(reason) = &report.reason {
         print_line(reason);
+    }
+    if let Some(ignored) = ignored {
+        print_line(&ignored.to_string());
     }
 }

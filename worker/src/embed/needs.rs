@@ -2,9 +2,10 @@
 use super::pool::PooledView;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::extract::Engine;
+use crate::extract::{Engine, cpu_weight_cache};
 use crate::memory::Memory;
 use crate::scene::{Gaussians, Scene};
+use crate::splat::{PreparedView, prepare};
 use crate::view::{Split, ViewSampler};
 
 /// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
@@ -78,12 +79,28 @@ impl ViewSize {
             [1.0; 3],
         )?
         .view;
+        Ok(Self::of(&view))
+    }
+
+    /// The same view as the CPU keeps it, without an engine.
+    ///
+    /// # Errors
+    /// An empty scene.
+    pub fn on_cpu(gaussians: &Gaussians, settings: &Settings) -> Result<Self> {
+        let sampler = ViewSampler::new(gaussians, settings.seed)?;
+        let camera = sampler.camera(Split::Training, 0, settings.size);
+        let camera = camera.enlarged(settings.enlarged);
+        let cache = cpu_weight_cache(camera.width, settings.half_weights);
+        Ok(Self::of(&prepare(gaussians, &camera, cache)?))
+    }
+
+    fn of(view: &PreparedView) -> Self {
         let weights = view.weight_bytes() as f64;
-        let side = f64::from(settings.size * settings.enlarged);
-        Ok(Self {
+        let side = f64::from(view.camera.width);
+        Self {
             visible: view.bytes() as f64 - weights,
             pixel: weights / (side * side),
-        })
+        }
     }
 
     /// Mean bytes of a training view.

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::memory::Memory;
 use crate::message::Message;
-use crate::scene::{Format, Scene};
+use crate::scene::{BadRows, Format, Ignored, Scene};
 
 /// What to embed where.
 pub struct Job<'a> {
@@ -27,6 +27,8 @@ pub struct Job<'a> {
     pub settings: &'a Settings,
     /// Writes a scene that misses its target all the same.
     pub force: bool,
+    /// What becomes of rows with values that are not legal; ignored ones are in the output as they were.
+    pub bad_rows: BadRows,
 }
 
 /// What became of a job.
@@ -48,6 +50,8 @@ pub struct Outcome {
     pub memory: Memory,
     /// Gaussians of the scene.
     pub gaussians: usize,
+    /// Rows of the file that are none, where some were ignored.
+    pub ignored: Option<Ignored>,
     /// Gaussians that training views show; the others were left alone.
     pub seen: usize,
     /// Training views that it took to find them.
@@ -70,7 +74,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         ..Memory::of_program()
     };
     admission::to_mark(job.input, &engine.limits, rest)?;
-    let scene = Scene::read(job.input)?;
+    let scene = Scene::read_with(job.input, job.bad_rows)?;
     stop.check()?;
     let memory = admit(engine, &scene, job.settings)?;
     let aside = reserve(job, &scene)?;
@@ -85,8 +89,10 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     scene.write(&aside, &colours).map_err(|e| named(e, job.output))?;
     drop(colours);
     stop.check()?;
-    let marked = Scene::read(&aside).map_err(|e| named(e, job.output))?.gaussians;
+    // The rows that were bad are so in the marked file too, and no others may be.
+    let marked = Scene::read_with(&aside, job.bad_rows).map_err(|e| named(e, job.output))?;
     check_geometry(job.output, &scene, &marked)?;
+    let marked = marked.gaussians;
 
     let total = job.settings.verify.views;
     let verification = verify(engine, &scene.gaussians, &marked, job.message, job.settings, |done| {
@@ -105,6 +111,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         steps: optimised.steps,
         view_steps: optimised.view_steps,
         gaussians: scene.gaussians.len(),
+        ignored: scene.ignored().cloned(),
         memory,
         seen: optimised.learned.learnable.rows().len(),
         covering_views: optimised.covering_views,
@@ -169,9 +176,10 @@ fn named(error: impl Into<Error>, output: &Path) -> Error {
     }
 }
 
-fn check_geometry(output: &Path, scene: &Scene, marked: &crate::scene::Gaussians) -> Result<()> {
-    let original = &scene.gaussians;
-    let same = original.positions == marked.positions
+fn check_geometry(output: &Path, scene: &Scene, read_back: &Scene) -> Result<()> {
+    let (original, marked) = (&scene.gaussians, &read_back.gaussians);
+    let same = scene.ignored() == read_back.ignored()
+        && original.positions == marked.positions
         && original.rotations == marked.rotations
         && original.log_scales == marked.log_scales
         && original.opacity_logits == marked.opacity_logits
@@ -206,6 +214,7 @@ mod tests {
                 message: &message,
                 settings: &settings,
                 force: false,
+                bad_rows: BadRows::Refuse,
             };
             reserve(&job, &scene)
         };
@@ -231,11 +240,11 @@ mod tests {
     #[test]
     fn other_geometry_is_noticed() {
         let scene = sample(10, 0, 1).unwrap();
-        let mut marked = scene.gaussians.clone();
-        marked.sh.coefficients[0] += 1.0;
+        let mut marked = scene.clone();
+        marked.gaussians.sh.coefficients[0] += 1.0;
         let output = Path::new("out.ply");
         check_geometry(output, &scene, &marked).unwrap();
-        marked.positions[3][1] += 1e-3;
+        marked.gaussians.positions[3][1] += 1e-3;
         assert!(check_geometry(output, &scene, &marked).is_err());
     }
 }

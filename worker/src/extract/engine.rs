@@ -38,6 +38,15 @@ fn on_cpu(compute: &Compute) -> bool {
     compute.name == "cpu"
 }
 
+/// What a view of that side keeps on the CPU: weights where they fit, in `half` precision if asked for.
+pub(crate) fn cpu_weight_cache(side: u32, half: bool) -> WeightCache {
+    match side <= CACHED_SIDE {
+        true if half => WeightCache::HalfWeights,
+        true => WeightCache::Weights,
+        false => WeightCache::None,
+    }
+}
+
 /// Everything that is loaded once and used for any number of scenes.
 pub struct Engine {
     /// Where tensors live.
@@ -169,10 +178,10 @@ impl Engine {
 
     /// What a view that is drawn repeatedly keeps: weights where they are used and fit, in `half` precision if asked for.
     pub fn weight_cache(&self, size: u32, half: bool) -> WeightCache {
-        match on_cpu(&self.compute) && size <= CACHED_SIDE {
-            true if half => WeightCache::HalfWeights,
-            true => WeightCache::Weights,
-            false => WeightCache::None,
+        if on_cpu(&self.compute) {
+            cpu_weight_cache(size, half)
+        } else {
+            WeightCache::None
         }
     }
 

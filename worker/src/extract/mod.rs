@@ -4,6 +4,7 @@ mod kind;
 mod pictures;
 mod reading;
 
+pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};

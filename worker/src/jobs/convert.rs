@@ -11,6 +11,7 @@ use guardsplat_worker::embed::{self, NewKey, Outcome, Preset, Settings};
 use guardsplat_worker::extract::DEFAULT_VIEWS;
 use guardsplat_worker::message::training::Progress as Training;
 use guardsplat_worker::message::{Key, Verdict};
+use guardsplat_worker::scene::{BadRows, Ignored};
 
 use super::error::{Error, Result};
 use crate::work::findings::{Findings, Views};
@@ -43,6 +44,7 @@ pub fn views(spec: &api::VerifySpec) -> Result<Views> {
         size: within("size", spec.size, 16, 4096)?,
         background: WHITE,
         seed: spec.seed,
+        bad_rows: BadRows::ignored_if(spec.ignore_bad_rows),
     })
 }
 
@@ -100,6 +102,7 @@ pub fn embed_result(outcome: &Outcome) -> api::EmbedResult {
         target_missed: outcome.missed.clone(),
         gaussians: outcome.gaussians as u64,
         changed_gaussians: outcome.changed as u64,
+        ignored_rows: outcome.ignored.as_ref().map_or(0, Ignored::count) as u64,
         ..api::EmbedResult::default()
     }
 }
@@ -125,6 +128,7 @@ pub fn verify_result(found: Findings) -> api::VerifyResult {
         mean_abs_logit: found.mean_abs_logit,
         view_agreement: found.view_agreement,
         reason: found.reason.unwrap_or_default(),
+        ignored_rows: found.ignored_rows as u64,
         ..api::VerifyResult::default()
     }
 }

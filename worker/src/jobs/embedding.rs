@@ -7,6 +7,7 @@ use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::embed::{Job, Outcome, embed};
 use guardsplat_worker::message::Key;
 use guardsplat_worker::quality::{PictureFormat, encode_picture};
+use guardsplat_worker::scene::BadRows;
 
 use super::attempt::Attempt;
 use super::convert;
@@ -31,6 +32,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
     // Its format, and so its name, is known when it is there.
     let output = attempt.folder.join("marked");
     let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
+    let bad_rows = BadRows::ignored_if(spec.ignore_bad_rows);
     let marked_file = Content::File(output.clone());
     let work = attempt.compute(move |bench, stop, reporter| {
         let start = Instant::now();
@@ -45,6 +47,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
             message: &message,
             settings: &settings,
             force,
+            bad_rows,
         };
         let outcome = embed(engine, &job, &mut |progress| {
             if let Some(progress) = convert::embedding_progress(&progress) {

@@ -43,12 +43,12 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<D
         let message = message.map(|text| key.message(&text)).transpose()?;
         let device = bench.device().to_owned();
         let engine = bench.engine(&name, &key, stop)?;
-        let reading = read(engine, &source, &views, |done, total| {
+        let (reading, ignored) = read(engine, &source, &views, |done, total| {
             reporter.tell(convert::stage(Stage::Reading, done, total));
         })?;
         let comparison = message.map(|message| reading.compare(&message)).transpose()?;
         Ok(Verified {
-            findings: Findings::new(&reading, comparison.as_ref())?,
+            findings: Findings::new(&reading, comparison.as_ref(), ignored.as_ref())?,
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),

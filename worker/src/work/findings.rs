@@ -5,7 +5,7 @@ use guardsplat_worker::extract::{Comparison, Engine, Reading, Source, default_si
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Verdict;
 use guardsplat_worker::quality::read_picture;
-use guardsplat_worker::scene::Scene;
+use guardsplat_worker::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
 
 /// Why a reading that has nothing to be compared with decides nothing.
@@ -21,15 +21,18 @@ pub struct Views {
     pub background: [f32; 3],
     /// Decides them.
     pub seed: u64,
+    /// What becomes of rows of the scene with values that are not legal.
+    pub bad_rows: BadRows,
 }
 
-/// Reads `source`; `progress` hears how many views or pictures are done, and of how many.
+/// Reads `source`, and tells of rows of a scene that were ignored; `progress` hears how many views or pictures are done,
+/// and of how many.
 pub fn read(
     engine: &Engine,
     source: &Source,
     views: &Views,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Reading> {
+) -> Result<(Reading, Option<Ignored>)> {
     match source {
         Source::Scene(path) => {
             let size = views.size.unwrap_or_else(|| default_size(engine));
@@ -39,10 +42,11 @@ pub fn read(
                 ..Memory::of_program()
             };
             admission::to_read(path, &engine.limits, rest)?;
-            let scene = Scene::read(path)?.gaussians;
-            read_scene(
+            let scene = Scene::read_with(path, views.bad_rows)?;
+            let ignored = scene.ignored().cloned();
+            let reading = read_scene(
                 engine,
-                &scene,
+                &scene.gaussians,
                 views.count,
                 size,
                 views.background,
@@ -50,7 +54,8 @@ pub fn read(
                 |done| {
                     progress(done, views.count);
                 },
-            )
+            )?;
+            Ok((reading, ignored))
         }
         Source::Pictures(paths) => {
             let mut read = Vec::with_capacity(paths.len());
@@ -60,7 +65,7 @@ pub fn read(
                 read.extend(engine.read_logits(&[picture])?);
                 progress(index + 1, paths.len());
             }
-            Reading::new(read)
+            Ok((Reading::new(read)?, None))
         }
     }
 }
@@ -92,13 +97,16 @@ pub struct Findings {
     pub mean_abs_logit: f64,
     /// Mean share of views that agree with the decision on a bit.
     pub view_agreement: f64,
+    /// Rows of the scene that are no Gaussians of it and were ignored.
+    pub ignored_rows: usize,
     /// Why nothing could be decided.
     pub reason: Option<String>,
 }
 
 impl Findings {
-    /// What a reading and its comparison with a claimed message, if there was one, say.
-    pub fn new(reading: &Reading, comparison: Option<&Comparison>) -> Result<Self> {
+    /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
+    /// were ignored for it.
+    pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: Option<&Ignored>) -> Result<Self> {
         let decision = comparison.map(|c| &c.decision);
         Ok(Self {
             verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
@@ -113,6 +121,7 @@ impl Findings {
             bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
             mean_abs_logit: reading.mean_abs_logit(),
             view_agreement: reading.agreement(),
+            ignored_rows: ignored.map_or(0, Ignored::count),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),
                 None => Some(NOTHING_TO_COMPARE.into()),

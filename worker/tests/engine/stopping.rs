@@ -3,6 +3,7 @@ use guardsplat_worker::Error;
 use guardsplat_worker::embed::{Job, NewKey, Progress, embed};
 use guardsplat_worker::extract::read_scene;
 use guardsplat_worker::message::training::Progress as Training;
+use guardsplat_worker::scene::BadRows;
 use guardsplat_worker::stop::Stop;
 
 use super::{cpu, engine, files, message, new_key_until, run, scene_file, settings, small_scene};
@@ -20,6 +21,7 @@ fn whatever_is_computed_ends_when_it_is_asked_to() {
             message: &message(),
             settings: &settings(),
             force: true,
+            bad_rows: BadRows::Refuse,
         };
         let mut told = Vec::new();
         let result = embed(&engine, &job, &mut |progress| {

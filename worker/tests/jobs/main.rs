@@ -35,6 +35,7 @@ fn embed(scene: &str) -> EmbedSpec {
         seed: 5,
         size: 32,
         force: true,
+        ignore_bad_rows: false,
     }
 }
 
@@ -187,6 +188,11 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
     let text = server.store("text.ply", b"ply\nthis is no scene\n");
     let picture = server.store("holiday.png", b"this is no picture");
     let damaged = server.store_as("robot.ply", &bench.read("in.ply"), "00".repeat(32));
+    // The last number of the last row.
+    let mut poisoned = bench.read("in.ply");
+    let last = poisoned.len() - 4;
+    poisoned[last..].copy_from_slice(&f32::NAN.to_le_bytes());
+    let poisoned = server.store("poisoned.ply", &poisoned);
     use Reason::{Internal, InvalidInput, TargetMissed};
     let bad_message = EmbedSpec {
         message: "5c".into(),
@@ -228,6 +234,13 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
         (verify(&[&picture, &scene], ""), InvalidInput, false, "and not a scene"),
         (too_many_views, InvalidInput, false, "views: 10001"),
         (
+            Spec::Embed(embed(&poisoned)),
+            InvalidInput,
+            false,
+            "property rot_3 of row",
+        ),
+        (verify(&[&poisoned], ""), InvalidInput, false, " is NaN"),
+        (
             Spec::CreateKey(KeySpec { bits: 76, seed: None }),
             InvalidInput,
             false,
@@ -242,6 +255,26 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
         assert!(message.contains(needle), "{message}");
         assert!(!message.contains("input-"), "{message}");
     }
+    // Asked to, both do without the row.
+    server.submit(Spec::Embed(EmbedSpec {
+        ignore_bad_rows: true,
+        ..embed(&poisoned)
+    }));
+    let Done::EmbedResult(marked) = completed(&server) else {
+        panic!()
+    };
+    assert_eq!(marked.ignored_rows, 1);
+    server.submit(Spec::Verify(VerifySpec {
+        suspects: vec![poisoned],
+        key: "keys/1".into(),
+        views: 2,
+        ignore_bad_rows: true,
+        ..VerifySpec::default()
+    }));
+    let Done::VerifyResult(found) = completed(&server) else {
+        panic!()
+    };
+    assert_eq!((found.ignored_rows, found.views), (1, 2));
     // A key that is damaged is not the user's fault.
     server.set_key(b"nothing");
     server.submit(verify(&[&scene], ""));

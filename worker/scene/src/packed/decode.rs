@@ -2,6 +2,7 @@
 use super::layout::{COLOUR, GEOMETRY, Layout};
 use super::{CHUNK, rest};
 use crate::gaussians::Gaussians;
+use crate::ignored::BadRows;
 use crate::ply::fields::{Rows, band, rest_count};
 use crate::range::{Range, logit};
 
@@ -60,10 +61,11 @@ pub(super) fn chunks(layout: &Layout, body: &[u8]) -> Result<Vec<Chunk>, String>
     .collect()
 }
 
-/// Decodes the body, all the bytes after the header; `Err` is the reason why not.
+/// Decodes the body, all the bytes after the header; `Err` is the reason why not. Fractions of legal ranges are legal,
+/// so that there are no bad rows.
 pub(super) fn decode(layout: &Layout, chunks: &[Chunk], body: &[u8]) -> Result<Gaussians, String> {
     let degree = used_degree(layout, body);
-    let mut collected = Rows::with_capacity(layout.degree, degree, layout.gaussians.count);
+    let mut collected = Rows::with_capacity(layout.degree, degree, layout.gaussians.count, BadRows::Refuse);
     // In the order of a plain PLY: position, rotation, scale, opacity, f_dc_*, f_rest_*.
     let mut values = vec![0.0; 14 + rest_count(layout.degree)];
     let mut rests = layout.rest.as_ref().map(|(table, columns)| (table.rows(body), columns));
@@ -87,7 +89,7 @@ pub(super) fn decode(layout: &Layout, chunks: &[Chunk], body: &[u8]) -> Result<G
         }
         collected.push(&values)?;
     }
-    Ok(collected.finish())
+    Ok(collected.finish().0)
 }
 
 /// The highest band in which some byte is not one for 0.

@@ -3,16 +3,17 @@ use super::fields::{COLOUR, Field, Rows, file_index};
 use super::header::{Storage, quote};
 use super::layout::{Layout, truncated};
 use crate::gaussians::{Gaussians, Sh};
+use crate::ignored::{BadRows, Ignored};
 use std::io::{self, Write};
 
 /// Decodes the body of a file, all the bytes after its header; `Err` is the reason why not.
-pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> {
+pub(super) fn decode(layout: &Layout, body: &[u8], bad_rows: BadRows) -> Result<(Gaussians, Ignored), String> {
     let mut values = vec![0.0; layout.fields.all.len()];
     match layout.storage {
         Storage::Binary { big_endian } => {
             let rows = binary_rows(layout, body)?;
             let degree = used_degree(layout, rows.clone(), big_endian);
-            let mut collected = Rows::with_capacity(layout.fields.degree, degree, layout.rows as usize);
+            let mut collected = Rows::with_capacity(layout.fields.degree, degree, layout.rows as usize, bad_rows);
             // Values of bands that are not used stay 0.
             let used: Vec<(usize, Field)> = layout.fields.all.iter().copied().enumerate().collect();
             let used: Vec<_> = used
@@ -31,7 +32,7 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
             // Again, since a file can shrink between the look at its size and the read.
             layout.check_size(body.len() as u64)?;
             let degree = layout.fields.degree;
-            let mut collected = Rows::with_capacity(degree, degree, layout.rows as usize);
+            let mut collected = Rows::with_capacity(degree, degree, layout.rows as usize, bad_rows);
             let mut words = Vec::with_capacity(layout.columns);
             let mut lines = ascii_lines(body).filter(|line| !line.trim_ascii().is_empty());
             for _ in 0..layout.skip {
@@ -46,18 +47,26 @@ pub(super) fn decode(layout: &Layout, body: &[u8]) -> Result<Gaussians, String> 
                 if words.len() != layout.columns {
                     return Err(format!("row {row} has {} values, not {}", words.len(), layout.columns));
                 }
+                let word = |field: &Field| &line[words[field.column].clone()];
+                let mut unread = None;
                 for (i, field) in layout.fields.all.iter().enumerate() {
-                    let word = &line[words[field.column].clone()];
-                    values[i] = number(word).ok_or_else(|| {
-                        let (name, word) = (super::fields::name(i), String::from_utf8_lossy(word));
-                        format!("property {name} of row {row} is {:?}, not a number", quote(&word))
-                    })?;
+                    match number(word(field)) {
+                        Some(value) => values[i] = value,
+                        None => unread = unread.or(Some(i)),
+                    }
                 }
-                collected.push(&values)?;
+                match unread {
+                    None => collected.push(&values)?,
+                    Some(i) => collected.reject(|| {
+                        let word = String::from_utf8_lossy(word(&layout.fields.all[i]));
+                        let (name, word) = (super::fields::name(i), quote(&word));
+                        format!("property {name} of row {row} is {word:?}, not a number")
+                    })?,
+                }
             }
-            let mut gaussians = collected.finish();
+            let (mut gaussians, ignored) = collected.finish();
             gaussians.sh.trim();
-            Ok(gaussians)
+            Ok((gaussians, ignored))
         }
     }
 }
@@ -84,16 +93,16 @@ fn used_degree(layout: &Layout, rows: std::slice::ChunksExact<'_, u8>, big_endia
     degree
 }
 
-/// Writes the body with the colours `sh`. Values that are as they were keep their bytes.
+/// Writes the body with the colours `sh`. Values that are as they were keep their bytes, as do the rows `ignored`.
 ///
-/// `layout` and `body` are those of a successful [`decode`], and `sh` has the degree and rows that it found; bands
-/// above are written as they are.
-pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write) -> io::Result<()> {
+/// `layout` and `body` are those of a successful [`decode`], `sh` has the degree and rows that it found, and `ignored`
+/// are the others; bands above are written as they are.
+pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, ignored: &Ignored, out: &mut impl Write) -> io::Result<()> {
     let stored = layout.fields.degree;
     let fields: Vec<Field> = (0..sh.per_gaussian())
         .map(|place| layout.fields.colour()[file_index(stored, place)])
         .collect();
-    let mut colours = sh.coefficients.chunks_exact(sh.per_gaussian());
+    let mut colours = ignored.spread(sh);
     match layout.storage {
         Storage::Binary { big_endian } => {
             let rows = binary_rows(layout, body).map_err(io::Error::other)?;
@@ -102,7 +111,7 @@ pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write
             let mut patched = vec![0; layout.row_bytes];
             for (row, colour) in rows.zip(&mut colours) {
                 patched.copy_from_slice(row);
-                for (field, value) in fields.iter().zip(colour) {
+                for (field, value) in fields.iter().zip(colour.unwrap_or_default()) {
                     set(&mut patched, *field, big_endian, *value);
                 }
                 out.write_all(&patched)?;
@@ -117,7 +126,7 @@ pub(super) fn encode(layout: &Layout, body: &[u8], sh: &Sh, out: &mut impl Write
                 } else if skip > 0 {
                     skip -= 1;
                     out.write_all(line)?;
-                } else if let Some(colour) = colours.next() {
+                } else if let Some(Some(colour)) = colours.next() {
                     split(line, &mut words);
                     encode_line(&fields, line, &words, colour, out)?;
                 } else {

@@ -1,6 +1,7 @@
 //! The properties of a Gaussian: which columns of a row they are, and what values they may have.
 use super::header::{bytes, quote};
 use crate::gaussians::{Gaussians, MAX_DEGREE, Sh};
+use crate::ignored::{BadRows, Ignored, Sieve};
 use ply_rs::ply::ScalarType;
 
 /// Properties before the rest coefficients, in the order in which rows are handed to [`Rows::push`].
@@ -104,6 +105,9 @@ pub(crate) fn band(stored: usize, i: usize) -> usize {
 /// Collects checked rows.
 pub(crate) struct Rows {
     gaussians: Gaussians,
+    /// Rows of the file that came by.
+    seen: usize,
+    sieve: Sieve,
     /// Which value comes at each place of a row of [`Sh`].
     order: Vec<usize>,
 }
@@ -111,7 +115,7 @@ pub(crate) struct Rows {
 impl Rows {
     /// Room for `rows` Gaussians of `degree` from a file of degree `stored`; call only with a count that the file's
     /// size supports.
-    pub fn with_capacity(stored: usize, degree: usize, rows: usize) -> Rows {
+    pub fn with_capacity(stored: usize, degree: usize, rows: usize, bad_rows: BadRows) -> Rows {
         let per_gaussian = 3 + rest_count(degree);
         let gaussians = Gaussians {
             positions: Vec::with_capacity(rows),
@@ -126,15 +130,21 @@ impl Rows {
         let order = (0..per_gaussian)
             .map(|place| COLOUR + file_index(stored, place))
             .collect();
-        Rows { gaussians, order }
+        Rows {
+            gaussians,
+            seen: 0,
+            sieve: Sieve::new(bad_rows),
+            order,
+        }
     }
 
-    /// Adds a row of the values of [`Fields::all`]; `Err` names the property and the row.
+    /// Adds a row of the values of [`Fields::all`], if they are legal; `Err` names the property and the row.
     pub fn push(&mut self, values: &[f32]) -> Result<(), String> {
-        let row = self.gaussians.len();
+        let row = self.seen;
         if let Some(i) = (0..values.len()).find(|i| !legal(*i, values[*i])) {
-            return Err(format!("property {} of row {row} is {}", name(i), values[i]));
+            return self.reject(|| format!("property {} of row {row} is {}", name(i), values[i]));
         }
+        self.seen += 1;
         let all = &mut self.gaussians;
         all.positions.push([values[0], values[1], values[2]]);
         all.rotations.push([values[3], values[4], values[5], values[6]]);
@@ -144,9 +154,20 @@ impl Rows {
         Ok(())
     }
 
-    /// The Gaussians collected.
-    pub fn finish(self) -> Gaussians {
-        self.gaussians
+    /// Sorts out a row that has no values to be added; `Err` is the reason where such rows are refused.
+    pub fn reject(&mut self, reason: impl FnOnce() -> String) -> Result<(), String> {
+        self.seen += 1;
+        self.sieve.reject(self.seen - 1, reason)
+    }
+
+    /// The Gaussians collected, and the rows that are not among them.
+    pub fn finish(self) -> (Gaussians, Ignored) {
+        let (mut gaussians, ignored) = (self.gaussians, self.sieve.finish());
+        if ignored.count() > 0 {
+            // Bands may have been in use by bad rows only.
+            gaussians.sh.trim();
+        }
+        (gaussians, ignored)
     }
 }
 

@@ -10,6 +10,7 @@ mod standard;
 
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::ignored::{BadRows, Ignored};
 use crate::rest::rest;
 use crate::scene::bad;
 use crate::summary::Summary;
@@ -26,6 +27,7 @@ struct Ply {
     header: Vec<u8>,
     layout: layout::Layout,
     body: Vec<u8>,
+    ignored: Ignored,
 }
 
 /// Whether a file that begins with these bytes is a PLY, if one that may be damaged.
@@ -40,6 +42,7 @@ pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
     size: u64,
+    bad_rows: BadRows,
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let header = header::read_header(source).map_err(Error::io(path))?;
     let header = header.map_err(|reason| bad(path, reason))?;
@@ -51,8 +54,14 @@ pub(crate) fn read(
     let layout = layout::Layout::find(&parsed).map_err(|reason| bad(path, reason))?;
     layout.check_size(left).map_err(|reason| bad(path, reason))?;
     let body = rest(path, source, left)?;
-    let gaussians = body::decode(&layout, &body).map_err(|reason| bad(path, reason))?;
-    Ok((gaussians, Arc::new(Ply { header, layout, body })))
+    let (gaussians, ignored) = body::decode(&layout, &body, bad_rows).map_err(|reason| bad(path, reason))?;
+    let ply = Ply {
+        header,
+        layout,
+        body,
+        ignored,
+    };
+    Ok((gaussians, Arc::new(ply)))
 }
 
 /// What the head of a PLY of `size` bytes says, plain or compressed; `Err` is the reason for which it is none.
@@ -82,9 +91,13 @@ impl Container for Ply {
         self.header.len() + self.body.len()
     }
 
+    fn ignored(&self) -> Option<&Ignored> {
+        self.ignored.if_any()
+    }
+
     fn write(&self, sh: &Sh, mut out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&self.header)?;
-        body::encode(&self.layout, &self.body, sh, &mut out)
+        body::encode(&self.layout, &self.body, sh, &self.ignored, &mut out)
     }
 }
 

@@ -3,6 +3,7 @@ use super::codebook::Codebook;
 use super::palette::Palette;
 use super::picture::Picture;
 use crate::gaussians::Sh;
+use crate::ignored::Sieve;
 use std::f64::consts::SQRT_2;
 
 /// The first three values of the alpha of rotations are no component's.
@@ -29,12 +30,13 @@ pub(super) fn positions(lower: &Picture, upper: &Picture, ranges: &[(f64, f64); 
 }
 
 /// Quaternions: alpha says which component was the largest, the others are in red, green and blue.
-pub(super) fn rotations(picture: &Picture, count: usize) -> Result<Vec<[f32; 4]>, String> {
+pub(super) fn rotations(picture: &Picture, count: usize, sieve: &mut Sieve) -> Result<Vec<[f32; 4]>, String> {
     let rotation = |row| {
         let texel = picture.texel(row);
-        let largest = texel[3]
-            .checked_sub(FIRST_COMPONENT)
-            .ok_or_else(|| format!("row {row} of quats has an alpha of {}, must be 252 to 255", texel[3]))?;
+        let Some(largest) = texel[3].checked_sub(FIRST_COMPONENT) else {
+            let reason = || format!("row {row} of quats has an alpha of {}, must be 252 to 255", texel[3]);
+            return sieve.reject(row, reason).map(|()| [0.0; 4]);
+        };
         let mut stored = texel[..3].iter().map(|byte| (f64::from(*byte) / 127.5 - 1.0) / SQRT_2);
         let mut quaternion = [0.0; 4];
         let mut squares = 0.0;
@@ -52,9 +54,14 @@ pub(super) fn rotations(picture: &Picture, count: usize) -> Result<Vec<[f32; 4]>
 }
 
 /// Log scales: an index a coordinate.
-pub(super) fn log_scales(picture: &Picture, tables: &[Codebook; 3], count: usize) -> Result<Vec<[f32; 3]>, String> {
+pub(super) fn log_scales(
+    picture: &Picture,
+    tables: &[Codebook; 3],
+    count: usize,
+    sieve: &mut Sieve,
+) -> Result<Vec<[f32; 3]>, String> {
     (0..count)
-        .map(|row| look_up(picture.texel(row), tables, "scales", row))
+        .map(|row| look_up(picture.texel(row), tables, "scales", row, sieve))
         .collect()
 }
 
@@ -69,6 +76,7 @@ pub(super) fn sh(
     tables: &[Codebook; 3],
     palette: Option<&Palette>,
     count: usize,
+    sieve: &mut Sieve,
 ) -> Result<Sh, String> {
     let mut sh = Sh {
         degree: palette.map_or(0, Palette::degree),
@@ -76,7 +84,8 @@ pub(super) fn sh(
     };
     sh.coefficients.reserve_exact(count * sh.per_gaussian());
     for row in 0..count {
-        sh.coefficients.extend(look_up(colours.texel(row), tables, "sh0", row)?);
+        sh.coefficients
+            .extend(look_up(colours.texel(row), tables, "sh0", row, sieve)?);
         if let Some(palette) = palette {
             sh.coefficients.extend(palette.row(row));
         }
@@ -84,14 +93,21 @@ pub(super) fn sh(
     Ok(sh)
 }
 
-/// The numbers that red, green and blue stand for.
-fn look_up(texel: [u8; 4], tables: &[Codebook; 3], name: &str, row: usize) -> Result<[f32; 3], String> {
+/// The numbers that red, green and blue stand for; zeros where the row is sorted out.
+fn look_up(
+    texel: [u8; 4],
+    tables: &[Codebook; 3],
+    name: &str,
+    row: usize,
+    sieve: &mut Sieve,
+) -> Result<[f32; 3], String> {
     let values = std::array::from_fn(|i| tables[i].value(texel[i]));
     match values.iter().position(|value: &f32| value.is_nan()) {
         None => Ok(values),
-        Some(i) => Err(format!(
-            "row {row} of {name} has index {}, which {name}.codebook has no number for",
-            texel[i]
-        )),
+        Some(i) => {
+            let index = texel[i];
+            let reason = || format!("row {row} of {name} has index {index}, which {name}.codebook has no number for");
+            sieve.reject(row, reason).map(|()| [0.0; 3])
+        }
     }
 }

@@ -14,6 +14,7 @@ mod picture;
 
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::ignored::{BadRows, Ignored, Sieve};
 use crate::scene::bad;
 use crate::{Error, Result};
 use archive::Archive;
@@ -45,6 +46,7 @@ struct Sog {
     dc: [Codebook; 3],
     /// Higher bands.
     palette: Option<Palette>,
+    ignored: Ignored,
 }
 
 /// Whether a file that starts so is a SOG, or the `meta.json` of one that is a folder, which [`read`] explains.
@@ -63,6 +65,7 @@ pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
     size: u64,
+    bad_rows: BadRows,
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let mut file = Vec::new();
     usize::try_from(size)
@@ -70,11 +73,11 @@ pub(crate) fn read(
         .and_then(|size| file.try_reserve_exact(size).ok())
         .ok_or_else(|| bad(path, format!("{size} bytes do not fit in memory")))?;
     source.take(size).read_to_end(&mut file).map_err(Error::io(path))?;
-    let (gaussians, sog) = parse(file).map_err(|reason| bad(path, reason))?;
+    let (gaussians, sog) = parse(file, bad_rows).map_err(|reason| bad(path, reason))?;
     Ok((gaussians, Arc::new(sog)))
 }
 
-fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
+fn parse(file: Vec<u8>, bad_rows: BadRows) -> Result<(Gaussians, Sog), String> {
     if !file.starts_with(ZIP) {
         return Err("the meta.json of an SOG without its pictures; bundle the folder into one .sog file first".into());
     }
@@ -82,6 +85,7 @@ fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
     let mut archive = Archive::open(&file)?;
     let meta = archive.unpack("meta.json", "meta.json", MAX_META, &mut budget)?;
     let meta = meta::parse(&meta).map_err(|reason| format!("meta.json: {reason}"))?;
+    let mut sieve = Sieve::new(bad_rows);
     let mut size = None;
     let mut picture = |role: Role, name: &str, budget: &mut Budget| -> Result<Picture, String> {
         let webp = archive.unpack(name, role.name(), u64::MAX, budget)?;
@@ -98,7 +102,7 @@ fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
         Some(rest) => {
             let labels = picture(Role::Labels, &rest.labels, &mut budget)?;
             let centroids = picture(Role::Centroids, &rest.centroids, &mut budget)?;
-            Palette::decode(rest, &labels, &centroids, meta.count as usize)?
+            Palette::decode(rest, &labels, &centroids, meta.count as usize, &mut sieve)?
         }
     };
     let degree = palette.as_ref().map_or(0, Palette::degree);
@@ -110,16 +114,20 @@ fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
         &meta.ranges,
         count,
     );
-    let rotations = decode::rotations(&picture(Role::Quats, &meta.quats, &mut budget)?, count)?;
-    let log_scales = decode::log_scales(&picture(Role::Scales, &meta.scales, &mut budget)?, &meta.sizes, count)?;
+    let quats = picture(Role::Quats, &meta.quats, &mut budget)?;
+    let rotations = decode::rotations(&quats, count, &mut sieve)?;
+    let scales = picture(Role::Scales, &meta.scales, &mut budget)?;
+    let log_scales = decode::log_scales(&scales, &meta.sizes, count, &mut sieve)?;
     let colours = picture(Role::Sh0, &meta.sh0, &mut budget)?;
-    let gaussians = Gaussians {
+    let mut gaussians = Gaussians {
         positions,
         rotations,
         log_scales,
         opacity_logits: decode::opacity_logits(&colours, &meta.opacity, count),
-        sh: decode::sh(&colours, &meta.dc, palette.as_ref(), count)?,
+        sh: decode::sh(&colours, &meta.dc, palette.as_ref(), count, &mut sieve)?,
     };
+    let ignored = sieve.finish();
+    ignored.take_from(&mut gaussians);
     let Meta { sh0, dc, .. } = meta;
     // What cannot be written again is refused now, not when its marks are to be saved.
     archive::replace(&file, &sh0, b"")?;
@@ -129,6 +137,7 @@ fn parse(file: Vec<u8>) -> Result<(Gaussians, Sog), String> {
         colours,
         dc,
         palette,
+        ignored,
     };
     Ok((gaussians, sog))
 }
@@ -153,19 +162,27 @@ impl Container for Sog {
     }
 
     fn keep(&self, row: usize, coefficients: &mut [f32]) {
+        let row = self.ignored.file_row(row);
         let texel = self.colours.texel(row);
         for ((value, byte), table) in coefficients.iter_mut().zip(texel).zip(&self.dc) {
             *value = table.value(table.nearest(byte, *value));
         }
         if let Some(palette) = &self.palette {
-            coefficients[3..].copy_from_slice(palette.row(row));
+            // Bands that only ignored rows use are in the palette and not in the scene.
+            for (value, own) in coefficients[3..].iter_mut().zip(palette.row(row)) {
+                *value = *own;
+            }
         }
+    }
+
+    fn ignored(&self) -> Option<&Ignored> {
+        self.ignored.if_any()
     }
 
     fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {
         let mut colours = self.colours.clone();
-        let rows = sh.coefficients.chunks_exact(sh.per_gaussian()).enumerate();
-        for (row, coefficients) in rows {
+        let rows = self.ignored.spread(sh).enumerate();
+        for (row, coefficients) in rows.filter_map(|(row, colour)| Some((row, colour?))) {
             let texel = colours.texel_mut(row);
             for ((byte, value), table) in texel.iter_mut().zip(coefficients).zip(&self.dc) {
                 *byte = table.nearest(*byte, *value);

@@ -1,6 +1,7 @@
 //! Higher bands: rows of coefficients that Gaussians share, and which row each has.
 use super::meta::Rest;
 use super::picture::Picture;
+use crate::ignored::Sieve;
 
 /// Rows of the palette side by side in its picture.
 const SIDE_BY_SIDE: usize = 64;
@@ -17,7 +18,13 @@ pub(super) struct Palette {
 
 impl Palette {
     /// Decodes the palette for the first `count` pixels of `labels`; `None` where they have nothing but zeros.
-    pub fn decode(rest: &Rest, labels: &Picture, centroids: &Picture, count: usize) -> Result<Option<Palette>, String> {
+    pub fn decode(
+        rest: &Rest,
+        labels: &Picture,
+        centroids: &Picture,
+        count: usize,
+        sieve: &mut Sieve,
+    ) -> Result<Option<Palette>, String> {
         let (bands, rows) = layout(rest, centroids)?;
         let stored = coefficients(bands);
         let mut used = vec![false; rows];
@@ -27,9 +34,9 @@ impl Palette {
             match used.get_mut(usize::from(label)) {
                 Some(used) => *used = true,
                 None => {
-                    return Err(format!(
-                        "row {i} of shN_labels is {label}, and the palette has {rows} rows"
-                    ));
+                    let reason = || format!("row {i} of shN_labels is {label}, and the palette has {rows} rows");
+                    // A row that is sorted out has no place in the palette; the first does no harm.
+                    return sieve.reject(i, reason).map(|()| 0);
                 }
             }
             Ok(label)
@@ -37,6 +44,8 @@ impl Palette {
         let labels = (0..count).map(label).collect::<Result<Vec<u16>, String>>()?;
         let mut values = vec![0.0; rows * 3 * stored];
         let mut degree = 0;
+        // Rows of the palette with an index that stands for no number, and that index.
+        let mut bad: Vec<Option<u8>> = vec![None; rows];
         for row in (0..rows).filter(|row| used[*row]) {
             // Rows are side by side, so their pixels follow each other whatever the width.
             for place in 0..stored {
@@ -44,16 +53,25 @@ impl Palette {
                 for channel in 0..3 {
                     let value = rest.values.value(texel[channel]);
                     if value.is_nan() {
-                        let index = texel[channel];
-                        return Err(format!(
-                            "row {row} of the palette has index {index}, which shN.codebook has no number for"
-                        ));
+                        bad[row] = bad[row].or(Some(texel[channel]));
+                        continue;
                     }
                     if value != 0.0 {
                         degree = degree.max((place + 1).isqrt());
                     }
                     values[3 * (row * stored + place) + channel] = value;
                 }
+            }
+        }
+        for (i, label) in labels.iter().enumerate() {
+            let row = usize::from(*label);
+            if let Some(index) = bad.get(row).copied().flatten() {
+                sieve.reject(i, || {
+                    format!(
+                        "row {i} has row {row} of the palette, which has index {index}, which shN.codebook has no \
+                         number for"
+                    )
+                })?;
             }
         }
         let kept = 3 * coefficients(degree);

@@ -5,6 +5,7 @@
 use crate::Result;
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
+use crate::ignored::{BadRows, Ignored};
 use crate::ply::fields::Rows;
 use crate::range::{Range, logit};
 use crate::rest::rest;
@@ -25,30 +26,33 @@ const UNIT: f32 = 0.1;
 #[derive(Debug)]
 struct Splat {
     body: Vec<u8>,
+    ignored: Ignored,
 }
 
 /// Reads a file of `size` bytes from its first; `path` is for messages. The reason of a refusal continues a sentence
 /// that says what else the file is not.
 ///
 /// Nothing in a file says that it is one, so it must look like one to be read: a whole number of rows, at least one;
-/// in each the position finite, the standard deviations finite and not negative; and at least half of the rotations
-/// of length 1, which writers make them. Zeros, text, pictures and noise fail that.
+/// and at least half of them with a position that is finite, standard deviations that are finite and not negative, and
+/// a rotation of length 1, which writers make them. Zeros, text, pictures and noise fail that. Rows whose numbers are
+/// not such are bad even there.
 pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
     size: u64,
+    bad_rows: BadRows,
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let refused = |reason| bad(path, format!("{}{reason}", UNKNOWN));
     check_size(size).map_err(refused)?;
     let body = rest(path, source, size)?;
     // Again, since a file can shrink between the look at its size and the read.
     check_size(body.len() as u64).map_err(refused)?;
-    let gaussians = decode(&body).map_err(refused)?;
-    Ok((gaussians, Arc::new(Splat { body })))
+    let (gaussians, ignored) = decode(&body, bad_rows).map_err(refused)?;
+    Ok((gaussians, Arc::new(Splat { body, ignored })))
 }
 
-/// What the head of a file of `size` bytes says: its rows must look like Gaussians, as all must when it is read. `Err`
-/// is the reason for which it is none.
+/// What the head of a file of `size` bytes says: half of its rows must look like Gaussians, as half of all must when it
+/// is read. `Err` is the reason for which it is none.
 pub(crate) fn summary(head: &[u8], size: u64) -> Result<Summary, String> {
     let rows = &head[..head.len() / ROW * ROW];
     check_size(size)
@@ -62,7 +66,8 @@ pub(crate) fn summary(head: &[u8], size: u64) -> Result<Summary, String> {
     })
 }
 
-/// Whether a file of `size` bytes that begins with `head` may be one: at least one row is there, and all look like it.
+/// Whether a file of `size` bytes that begins with `head` may be one: at least one row is there, and half of them look
+/// like it. Bad ones among them are for the reader to tell of.
 pub(crate) fn looks_like(head: &[u8], size: u64) -> bool {
     let rows = &head[..head.len() - head.len() % ROW];
     check_size(size).is_ok() && !rows.is_empty() && check_rows(rows).is_ok()
@@ -78,10 +83,14 @@ fn check_size(size: u64) -> Result<(), String> {
     Ok(())
 }
 
-fn decode(body: &[u8]) -> Result<Gaussians, String> {
+fn decode(body: &[u8], bad_rows: BadRows) -> Result<(Gaussians, Ignored), String> {
     check_rows(body)?;
-    let mut collected = Rows::with_capacity(0, 0, body.len() / ROW);
-    for row in body.chunks_exact(ROW) {
+    let mut collected = Rows::with_capacity(0, 0, body.len() / ROW, bad_rows);
+    for (i, row) in body.chunks_exact(ROW).enumerate() {
+        if let Some(fault) = fault(row) {
+            collected.reject(|| fault.of_row(i))?;
+            continue;
+        }
         let [x, y, z, a, b, c] = floats(row);
         let [w, i, j, k] = rotation(row);
         let log = |scale: f32| f64::from(scale).ln() as f32;
@@ -92,29 +101,48 @@ fn decode(body: &[u8]) -> Result<Gaussians, String> {
     Ok(collected.finish())
 }
 
-/// Whether the rows are Gaussians; see [`read`].
+/// Whether enough rows are Gaussians; see [`read`].
 fn check_rows(body: &[u8]) -> Result<(), String> {
-    let mut units = 0;
+    let (mut units, mut first) = (0, None);
     for (i, row) in body.chunks_exact(ROW).enumerate() {
-        let values = floats(row);
-        for (axis, value) in ["x", "y", "z"].iter().zip(values) {
-            if !value.is_finite() {
-                return Err(format!("{axis} of row {i} is {value}"));
-            }
-        }
-        for (axis, value) in values[3..].iter().enumerate() {
-            if !(value.is_finite() && *value >= 0.0) {
-                return Err(format!("the scale of row {i} along axis {axis} is {value}"));
-            }
+        if let Some(fault) = fault(row) {
+            first = first.or(Some((i, fault)));
+            continue;
         }
         let length = rotation(row).iter().map(|v| v * v).sum::<f32>().sqrt();
         units += usize::from((length - 1.0).abs() <= UNIT);
     }
     let rows = body.len() / ROW;
-    if units < rows.div_ceil(2) {
-        return Err(format!("only {units} of {rows} rows have a rotation of length 1"));
+    if units >= rows.div_ceil(2) {
+        return Ok(());
     }
-    Ok(())
+    Err(match first {
+        Some((i, fault)) => fault.of_row(i),
+        None => format!("only {units} of {rows} rows have a rotation of length 1"),
+    })
+}
+
+/// A number of a row that can't be: which of [`floats`], and what it is.
+#[derive(Clone, Copy)]
+struct Fault(usize, f32);
+
+impl Fault {
+    fn of_row(self, row: usize) -> String {
+        let Fault(place, value) = self;
+        match ["x", "y", "z"].get(place) {
+            Some(axis) => format!("{axis} of row {row} is {value}"),
+            None => format!("the scale of row {row} along axis {} is {value}", place - 3),
+        }
+    }
+}
+
+/// The first number of a row that can't be.
+fn fault(row: &[u8]) -> Option<Fault> {
+    let can_be = |place: usize, value: f32| value.is_finite() && (place < 3 || value >= 0.0);
+    let mut values = floats(row).into_iter().enumerate();
+    values
+        .find(|(place, value)| !can_be(*place, *value))
+        .map(|(place, value)| Fault(place, value))
 }
 
 /// The numbers at the start of a row: position, standard deviations.
@@ -150,11 +178,15 @@ impl Container for Splat {
         }
     }
 
+    fn ignored(&self) -> Option<&Ignored> {
+        self.ignored.if_any()
+    }
+
     fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {
         let mut patched = [0; ROW];
-        for (row, colour) in self.body.chunks_exact(ROW).zip(sh.coefficients.chunks_exact(3)) {
+        for (row, colour) in self.body.chunks_exact(ROW).zip(self.ignored.spread(sh)) {
             patched.copy_from_slice(row);
-            for (byte, value) in patched[COLOUR..].iter_mut().zip(colour) {
+            for (byte, value) in patched[COLOUR..].iter_mut().zip(colour.unwrap_or_default()) {
                 *byte = Range::UNIT.nearest(*value);
             }
             out.write_all(&patched)?;

@@ -1,4 +1,6 @@
 //! Tests of files without a header.
+mod ignored;
+
 use super::*;
 use crate::range::tests::wild;
 use crate::summary::tests::agrees;

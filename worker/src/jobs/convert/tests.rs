@@ -55,6 +55,12 @@ fn views_have_defaults_and_limits() {
         (found.count, found.size, found.seed, found.background),
         (20, None, 3, WHITE)
     );
+    assert_eq!(found.bad_rows, BadRows::Refuse);
+    let ignoring = views(&api::VerifySpec {
+        ignore_bad_rows: true,
+        ..api::VerifySpec::default()
+    });
+    assert_eq!(ignoring.unwrap().bad_rows, BadRows::Ignore);
     let found = of(10_000, 16).unwrap();
     assert_eq!((found.count, found.size), (10_000, Some(16)));
     assert_eq!(
@@ -96,7 +102,7 @@ fn findings_keep_their_figures() {
     let reading = Reading::new(vec![vec![2.0; 32], vec![-1.0; 32]]).unwrap();
     let message = Message::parse("ffffffff", 32).unwrap();
     let comparison = reading.compare(&message).unwrap();
-    let found = verify_result(Findings::new(&reading, Some(&comparison)).unwrap());
+    let found = verify_result(Findings::new(&reading, Some(&comparison), None).unwrap());
     assert_eq!(found.verdict(), ApiVerdict::Match);
     assert_eq!((found.matched_bits, found.bits, found.views), (Some(32), 32, 2));
     assert_eq!(
@@ -104,7 +110,7 @@ fn findings_keep_their_figures() {
         (Some(0.5), Some(0.0))
     );
     assert!(found.p_value.unwrap() <= found.threshold.unwrap() && found.reason.is_empty());
-    let alone = verify_result(Findings::new(&reading, None).unwrap());
+    let alone = verify_result(Findings::new(&reading, None, None).unwrap());
     assert_eq!((alone.verdict(), alone.p_value), (ApiVerdict::Inconclusive, None));
     assert_eq!(alone.message, "ffffffff");
     assert!(

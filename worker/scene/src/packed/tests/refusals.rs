@@ -1,5 +1,6 @@
 //! Every kind of bad file has its message.
 use super::*;
+use crate::BadRows;
 
 #[test]
 fn other_encodings_are_refused() {
@@ -127,6 +128,9 @@ fn ranges_that_cannot_be_are_named() {
             file.chunk().set(name, 1, value);
             let reason = format!("property {name} of chunk 1 is {}", value as f32);
             assert_eq!(file.refused(), reason);
+            // A chunk's ranges are no row's: nothing says which of its Gaussians would be right without them.
+            let ignoring = Scene::parse_with(Path::new("it"), &file.bytes(), BadRows::Ignore);
+            assert!(ignoring.unwrap_err().to_string().ends_with(&reason));
         }
     }
     let mut file = File::new(300, 0);

@@ -1,5 +1,6 @@
 //! Tests of reading and writing, and the files that they are made of.
 mod garbage;
+mod ignored;
 mod refusals;
 mod round_trips;
 

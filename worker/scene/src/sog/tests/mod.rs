@@ -1,6 +1,7 @@
 //! Tests of reading and writing, and the files that they are made of.
 mod formulas;
 mod garbage;
+mod ignored;
 mod limits;
 mod pictures;
 mod real;

@@ -1,0 +1,207 @@
+//! `inspect`.
+use std::path::PathBuf;
+
+use clap::Args;
+use guardsplat_worker::Result;
+use guardsplat_worker::admission::{self, picture_bytes};
+use guardsplat_worker::clip::{Clip, Parts};
+use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::embed::{Preset, SceneSize, ViewSize, needs};
+use guardsplat_worker::memory::{Bytes, Limits, Memory};
+use guardsplat_worker::scene::{BadRows, Gaussians, Ignored, Scene};
+use guardsplat_worker::splat::{WeightCache, prepare};
+use guardsplat_worker::view::{Extent, Split, ViewSampler};
+use serde::Serialize;
+
+use super::{Budget, Exit, print_json, print_line};
+
+/// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
+const SIDE: u32 = 160;
+/// Side of pictures for the prediction of `render`: its own default.
+const PICTURE: u32 = 512;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene: PLY, compressed PLY, SPZ, SOG or .splat
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Counts the Gaussians that so many training views show; takes a while
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    views: Option<u32>,
+    /// Leaves out rows with NaN and other impossible values instead of refusing the scene
+    #[arg(long)]
+    ignore_bad_rows: bool,
+    #[command(flatten)]
+    budget: Budget,
+    /// Prints JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// What there is to say of a scene.
+#[derive(Serialize)]
+struct Report {
+    format: &'static str,
+    file_bytes: u64,
+    gaussians: usize,
+    ignored_rows: usize,
+    #[serde(skip)]
+    ignored: Option<Ignored>,
+    sh_degree_stored: Option<u64>,
+    sh_degree_used: usize,
+    sh_degree_learned: usize,
+    colours_rounded: bool,
+    extent: Option<Where>,
+    views: Option<u32>,
+    seen_gaussians: Option<usize>,
+    memory_limit_bytes: u64,
+    render: Need,
+    embed: Option<Need>,
+}
+
+/// Where a scene is.
+#[derive(Serialize)]
+struct Where {
+    centre: [f32; 3],
+    radius: f32,
+    up: [f32; 3],
+    on_ground: bool,
+}
+
+/// What a command will need of the memory.
+#[derive(Serialize)]
+struct Need {
+    bytes: u64,
+    parts: Memory,
+    fits: bool,
+}
+
+impl Need {
+    fn new(parts: Memory, limits: &Limits) -> Self {
+        Self {
+            bytes: parts.total(),
+            fits: limits.admit(&parts).is_ok(),
+            parts,
+        }
+    }
+
+    fn line(&self) -> String {
+        let fits = if self.fits { "fits" } else { "does not fit" };
+        format!("{}: {fits}", self.parts)
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let limits = Limits::of_machine(arguments.budget.bytes());
+    let rest = Memory::of_program();
+    admission::to_read(&arguments.scene, &limits, rest)?;
+    let head = admission::summary_of(&arguments.scene);
+    let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
+    let scene = Scene::read_with(&arguments.scene, bad_rows)?;
+    let gaussians = &scene.gaussians;
+    let size = SceneSize::of(&scene);
+    let render = Memory {
+        scene: size.bytes(),
+        pictures: picture_bytes(PICTURE, PICTURE),
+        ..rest
+    };
+    let (mut extent, mut embed, mut seen) = (None, None, None);
+    // Of nothing there is nothing to be seen.
+    if !gaussians.is_empty() {
+        extent = Some(Extent::of(gaussians)?);
+        let settings = Preset::Standard.settings();
+        let view = ViewSize::on_cpu(gaussians, &settings)?;
+        let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
+        embed = Some(needs(size, view, &settings, 4 * clip.parameters() as u64));
+        seen = arguments.views.map(|views| count_seen(gaussians, views)).transpose()?;
+    }
+    let report = Report {
+        format: scene.format().name(),
+        file_bytes: size.file,
+        gaussians: gaussians.len(),
+        ignored_rows: scene.ignored().map_or(0, Ignored::count),
+        ignored: scene.ignored().cloned(),
+        sh_degree_stored: head.map(|head| head.degree),
+        sh_degree_used: gaussians.sh.degree,
+        sh_degree_learned: scene.learnable_degree(),
+        colours_rounded: !scene.exact(),
+        extent: extent.map(|extent| Where {
+            centre: extent.centre,
+            radius: extent.radius,
+            up: extent.up,
+            on_ground: extent.on_ground,
+        }),
+        views: arguments.views,
+        seen_gaussians: seen,
+        memory_limit_bytes: limits.memory,
+        render: Need::new(render, &limits),
+        embed: embed.map(|parts| Need::new(parts, &limits)),
+    };
+    if arguments.json {
+        print_json(&report)?;
+    } else {
+        tell(&report);
+    }
+    Ok(Exit::Done)
+}
+
+/// How many Gaussians so many training views show.
+fn count_seen(gaussians: &Gaussians, views: u32) -> Result<usize> {
+    let sampler = ViewSampler::new(gaussians, 0)?;
+    let mut seen = vec![false; gaussians.len()];
+    for index in 0..u64::from(views) {
+        let camera = sampler.camera(Split::Training, index, SIDE);
+        for row in prepare(gaussians, &camera, WeightCache::Weights)?.visible {
+            seen[row as usize] = true;
+        }
+    }
+    Ok(seen.into_iter().filter(|seen| *seen).count())
+}
+
+fn tell(report: &Report) {
+    let line = |name: &str, text: String| print_line(&format!("{name:10} {text}"));
+    let file = Bytes(report.file_bytes);
+    line("format", format!("{}, {file} uncompressed", report.format));
+    line("Gaussians", report.gaussians.to_string());
+    if let Some(ignored) = &report.ignored {
+        line("bad rows", ignored.to_string());
+    }
+    let used = report.sh_degree_used;
+    let stored = match report.sh_degree_stored {
+        Some(stored) if stored != used as u64 => format!(" of {stored} in the file"),
+        _ => String::new(),
+    };
+    let rounded = if report.colours_rounded {
+        ", in the steps of the format"
+    } else {
+        ""
+    };
+    let learned = report.sh_degree_learned;
+    line(
+        "colour",
+        format!("degree {used}{stored} is in use; an embedding learns up to degree {learned}{rounded}"),
+    );
+    match &report.extent {
+        Some(extent) => {
+            let ground = if extent.on_ground { ", on ground" } else { "" };
+            let (centre, radius, up) = (extent.centre, extent.radius, extent.up);
+            line(
+                "extent",
+                format!("centre {centre:?}, radius {radius}, up {up:?}{ground}"),
+            );
+        }
+        None => line("extent", "none: there is nothing to see or mark".into()),
+    }
+    if let (Some(views), Some(seen)) = (report.views, report.seen_gaussians) {
+        let share = 100.0 * seen as f64 / report.gaussians.max(1) as f64;
+        line(
+            "seen",
+            format!("{seen} Gaussians ({share:.1} %) in {views} training views"),
+        );
+    }
+    line("memory", format!("{} may be used", Bytes(report.memory_limit_bytes)));
+    line("  render", report.render.line());
+    if let Some(embed) = &report.embed {
+        line("  embed", format!("{} (preset standard, on the CPU)", embed.line()));
+    }
+}
