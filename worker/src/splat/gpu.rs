@@ -4,6 +4,7 @@ use super::tiles::TILE;
 use super::uploads::{Uploaded, Uploads};
 use super::{PreparedView, Rasterizer};
 use crate::error::{Error, Result};
+use crate::memory::Limits;
 use crate::picture::Picture;
 use burn::backend::{BackendTensor, DispatchTensorKind};
 use burn::tensor::{Device, Tensor};
@@ -52,15 +53,15 @@ impl GpuRasterizer {
         }
     }
 
-    /// Refuses a buffer that the device cannot bind, before anything is allocated.
+    /// Refuses a buffer that the device cannot bind, before anything is allocated. That is the scene's fault and not the
+    /// device's: another attempt would end in the same way.
     fn check(&self, what: &str, bytes: usize) -> Result<()> {
-        let limit = self.client.properties().memory.max_page_size;
-        if bytes as u64 <= limit {
-            return Ok(());
-        }
-        Err(self.failed(format_args!(
-            "the view's {what} need {bytes} bytes, the device's limit for one buffer is {limit}; render a smaller picture"
-        )))
+        let limits = Limits {
+            memory: u64::MAX,
+            budget: false,
+            buffer: Some(self.client.properties().memory.max_page_size),
+        };
+        limits.admit_buffer(&format!("the buffer of a view's {what}"), bytes as u64)
     }
 
     fn upload(&self, view: &PreparedView) -> Result<Uploaded> {
