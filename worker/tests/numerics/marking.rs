@@ -5,6 +5,7 @@ use guardsplat_worker::clip::{Clip, ClipConfig, ClipModel, Parts};
 use guardsplat_worker::embed::{Job, Optimised, Preset, Progress, Settings, Terms, embed, optimise};
 use guardsplat_worker::error::Error;
 use guardsplat_worker::extract::Engine;
+use guardsplat_worker::message::decoder::LayerWeights;
 use guardsplat_worker::message::key::Secret;
 use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Key, Message, Projection};
 use guardsplat_worker::sample::sample;
@@ -185,17 +186,17 @@ pub fn poison(machine: &Machine) {
             "nothing is left aside"
         );
     };
-    let scaled = |factor: f32| {
-        move |decoder: &mut DecoderWeights| decoder.layers[2].weight.iter_mut().for_each(|w| *w *= factor)
-    };
+    let scale = |layer: &mut LayerWeights, factor: f32| layer.weight.iter_mut().for_each(|w| *w *= factor);
     let huge = lpips_weights(folder.path(), 1e30);
     for preset in [Preset::Draft, Preset::Standard, Preset::Paper] {
         let mut settings = short(preset);
         settings.lambda.lpips = 0.0;
-        stops(&engine(machine, None, scaled(3e38)), &settings, "message");
+        let beyond = engine(machine, None, |d| d.layers[1..].iter_mut().for_each(|l| scale(l, 1e25)));
+        stops(&beyond, &settings, "message");
         // The loss itself is a number, and its gradient is beyond all.
         settings.lambda.message = 1e9;
-        stops(&engine(machine, None, scaled(1e33)), &settings, "gradient");
+        let steep = engine(machine, None, |d| scale(&mut d.layers[2], 1e33));
+        stops(&steep, &settings, "gradient");
         let settings = Settings {
             lambda: Preset::Paper.settings().lambda,
             ..short(preset)
