@@ -125,6 +125,9 @@ lines! {
     "a scene that cannot fit is refused at admission with the numbers in the message":
         "by the head of its file, unread, to the byte, at each of these sizes",
         scale_refused_at_admission = None(scale::refused_at_admission);
+    "a scene that cannot fit is refused at admission with the numbers in the message":
+        "a small file whose views take more than the adapter's largest buffer: before the first step",
+        scale_refused_by_the_adapter = Wgpu(marking::too_much_for_the_adapter);
     "a full-screen splat at 800² touches 2500 tiles: pair counts must not overflow 32 bits":
         "counted in 64 bits: 2²⁸ + and 4.3 · 10⁹ pairs are refused with their number",
         scale_pairs = None(scale::pairs);

@@ -5,15 +5,17 @@ use guardsplat_worker::clip::{Clip, ClipConfig, ClipModel, Parts};
 use guardsplat_worker::embed::{Job, Optimised, Preset, Progress, Settings, Terms, embed, optimise};
 use guardsplat_worker::error::Error;
 use guardsplat_worker::extract::Engine;
+use guardsplat_worker::memory::Bytes;
 use guardsplat_worker::message::decoder::LayerWeights;
 use guardsplat_worker::message::key::Secret;
 use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Key, Message, Projection};
 use guardsplat_worker::sample::sample;
 use guardsplat_worker::scene::{Gaussians, Scene};
+use guardsplat_worker::splat::{MAX_PAIRS, TILE};
 use safetensors::tensor::{Dtype, TensorView};
 
 use super::machine::Machine;
-use super::scenes::{one, ordinary, strange};
+use super::scenes::{full_screen, one, ordinary, strange};
 
 /// A CLIP of a few thousand parameters.
 pub const TINY: &str = r#"{"embed_dim": 16,
@@ -203,6 +205,43 @@ pub fn poison(machine: &Machine) {
         };
         stops(&engine(machine, Some(huge.clone()), |_| ()), &settings, "LPIPS");
     }
+}
+
+/// A small file whose views have longer lists than the adapter can bind: as many balls, each on all tiles, as it takes.
+/// It is refused before the first step, and before the output is touched.
+pub fn too_much_for_the_adapter(machine: &Machine) {
+    let mut settings = short(Preset::Standard);
+    (settings.size, settings.enlarged) = (160, 3);
+    let tiles = u64::from((160 * 3 / TILE).pow(2));
+    let limit = machine.compute.max_buffer.unwrap();
+    // Twelve bytes of gradient a (Gaussian, tile) pair.
+    let count = limit / (12 * tiles) + 1;
+    if count * tiles > MAX_PAIRS {
+        return; // no view may have as many pairs as this adapter can hold
+    }
+    let mut g = full_screen(count as usize);
+    g.positions
+        .iter_mut()
+        .zip(0..)
+        .for_each(|(p, i)| p[0] = 1e-3 * i as f32);
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let scene = Scene::from_gaussians(full_screen(count as usize));
+    scene.write(&at("in.ply"), &scene.gaussians.sh).unwrap();
+    let job = Job {
+        input: &at("in.ply"),
+        output: &at("out.ply"),
+        message: &message(),
+        settings: &settings,
+        force: true,
+    };
+    let mut told = 0;
+    let error = embed(&engine(machine, None, |_| ()), &job, &mut |_| told += 1).unwrap_err();
+    println!("{error}");
+    assert!(matches!(error, Error::DoesNotFit { .. }), "{error}");
+    assert!(error.to_string().contains(&Bytes(limit).to_string()));
+    assert_eq!(told, 0, "not even admitted");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 /// Weights for LPIPS, random and of the usual spread times `factor`: published ones are no part of the repository.

@@ -11,7 +11,7 @@ use guardsplat_worker::scene::{HEAD, Scene, Summary, summary};
 use guardsplat_worker::splat::{MAX_PAIRS, WeightCache, prepare, sh};
 
 use super::machine::Machine;
-use super::scenes::{BACKGROUND, camera, none};
+use super::scenes::{BACKGROUND, camera, full_screen, ordinary};
 
 const SIZES: [u64; 5] = [1, 1_000, 100_000, 1_000_000, 10_000_000];
 /// Numbers of a Gaussian of degree 3 without its normal: 3 + 4 + 3 + 1 and 48.
@@ -118,7 +118,7 @@ pub fn drawn(machine: &Machine) {
         100_000
     };
     for n in SIZES.into_iter().filter(|n| *n <= most) {
-        let mut g = super::scenes::ordinary(n as usize, 0);
+        let mut g = ordinary(n as usize, 0);
         // Smaller where there are more, or those in front hide all others.
         let smaller = (n as f32).ln() / 3.0;
         g.log_scales.iter_mut().flatten().for_each(|s| *s -= smaller);
@@ -132,17 +132,6 @@ pub fn drawn(machine: &Machine) {
             assert_eq!(gradient.len(), 3 * view.visible.len());
         }
     }
-}
-
-/// `n` balls so large that each touches every tile of a view.
-fn full_screen(n: usize) -> guardsplat_worker::scene::Gaussians {
-    let mut g = none(0);
-    g.positions = vec![[0.0, 0.0, 3.0]; n];
-    g.rotations = vec![[1.0, 0.0, 0.0, 0.0]; n];
-    g.log_scales = vec![[5.0; 3]; n];
-    g.opacity_logits = vec![0.0; n];
-    g.sh.coefficients = vec![0.0; 3 * n];
-    g
 }
 
 /// Tiles of a view of 800 x 800 pixels.

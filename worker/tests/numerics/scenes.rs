@@ -117,3 +117,14 @@ pub fn strange(n: usize, degree: usize) -> Gaussians {
     }
     g
 }
+
+/// `n` balls so large that each touches every tile of a view.
+pub fn full_screen(n: usize) -> Gaussians {
+    let mut g = none(0);
+    g.positions = vec![[0.0, 0.0, 3.0]; n];
+    g.rotations = vec![[1.0, 0.0, 0.0, 0.0]; n];
+    g.log_scales = vec![[5.0; 3]; n];
+    g.opacity_logits = vec![0.0; n];
+    g.sh.coefficients = vec![0.0; 3 * n];
+    g
+}
