@@ -51,7 +51,8 @@ impl AdamOptions {
         within("adam.final_rate", f64::from(self.final_rate), 0.0, 1.0)?;
         within("adam.beta1", f64::from(self.beta1), 0.0, 0.999_999)?;
         within("adam.beta2", f64::from(self.beta2), 0.0, 0.999_999)?;
-        within("adam.epsilon", f64::from(self.epsilon), 1e-30, 1.0)
+        // Squares of gradients below 1e-21 vanish in single precision; what they are divided by then must not.
+        within("adam.epsilon", f64::from(self.epsilon), 1e-20, 1.0)
     }
 }
 

@@ -1,8 +1,103 @@
-//! How far a gradient is from another: four measures that must hold together, because each alone can be fooled.
+//! How far a rasteriser is from [`reference`]: its pictures pixel by pixel, its gradients by four measures that must hold
+//! together, because each alone can be fooled. For tests.
+use super::{Learnable, Rasterizer, WeightCache, prepare, reference, sh};
+use crate::error::Result;
+use crate::scene::Gaussians;
+use crate::view::Camera;
+
+/// Most that a pixel may be off where no decision hangs on the last digits, and a gradient by each of its measures.
+const LIMIT: f64 = 1e-4;
+/// Most that a pixel may be off where one does: 1/255 a decision, of which there may be a few.
+const UNCERTAIN_LIMIT: f64 = 0.02;
+/// Largest share of pixels where one may.
+const MOST_UNCERTAIN: f64 = 0.05;
+
+/// Distance of one view of a scene, and of the gradient through it, from the reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// Largest difference of a value of the picture where no decision hangs on the last digits; infinite if any value is
+    /// not finite.
+    pub worst: f64,
+    /// The same where one does ([`reference::Rendering::uncertain`]).
+    pub worst_uncertain: f64,
+    /// Share of pixels where one does.
+    pub uncertain: f64,
+    /// Of the gradient to all coefficients, for a gradient to the picture that is 0 at uncertain pixels.
+    pub gradient: GradientError,
+}
+
+impl Agreement {
+    /// Draws `gaussians` with `rasterizer` and with the reference.
+    ///
+    /// # Errors
+    /// Those of [`prepare`] and of the rasteriser.
+    pub fn of(
+        rasterizer: &dyn Rasterizer,
+        cache: WeightCache,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        background: [f32; 3],
+    ) -> Result<Self> {
+        let view = prepare(gaussians, camera, cache)?;
+        let colours = sh::colours(&gaussians.sh, None, &view);
+        let picture = rasterizer.render(&view, &colours, background)?;
+        let want = reference::render(gaussians, camera, background.map(f64::from));
+        let (mut worst, mut worst_uncertain) = (0.0f64, 0.0f64);
+        for (i, (got, want_value)) in picture.pixels.iter().zip(&want.pixels).enumerate() {
+            let error = (f64::from(*got) - want_value).abs();
+            let error = if error.is_finite() { error } else { f64::INFINITY };
+            let worst = if want.uncertain[i / 3] {
+                &mut worst_uncertain
+            } else {
+                &mut worst
+            };
+            *worst = worst.max(error);
+        }
+        // Numbers of both signs that repeat in no simple way; not 0 in the mean, so that little cancels.
+        let picture_gradient: Vec<f32> = (0..want.pixels.len())
+            .map(|i| match want.uncertain[i / 3] {
+                true => 0.0,
+                false => (i as f32 * 0.61).sin() + 0.3,
+            })
+            .collect();
+        let double: Vec<f64> = picture_gradient.iter().map(|v| f64::from(*v)).collect();
+        let colour_gradient = rasterizer.backward(&view, &picture_gradient)?;
+        let mut got = vec![0.0; gaussians.sh.coefficients.len()];
+        sh::backward(&Learnable::all(gaussians), &view, &colours, &colour_gradient, &mut got);
+        Ok(Self {
+            worst,
+            worst_uncertain,
+            uncertain: want.uncertain.iter().filter(|u| **u).count() as f64 / want.uncertain.len().max(1) as f64,
+            gradient: GradientError::new(&got, &reference::gradient(gaussians, camera, &double)),
+        })
+    }
+
+    /// Whether it is near enough for a scene whose colours are of the order of 1: pixels within 1e-4, those where a
+    /// decision hangs on the last digits few and within a few decisions, the gradient within 1e-4 by all measures.
+    pub fn holds(&self) -> bool {
+        self.worst <= LIMIT
+            && self.worst_uncertain <= UNCERTAIN_LIMIT
+            && self.uncertain <= MOST_UNCERTAIN
+            && self.gradient.within(LIMIT)
+    }
+}
+
+impl std::fmt::Display for Agreement {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let GradientError { l1, l2, angle, bias } = self.gradient;
+        write!(
+            f,
+            "pixels {:.1e} ({:.2} % uncertain: {:.1e}), gradient L1 {l1:.1e}, L2 {l2:.1e}, angle {angle:.1e}, bias {bias:.1e}",
+            self.worst,
+            100.0 * self.uncertain,
+            self.worst_uncertain
+        )
+    }
+}
 
 /// Distance of a gradient from the one it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct GradientError {
+pub struct GradientError {
     /// `sum |got - want| / sum |want|`.
     pub l1: f64,
     /// `|got - want|_2 / |want|_2`: finds single large errors.
@@ -14,9 +109,12 @@ pub(crate) struct GradientError {
 }
 
 impl GradientError {
-    /// Compares two gradients of one length. Two zero gradients are equal; NaN anywhere makes every measure NaN.
+    /// Compares two gradients. Two zero gradients are equal; NaN anywhere, or different lengths, make every measure NaN.
     pub fn new(got: &[f32], want: &[f64]) -> Self {
-        assert_eq!(got.len(), want.len(), "gradients of different lengths");
+        if got.len() != want.len() {
+            let [l1, l2, angle, bias] = [f64::NAN; 4];
+            return GradientError { l1, l2, angle, bias };
+        }
         let [mut sum, mut square, mut got_square, mut dot, mut d1, mut d2, mut signed] = [0.0f64; 7];
         for (g, w) in got.iter().zip(want) {
             let (g, d) = (f64::from(*g), f64::from(*g) - w);
@@ -91,5 +189,6 @@ mod tests {
     fn zero_gradients_are_equal() {
         assert!(GradientError::new(&[0.0; 3], &[0.0; 3]).within(0.0));
         assert!(!GradientError::new(&[0.0, 1e-9], &[0.0; 2]).within(0.1));
+        assert!(!GradientError::new(&[0.0; 3], &[0.0; 2]).within(0.1));
     }
 }

@@ -53,11 +53,12 @@ impl GpuRasterizer {
         }
     }
 
-    /// Refuses a buffer that the device cannot bind, before anything is allocated. An embedding draws a view before it
-    /// begins, so a scene that can't fit is refused at its admission.
+    /// Refuses a buffer that the device cannot bind, before anything is allocated. That is the scene's fault and not the
+    /// device's: another attempt would end in the same way. An embedding draws a view before it begins, so there it is
+    /// a matter of admission.
     fn check(&self, what: &str, bytes: usize) -> Result<()> {
         let limit = self.client.properties().memory.max_page_size;
-        Limits::of_buffers(limit).admit_buffer(what, bytes as u64)
+        Limits::of_buffers(limit).admit_buffer(&format!("the buffer of a view's {what}"), bytes as u64)
     }
 
     fn upload(&self, view: &PreparedView) -> Result<Uploaded> {
@@ -65,9 +66,9 @@ impl GpuRasterizer {
         let mut uploads = self.uploads.lock().unwrap_or_else(PoisonError::into_inner);
         uploads.get_or_insert(view.id, || {
             let tiles = &view.tiles;
-            self.check("the list of what a view shows", size_of_val(&view.splats[..]))?;
-            self.check("the gradient of a view", 12 * tiles.pairs())?;
-            self.check("a picture", 4 * view.picture_len())?;
+            self.check("splats", size_of_val(&view.splats[..]))?;
+            self.check("gradient slots", 12 * tiles.pairs())?;
+            self.check("pixels", 4 * view.picture_len())?;
             Ok(Uploaded {
                 bytes: size_of_val(&view.splats[..]) + tiles.bytes(),
                 splats: self.buffer(bytemuck::cast_slice(&view.splats)),

@@ -4,11 +4,8 @@
 //! what is learned. [`prepare`] computes per view what stays fixed; a [`Rasterizer`] applies it and its transpose.
 #[cfg(test)]
 mod checks;
-#[cfg(test)]
-mod compare;
+pub mod compare;
 mod cpu;
-#[cfg(test)]
-mod extremes;
 mod gpu;
 mod kernels;
 mod learnable;

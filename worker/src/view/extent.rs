@@ -14,7 +14,6 @@
 //!
 //! A scene *lies on ground* when one thin level sheet at its lower end is wide and carries a good part of the weight:
 //! from below there would be nothing to see but that sheet.
-use super::vector::dot;
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
 
@@ -92,10 +91,9 @@ fn weights(gaussians: &Gaussians) -> Vec<f64> {
         .log_scales
         .iter()
         .map(|s| {
-            let shortest = s.iter().copied().fold(f32::INFINITY, f32::min);
-            let others: f64 = s.iter().map(|x| f64::from(*x)).sum::<f64>() - f64::from(shortest);
-            // Minus infinity less minus infinity: a point or a line, which shows nothing.
-            if others.is_nan() { 0.0 } else { others.exp() }
+            // Of a point or a line it is minus infinity: they show nothing. A disc has one such axis, and an area.
+            let [a, b, c] = s.map(f64::from);
+            (a + b).max(b + c).max(c + a).exp()
         })
         .collect();
     let ones = vec![1.0; areas.len()];
@@ -170,13 +168,18 @@ fn normal(gaussians: &Gaussians, row: usize) -> [f32; 3] {
     let scales = gaussians.log_scales[row];
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| scales[*a].total_cmp(&scales[*b]));
-    let q = gaussians.rotations[row];
-    let length = dot([q[0], q[1], q[2]], [q[0], q[1], q[2]]) + q[3] * q[3];
     let flat = scales[order[0]] < scales[order[1]] - 0.5;
-    if !(flat && length.is_finite() && length > 1e-20) {
+    if !flat {
         return [0.0; 3];
     }
-    let [w, x, y, z] = q.map(|v| v / length.sqrt());
+    // What has no direction is not turned, as in the renderer; whole files of zeros exist.
+    let q = gaussians.rotations[row].map(f64::from);
+    let length = q.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let [w, x, y, z] = if length > 0.0 && length.is_finite() {
+        q.map(|v| (v / length) as f32)
+    } else {
+        [1.0, 0.0, 0.0, 0.0]
+    };
     // A column of the rotation matrix of a unit quaternion.
     match order[0] {
         0 => [

@@ -8,56 +8,6 @@ use guardsplat_worker::splat::{CpuRasterizer, Rasterizer, WeightCache, prepare, 
 use guardsplat_worker::view::{Split, ViewSampler};
 use ply::{ENCODINGS, Encoding, File, RESTS};
 
-/// What a file has, what must come of it, and the test that says so.
-pub const LINES: &[(&str, &str, fn())] = &[
-    (
-        "NaN anywhere",
-        "an error that names property and row; or, asked for, the rows are left out, counted, and written as they were",
-        nan_anywhere,
-    ),
-    (
-        "a wrong f_rest count",
-        "an error with the count and those that would do",
-        a_wrong_f_rest_count,
-    ),
-    (
-        "truncated body",
-        "an error with the rows that are there and those promised",
-        truncated_body,
-    ),
-    (
-        "header that promises 10²³ vertices or 400 million property-less ones",
-        "an error that names the count; in constant memory, as scene/tests/promises.rs measures",
-        promises,
-    ),
-    (
-        "ASCII and big-endian",
-        "the same scene, written back in the same encoding",
-        ascii_and_big_endian,
-    ),
-    (
-        "extra properties, comments and row order",
-        "kept in the output to the byte",
-        extras_are_kept,
-    ),
-    ("CRLF headers", "read, and kept in the output", crlf_headers),
-    (
-        "whole files of zero quaternions",
-        "read, kept, and drawn without a NaN",
-        zero_quaternions,
-    ),
-    (
-        "files of 0 or 1 Gaussian",
-        "read and written; nothing to see in the former is an error",
-        none_or_one,
-    ),
-    (
-        "SH degree 0..4 in a file",
-        "read with all coefficients, written back to the byte",
-        degrees,
-    ),
-];
-
 fn read(bytes: &[u8]) -> Scene {
     Scene::parse(Path::new("it.ply"), bytes).unwrap()
 }
@@ -93,8 +43,7 @@ fn picture(scene: &Scene) -> Vec<f32> {
     CpuRasterizer.render(&view, &colours, [0.0; 3]).unwrap().pixels
 }
 
-#[test]
-fn nan_anywhere() {
+pub fn nan_anywhere() {
     for encoding in ENCODINGS {
         let good = File::new(encoding, 4, 9);
         for name in &good.names {
@@ -112,8 +61,7 @@ fn nan_anywhere() {
     }
 }
 
-#[test]
-fn a_wrong_f_rest_count() {
+pub fn a_wrong_f_rest_count() {
     for rest in 0..80 {
         let bytes = File::new(Encoding::Little, 2, rest).bytes();
         if RESTS.contains(&rest) {
@@ -132,8 +80,7 @@ fn a_wrong_f_rest_count() {
     assert!(refused(&file.bytes()).contains("no property f_rest_4"));
 }
 
-#[test]
-fn truncated_body() {
+pub fn truncated_body() {
     for encoding in [Encoding::Little, Encoding::Big] {
         let file = File::new(encoding, 5, 9);
         let (bytes, header, row) = (file.bytes(), file.header().len(), 4 * file.names.len());
@@ -156,8 +103,7 @@ fn truncated_body() {
     }
 }
 
-#[test]
-fn promises() {
+pub fn promises() {
     let many = format!("1{}", "0".repeat(23));
     for encoding in ENCODINGS {
         let mut file = File::new(encoding, 3, 0);
@@ -190,8 +136,7 @@ fn promises() {
     }
 }
 
-#[test]
-fn ascii_and_big_endian() {
+pub fn ascii_and_big_endian() {
     let expected = read(&File::new(Encoding::Little, 4, 24).bytes()).gaussians;
     for encoding in ENCODINGS {
         let file = File::new(encoding, 4, 24);
@@ -201,8 +146,7 @@ fn ascii_and_big_endian() {
     }
 }
 
-#[test]
-fn extras_are_kept() {
+pub fn extras_are_kept() {
     for encoding in ENCODINGS {
         let mut file = File::new(encoding, 4, 9);
         file.before = "comment  by\thand, \u{e9}\nobj_info kept\nelement camera 0\nproperty double k\n";
@@ -220,8 +164,7 @@ fn extras_are_kept() {
     }
 }
 
-#[test]
-fn crlf_headers() {
+pub fn crlf_headers() {
     for encoding in ENCODINGS {
         let mut file = File::new(encoding, 4, 9);
         let plain = read(&file.bytes()).gaussians;
@@ -232,8 +175,7 @@ fn crlf_headers() {
     }
 }
 
-#[test]
-fn zero_quaternions() {
+pub fn zero_quaternions() {
     let mut file = File::new(Encoding::Little, 6, 9);
     for row in 0..6 {
         (0..4).for_each(|i| file.set(row, &format!("rot_{i}"), 0.0));
@@ -246,8 +188,7 @@ fn zero_quaternions() {
     assert!(pixels.iter().any(|value| *value > 0.0), "they are drawn");
 }
 
-#[test]
-fn none_or_one() {
+pub fn none_or_one() {
     for encoding in ENCODINGS {
         let none = File::new(encoding, 0, 9);
         let scene = read(&none.bytes());
@@ -264,8 +205,7 @@ fn none_or_one() {
     }
 }
 
-#[test]
-fn degrees() {
+pub fn degrees() {
     for encoding in ENCODINGS {
         for (degree, rest) in RESTS.into_iter().enumerate() {
             let file = File::new(encoding, 3, rest);
@@ -288,14 +228,3 @@ fn degrees() {
 }
 
 /// The table has every test once.
-#[test]
-fn every_line_has_a_test_of_its_own() {
-    for (i, (phrase, outcome, test)) in LINES.iter().enumerate() {
-        assert!(!phrase.is_empty() && !outcome.is_empty());
-        assert!(
-            LINES[..i]
-                .iter()
-                .all(|(other, _, another)| other != phrase && !std::ptr::fn_addr_eq(*another, *test))
-        );
-    }
-}
