@@ -226,5 +226,3 @@ pub fn degrees() {
         }
     }
 }
-
-/// The table has every test once.
