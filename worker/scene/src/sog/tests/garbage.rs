@@ -1,5 +1,6 @@
 //! Random and damaged files: never a panic.
 use super::*;
+use crate::BadRows;
 use proptest::prelude::*;
 
 proptest! {
@@ -51,13 +52,18 @@ proptest! {
 }
 
 fn check(bytes: &[u8]) {
-    let Ok(scene) = read(bytes) else {
-        return;
-    };
-    assert!(written(&scene, &scene.gaussians.sh) == bytes);
-    let sh = changed(&scene, |i, value| value + i as f32);
-    let again = read(&written(&scene, &sh)).unwrap().gaussians;
-    assert_eq!(bits(&again.sh.coefficients), bits(&sh.coefficients));
-    assert_eq!(again.positions, scene.gaussians.positions);
-    assert_eq!(again.opacity_logits, scene.gaussians.opacity_logits);
+    for bad_rows in [BadRows::Refuse, BadRows::Ignore] {
+        let read = |bytes: &[u8]| Scene::parse_with(Path::new("it"), bytes, bad_rows);
+        let Ok(scene) = read(bytes) else {
+            continue;
+        };
+        assert!(written(&scene, &scene.gaussians.sh) == bytes);
+        let sh = changed(&scene, |i, value| value + i as f32);
+        let again = read(&written(&scene, &sh)).unwrap();
+        assert_eq!(again.ignored(), scene.ignored());
+        let again = again.gaussians;
+        assert_eq!(bits(&again.sh.coefficients), bits(&sh.coefficients));
+        assert_eq!(again.positions, scene.gaussians.positions);
+        assert_eq!(again.opacity_logits, scene.gaussians.opacity_logits);
+    }
 }
