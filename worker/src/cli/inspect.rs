@@ -6,7 +6,7 @@ use guardsplat_worker::Result;
 use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::clip::{Clip, Parts};
 use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{Preset, SceneSize, ViewSize, needs};
+use guardsplat_worker::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs, needs_to_render};
 use guardsplat_worker::memory::{Bytes, Limits, Memory};
 use guardsplat_worker::scene::{BadRows, Gaussians, Ignored, Scene};
 use guardsplat_worker::splat::{WeightCache, prepare};
@@ -100,11 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let scene = Scene::read_with(&arguments.scene, bad_rows)?;
     let gaussians = &scene.gaussians;
     let size = SceneSize::of(&scene);
-    let render = Memory {
-        scene: size.bytes(),
-        pictures: picture_bytes(PICTURE, PICTURE),
-        ..rest
-    };
+    let render = needs_to_render(size, picture_bytes(PICTURE, PICTURE));
     let (mut extent, mut embed, mut seen) = (None, None, None);
     // Of nothing there is nothing to be seen.
     if !gaussians.is_empty() {
@@ -112,7 +108,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         let settings = Preset::Standard.settings();
         let view = ViewSize::on_cpu(gaussians, &settings)?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
-        embed = Some(needs(size, view, &settings, 4 * clip.parameters() as u64));
+        let clip = 4 * clip.parameters() as u64;
+        let models = ModelBytes {
+            learning: clip,
+            verifying: clip,
+        };
+        embed = Some(needs(size, view, &settings, models));
         seen = arguments.views.map(|views| count_seen(gaussians, views)).transpose()?;
     }
     let report = Report {

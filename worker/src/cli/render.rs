@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::device::{DeviceChoice, open};
+use guardsplat_worker::embed::{SceneSize, needs_to_render};
 use guardsplat_worker::extract::rasterizer;
 use guardsplat_worker::memory::{Limits, Memory};
 use guardsplat_worker::quality::write_picture;
@@ -81,6 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
     let scene = Scene::read_with(&arguments.input, bad_rows)?;
     let ignored = scene.ignored().cloned();
+    limits.admit(&needs_to_render(SceneSize::of(&scene), rest.pictures))?;
     let scene = scene.gaussians;
     let cameras = match given {
         Some(cameras) => cameras,

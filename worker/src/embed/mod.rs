@@ -22,7 +22,7 @@ pub use adam::{Adam, AdamOptions, Penalty};
 pub use augment::Augmentation;
 pub use balance::{Balance, Balancer};
 pub use learned::Learned;
-pub use needs::{ModelBytes, SceneSize, ViewSize, needs};
+pub use needs::{ModelBytes, SceneSize, ViewSize, needs, needs_to_render};
 pub use new_key::{NewKey, create_key};
 pub use optimise::{Optimised, optimise};
 pub use output::{Job, Outcome, embed};

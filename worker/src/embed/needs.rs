@@ -136,6 +136,18 @@ impl ModelBytes {
     }
 }
 
+/// Predicts the most memory that it takes to read a scene and draw pictures of it, of at most so many bytes
+/// ([`picture_bytes`](crate::admission::picture_bytes)).
+pub fn needs_to_render(scene: SceneSize, picture: u64) -> Memory {
+    // The file has gone when views are prepared, one at a time.
+    let preparing = PREPARING * scene.gaussians;
+    Memory {
+        scene: scene.bytes(),
+        pictures: (preparing + picture).saturating_sub(scene.file),
+        ..Memory::of_program()
+    }
+}
+
 /// Predicts the most memory that an embedding has in use at once.
 pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: ModelBytes) -> Memory {
     let threads = rayon::current_num_threads() as u64;

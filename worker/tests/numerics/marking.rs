@@ -10,7 +10,7 @@ use guardsplat_worker::message::decoder::LayerWeights;
 use guardsplat_worker::message::key::Secret;
 use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Key, Message, Projection};
 use guardsplat_worker::sample::sample;
-use guardsplat_worker::scene::{Gaussians, Scene};
+use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
 use guardsplat_worker::splat::{MAX_PAIRS, TILE};
 use safetensors::tensor::{Dtype, TensorView};
 
@@ -161,6 +161,7 @@ pub fn poison(machine: &Machine) {
     std::fs::write(at("out.ply"), BEFORE).unwrap();
     let stops = |engine: &Engine, settings: &Settings, expected: &str| {
         let job = Job {
+            bad_rows: BadRows::Refuse,
             input: &at("in.ply"),
             output: &at("out.ply"),
             message: &message(),
@@ -229,6 +230,7 @@ pub fn too_much_for_the_adapter(machine: &Machine) {
     let scene = Scene::from_gaussians(full_screen(count as usize));
     scene.write(&at("in.ply"), &scene.gaussians.sh).unwrap();
     let job = Job {
+        bad_rows: BadRows::Refuse,
         input: &at("in.ply"),
         output: &at("out.ply"),
         message: &message(),

@@ -3,7 +3,7 @@ use std::fs::File;
 use std::path::Path;
 
 use guardsplat_worker::admission::to_mark;
-use guardsplat_worker::embed::{Preset, SceneSize, ViewSize, needs};
+use guardsplat_worker::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs};
 use guardsplat_worker::error::Error;
 use guardsplat_worker::memory::{Bytes, Limits, Memory};
 use guardsplat_worker::sample::sample;
@@ -41,7 +41,7 @@ pub fn memory_is_predicted() {
             exact: true,
             file: 4 * NUMBERS * n,
         };
-        let needed = needs(size, view, &settings, 0);
+        let needed = needs(size, view, &settings, ModelBytes::default());
         assert_eq!(needed.scene, 2 * 4 * NUMBERS * n);
         assert_eq!(needed.offsets, (2 * 4 * 48 + 9) * n);
         assert_eq!(needed.optimiser, (2 * 4 * 48 + 4) * n);
