@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, protos, lints and all tests. Four to eight minutes on two cores when all dependencies are
-# built; building them takes some twenty more.
+# Checks everything: formatting, protos, lints, all tests, and a little fuzzing. Six to ten minutes on two cores when all
+# dependencies are built; building them takes some twenty more.
 # Scenes for the tests that want real ones are taken from $GUARDSPLAT_SCENES or ../shared/scenes; without them those
 # tests are skipped, unless CI is set.
 set -euo pipefail
@@ -50,4 +50,6 @@ stage protos bash deploy/check-api.sh
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests
+# Longer runs are for people: docs/fuzzing.md.
+stage fuzz bash deploy/fuzz.sh 5
 echo "== all: $SECONDS s"

@@ -36,6 +36,8 @@ mod problems;
 mod progress;
 mod refusals;
 mod status;
+#[doc(hidden)]
+pub mod strangers;
 mod submission;
 #[cfg(test)]
 mod tests;

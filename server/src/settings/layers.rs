@@ -2,7 +2,8 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use config::{Config, ConfigError, Environment, File, FileFormat};
+use config::builder::DefaultState;
+use config::{Config, ConfigBuilder, ConfigError, Environment, File, FileFormat};
 use secrecy::SecretString;
 
 use super::{Flags, Settings, SettingsError};
@@ -34,15 +35,23 @@ pub fn load(flags: Flags, environment: impl IntoIterator<Item = (String, String)
     if let Some(path) = flags.config.clone().or_else(usual_file) {
         builder = builder.add_source(File::from(path).format(FileFormat::Toml));
     }
-    let mut settings: Settings = builder
-        .add_source(Environment::default().source(Some(variables)))
-        .build()
-        .and_then(Config::try_deserialize)
-        .map_err(|error: ConfigError| SettingsError::Unreadable(error.to_string()))?;
+    let mut settings = build(builder.add_source(Environment::default().source(Some(variables))))?;
     flags.apply(&mut settings);
     settings.master_key = master_key;
     settings.check()?;
     Ok(settings)
+}
+
+/// The settings of a file alone, from its text.
+pub fn parse(text: &str) -> Result<Settings, SettingsError> {
+    let settings = build(Config::builder().add_source(File::from_str(text, FileFormat::Toml)))?;
+    settings.check()?;
+    Ok(settings)
+}
+
+fn build(layers: ConfigBuilder<DefaultState>) -> Result<Settings, SettingsError> {
+    let settings = layers.build().and_then(Config::try_deserialize);
+    settings.map_err(|error: ConfigError| SettingsError::Unreadable(error.to_string()))
 }
 
 fn usual_file() -> Option<PathBuf> {

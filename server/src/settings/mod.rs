@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::SettingsError;
 pub use flags::Flags;
-pub use layers::load;
+pub use layers::{load, parse};
 
 /// Everything that can be set. `deploy/guardsplat-server.toml` says what each is for.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -132,6 +132,8 @@ fn the_documented_file_equals_the_defaults() {
         .filter(|line| line.contains(" = "))
         .fold(String::new(), |all, line| all + line + "\n");
     layers(&examples, &[], &[]).unwrap();
+    assert_eq!(as_json(&parse(&text).unwrap()), defaults);
+    assert!(parse("lease_seconds = 0").is_err());
 }
 
 #[test]

@@ -21,12 +21,19 @@ pub(crate) fn announced(first: &[u8]) -> Option<Format> {
     }
 }
 
-/// Whether the header of a PLY has the property by which compressed ones are known.
+/// Whether the Gaussians in the header of a PLY have the property by which compressed ones are known.
 fn has_packed_rows(first: &[u8]) -> bool {
-    let lines = first.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-    lines
-        .take_while(|line| *line != b"end_header")
-        .any(|line| line.starts_with(b"property") && line.ends_with(b" packed_position"))
+    let mut vertex = false;
+    for line in first.split(|byte| *byte == b'\n') {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"end_header") => return false,
+            Some(b"element") => vertex = words.next() == Some(b"vertex"),
+            Some(b"property") if vertex && words.next_back() == Some(b"packed_position") => return true,
+            _ => (),
+        }
+    }
+    false
 }
 
 /// The format of a file of `size` bytes that begins with `head`, or `None` where it looks like no scene.
@@ -92,6 +99,14 @@ mod tests {
         for (head, format) in [
             (PLAIN, Format::Ply),
             (PACKED, Format::CompressedPly),
+            (
+                b"ply\nelement vertex 1\nproperty\tuint\tpacked_position\nend_header\n",
+                Format::CompressedPly,
+            ),
+            (
+                b"ply\nelement face 1\nproperty uint packed_position\nelement vertex 1\nend_header\n",
+                Format::Ply,
+            ),
             (b"ply", Format::Ply),
             (gzip, Format::Spz),
             (b"NGSP\x04", Format::Spz),

@@ -29,7 +29,7 @@ pub use transformer::Transformer;
 pub use vit::VisionTransformer;
 pub use weights::Precision;
 
-pub(crate) use tensor_file::hash;
+pub(crate) use tensor_file::{check_header, hash};
 pub(crate) use weights::write_whole;
 
 use crate::error::{Error, Result};

@@ -6,8 +6,19 @@ use sha2::{Digest, Sha256};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Largest header that is read. The largest published CLIP needs 0.1 MB.
-const MAX_HEADER_BYTES: u64 = 16 << 20;
+/// Largest header that is read, here and of other safetensors files. The largest published CLIP needs 0.1 MB. A shape of
+/// many ones takes ten times its text in memory.
+pub(crate) const MAX_HEADER_BYTES: u64 = 4 << 20;
+
+/// Checks the length that a whole safetensors file states of its header, before somebody believes it.
+pub(crate) fn check_header(bytes: &[u8]) -> Result<(), String> {
+    match bytes.first_chunk().map(|word| u64::from_le_bytes(*word)) {
+        Some(header) if header > MAX_HEADER_BYTES => Err(format!(
+            "its header promises {header} bytes, at most {MAX_HEADER_BYTES} are read"
+        )),
+        _ => Ok(()),
+    }
+}
 
 /// Where weights come from: a file, or something that makes them (tests).
 pub trait TensorSource {
@@ -44,11 +55,11 @@ impl TensorFile {
         Self::from_reader(path.display().to_string(), Box::new(file))
     }
 
-    /// A file that is part of the program.
+    /// A file that is in memory; `name` is for error messages.
     ///
     /// # Errors
     /// [`Error::BadModel`] as for [`TensorFile::open`].
-    pub fn from_bytes(name: &str, bytes: &'static [u8]) -> Result<Self> {
+    pub fn from_bytes(name: &str, bytes: impl AsRef<[u8]> + 'static) -> Result<Self> {
         Self::from_reader(name.to_owned(), Box::new(Cursor::new(bytes)))
     }
 

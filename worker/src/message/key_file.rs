@@ -11,6 +11,7 @@ use super::bits::MAX_BITS;
 use super::decoder::{DecoderWeights, HIDDEN, LayerWeights};
 use super::key::{ClipIdentity, Key, Secret};
 use super::projection::Projection;
+use crate::clip::check_header;
 use crate::error::{Error, Result};
 
 /// The format's version; another one is refused.
@@ -140,6 +141,7 @@ pub(super) fn read(path: &Path) -> Result<Key> {
 /// A key from the file's bytes, checked against its id.
 pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     let not_a_key = |e: safetensors::SafeTensorError| format!("not a key file, or a truncated one ({e})");
+    check_header(bytes)?;
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(not_a_key)?;
     let json = metadata.metadata().as_ref().and_then(|m| m.get(HEADER));
     let json = json.ok_or("a safetensors file, but not a key")?;
@@ -294,6 +296,16 @@ mod tests {
         for length in (0..bytes.len()).step_by(997).chain([0, 7, 8, 9, bytes.len() - 1]) {
             assert!(deserialize(&bytes[..length]).is_err(), "{length}");
         }
+    }
+
+    #[test]
+    fn headers_of_megabytes_are_not_parsed() {
+        let file = [&(64u64 << 20).to_le_bytes()[..], &vec![b'['; 64 << 20]].concat();
+        assert!(
+            deserialize(&file)
+                .unwrap_err()
+                .contains("its header promises 67108864 bytes")
+        );
     }
 
     #[test]

@@ -11,6 +11,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const MANIFEST: &str = "manifest.json";
+/// Most bytes of a manifest that are read.
+const MAX_MANIFEST: u64 = 1 << 16;
 /// The weights file in a model's folder.
 pub const WEIGHTS: &str = "model.safetensors";
 const CONFIG: &str = "config.json";
@@ -128,11 +130,20 @@ impl Models {
     fn entry(&self, name: &str) -> Result<Entry> {
         let path = self.dir(name)?.join(MANIFEST);
         let file = std::fs::File::open(&path).map_err(Error::io(&path))?;
-        let reader = std::io::Read::take(file, 1 << 16);
-        let entry: Entry = serde_json::from_reader(reader).map_err(|e| bad(name, format!("{MANIFEST}: {e}")))?;
+        let mut text = Vec::new();
+        let mut bounded = std::io::Read::take(file, MAX_MANIFEST);
+        std::io::Read::read_to_end(&mut bounded, &mut text).map_err(Error::io(&path))?;
+        Entry::parse(&text).map_err(|reason| bad(name, format!("{MANIFEST} {reason}")))
+    }
+}
+
+impl Entry {
+    /// Reads a manifest; `Err` says what is wrong with it.
+    pub fn parse(text: &[u8]) -> Result<Self, String> {
+        let entry: Entry = serde_json::from_slice(text).map_err(|e| format!("cannot be read: {e}"))?;
         let known = [WEIGHTS, CONFIG, PREPROCESSOR];
         match entry.files.keys().find(|file| !known.contains(&file.as_str())) {
-            Some(file) => Err(bad(name, format!("{MANIFEST} names an unknown file, {file:?}"))),
+            Some(file) => Err(format!("names an unknown file, {file:?}")),
             None => Ok(entry),
         }
     }

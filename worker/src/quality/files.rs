@@ -6,6 +6,7 @@ use std::path::Path;
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage};
 
+use super::exr;
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 
@@ -106,6 +107,24 @@ pub fn is_picture(head: &[u8]) -> bool {
 /// # Errors
 /// Says why in words: an unknown format, damage, more than [`MAX_PIXELS`], or values that are not finite.
 pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, String> {
+    let picture = if exr::is_exr(bytes) {
+        exr::decode(bytes, background)?
+    } else {
+        decode_integers(bytes, background)?
+    };
+    let Picture { width, pixels, .. } = &picture;
+    if let Some(at) = pixels.iter().position(|v: &f32| !v.is_finite()) {
+        let (x, y) = (at / 3 % *width as usize, at / 3 / *width as usize);
+        return Err(format!("pixel ({x}, {y}) is {}", pixels[at]));
+    }
+    if pixels.is_empty() {
+        return Err("it has no pixels".into());
+    }
+    Ok(picture)
+}
+
+/// A picture of a format that `image` reads within limits: all but OpenEXR.
+fn decode_integers(bytes: &[u8], background: [f32; 3]) -> Result<Picture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| e.to_string())?;
@@ -123,38 +142,27 @@ pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, Str
     let orientation = decoder.orientation().map_err(|e| e.to_string())?;
     let mut image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
     image.apply_orientation(orientation);
-    let transparent = image.color().has_alpha();
     let (width, height) = (image.width(), image.height());
-    let pixels = if transparent {
-        let over = |[r, g, b, a]: [f32; 4]| {
-            let [p, q, s] = background;
-            [r * a + p * (1.0 - a), g * a + q * (1.0 - a), b * a + s * (1.0 - a)]
-        };
-        image
-            .into_rgba32f()
-            .into_raw()
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .copied()
-            .flat_map(over)
-            .collect()
+    let pixels = if image.color().has_alpha() {
+        over(image.into_rgba32f().into_raw(), background)
     } else {
         image.into_rgb32f().into_raw()
     };
-    if let Some(at) = pixels.iter().position(|v: &f32| !v.is_finite()) {
-        let pixel = at / 3;
-        return Err(format!(
-            "pixel ({}, {}) is {}",
-            pixel % width as usize,
-            pixel / width as usize,
-            pixels[at]
-        ));
-    }
-    if pixels.is_empty() {
-        return Err("it has no pixels".into());
-    }
     Ok(Picture { width, height, pixels })
+}
+
+/// Pixels of four values to such of three, in place: a copy would be the largest thing in memory.
+fn over(mut pixels: Vec<f32>, background: [f32; 3]) -> Vec<f32> {
+    let count = pixels.len() / 4;
+    for i in 0..count {
+        let alpha = pixels[4 * i + 3];
+        for (channel, behind) in background.into_iter().enumerate() {
+            pixels[3 * i + channel] = pixels[4 * i + channel] * alpha + behind * (1.0 - alpha);
+        }
+    }
+    pixels.truncate(3 * count);
+    pixels.shrink_to_fit();
+    pixels
 }
 
 /// Reads a picture file as [`decode_picture`] does. Fails with [`Error::BadPicture`], or [`Error::Io`].

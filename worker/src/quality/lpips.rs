@@ -8,7 +8,7 @@ use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::lpips_weights::{self, CONVOLUTIONS};
+use super::lpips_weights::{self, CONVOLUTIONS, StageWeights};
 use crate::error::{Error, Result};
 
 /// Smallest width and height that leave a pixel after both poolings.
@@ -39,24 +39,30 @@ impl Lpips {
     /// Loads `lpips_alex_v0.1.safetensors`. Fails with [`Error::BadModel`] unless every tensor is
     /// there, f32, finite and of its shape.
     pub fn load(path: &Path, device: &Device) -> Result<Self> {
+        Ok(Self::new(lpips_weights::read(path)?, device))
+    }
+
+    /// The same from a file's bytes; `Err` is the reason why not.
+    pub fn from_bytes(bytes: &[u8], device: &Device) -> Result<Self, String> {
+        Ok(Self::new(lpips_weights::parse(bytes)?, device))
+    }
+
+    fn new(weights: Vec<StageWeights>, device: &Device) -> Self {
         let device = &device.clone().without_autodiff();
-        let stages = lpips_weights::read(path)?
-            .into_iter()
-            .zip(CONVOLUTIONS)
-            .map(|(weights, shape)| {
-                let dims = [shape.outputs, shape.inputs, shape.kernel, shape.kernel];
-                Stage {
-                    weight: Tensor::from_data(TensorData::new(weights.weight, dims), device),
-                    bias: Tensor::from_data(TensorData::new(weights.bias, [shape.outputs]), device),
-                    head: Tensor::from_data(TensorData::new(weights.head, [1, shape.outputs, 1, 1]), device),
-                }
-            });
+        let stages = weights.into_iter().zip(CONVOLUTIONS).map(|(weights, shape)| {
+            let dims = [shape.outputs, shape.inputs, shape.kernel, shape.kernel];
+            Stage {
+                weight: Tensor::from_data(TensorData::new(weights.weight, dims), device),
+                bias: Tensor::from_data(TensorData::new(weights.bias, [shape.outputs]), device),
+                head: Tensor::from_data(TensorData::new(weights.head, [1, shape.outputs, 1, 1]), device),
+            }
+        });
         let channels = |values: [f32; 3]| Tensor::from_data(TensorData::new(values.to_vec(), [1, 3, 1, 1]), device);
-        Ok(Self {
+        Self {
             stages: stages.collect(),
             shift: channels(SHIFT),
             scale: channels(SCALE),
-        })
+        }
     }
 
     /// Features of pictures `[b, 3, h, w]` in [0, 1]. Fails below [`MINIMUM_SIZE`].

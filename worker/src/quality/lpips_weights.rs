@@ -5,6 +5,7 @@ use std::path::Path;
 
 use safetensors::tensor::{Dtype, SafeTensors};
 
+use crate::clip::check_header;
 use crate::error::{Error, Result};
 
 /// One convolution of AlexNet.
@@ -60,10 +61,12 @@ pub(super) fn read(path: &Path) -> Result<Vec<StageWeights>> {
     })
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<StageWeights>, String> {
+/// The five stages from a file's bytes.
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<StageWeights>, String> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(format!("it is larger than {MAX_BYTES} bytes"));
     }
+    check_header(bytes)?;
     let file = SafeTensors::deserialize(bytes).map_err(|e| format!("not a safetensors file ({e})"))?;
     let stage = |(i, c): (usize, Convolution)| {
         Ok(StageWeights {

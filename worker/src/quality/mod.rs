@@ -1,6 +1,7 @@
 //! How much a mark shows: PSNR, SSIM and LPIPS of marked against original views, and pictures to look at.
 pub mod batch;
 pub mod compare;
+mod exr;
 pub mod files;
 pub mod lpips;
 mod lpips_weights;

@@ -5,10 +5,11 @@
 //! object with `frames`, each a `transform_matrix` whose camera axes are those of OpenGL (x right, y up, z backward),
 //! and intrinsics for all frames or one: `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`.
 use super::camera::Camera;
+use super::json::{self, Fields, Length, List, Outline, Scalar};
 use super::vector::{cross, dot};
 use crate::error::{Error, Result};
 use crate::scene::write_whole;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::io::Read;
 use std::path::Path;
 
@@ -41,7 +42,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>> {
     if text.len() as u64 > MAX_FILE {
         return Err(bad(format!("longer than the limit of {MAX_FILE} bytes")));
     }
-    parse(&text).map_err(bad)
+    parse_cameras(&text).map_err(bad)
 }
 
 /// Writes cameras as `transforms.json` where the file's name has `transforms` in it, else as `cameras.json`.
@@ -66,58 +67,70 @@ pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<()> {
     Ok(())
 }
 
-fn parse(text: &[u8]) -> Result<Vec<Camera>, String> {
-    let value: Value = serde_json::from_slice(text).map_err(|e| format!("not JSON: {e}"))?;
-    let (entries, shared) = match &value {
-        Value::Array(entries) => (entries, None),
-        Value::Object(fields) => match fields.get("frames") {
-            Some(Value::Array(frames)) => (frames, Some(fields)),
+/// Reads cameras of either kind from a file's text. Entries are read one by one: only the cameras are kept, not the
+/// JSON, which would take many times its text. `Err` is the reason why not.
+pub fn parse_cameras(text: &[u8]) -> Result<Vec<Camera>, String> {
+    let outline = json::outline(text)?;
+    let (count, shared) = match &outline {
+        Outline::Array(count) => (*count, None),
+        Outline::Object(shared) => match shared.frames {
+            Some(Length(Some(count))) => (count, Some(&**shared)),
             _ => {
                 return Err("neither cameras.json (an array) nor transforms.json (with \"frames\")".into());
             }
         },
-        _ => return Err("neither cameras.json (an array) nor transforms.json (an object)".into()),
+        Outline::Other => return Err("neither cameras.json (an array) nor transforms.json (an object)".into()),
     };
-    if entries.is_empty() {
+    if count == 0 {
         return Err("has no cameras".into());
     }
-    let camera = |(i, entry): (usize, &Value)| {
-        let own = entry.as_object().ok_or_else(|| "not an object".to_string());
-        own.and_then(|own| match shared {
-            None => from_entry(own),
-            Some(shared) => from_frame(own, shared),
-        })
-        .map_err(|reason| format!("camera {i}: {reason}"))
-    };
-    entries.iter().enumerate().map(camera).collect()
+    let mut cameras = Vec::with_capacity(count);
+    json::for_each(text, |own| {
+        let camera = match shared {
+            None => from_entry(&own),
+            Some(shared) => from_frame(&own, shared),
+        };
+        cameras.push(camera?);
+        Ok(())
+    })?;
+    Ok(cameras)
 }
 
-fn from_entry(own: &Map<String, Value>) -> Result<Camera, String> {
-    let need = |name: &str| number(own, name)?.ok_or_else(|| format!("{name} is missing"));
-    let position: [f64; 3] = numbers(own.get("position"), "position")?;
-    let rows: [[f64; 3]; 3] = matrix(own.get("rotation"), "rotation")?;
+fn from_entry(own: &Fields) -> Result<Camera, String> {
+    let need = |value: &Option<Scalar>, name: &str| number(value, name)?.ok_or_else(|| format!("{name} is missing"));
+    let position = numbers(&own.position, "position")?;
+    let rows = matrix(&own.rotation, "rotation")?;
     let axes = std::array::from_fn(|k| [rows[0][k], rows[1][k], rows[2][k]]);
-    let (width, height) = (need("width")?, need("height")?);
-    let principal = [number(own, "cx")?, number(own, "cy")?];
-    build(axes, position, [need("fx")?, need("fy")?], principal, [width, height])
+    let size = [need(&own.width, "width")?, need(&own.height, "height")?];
+    let principal = [number(&own.cx, "cx")?, number(&own.cy, "cy")?];
+    build(
+        axes,
+        position,
+        [need(&own.fx, "fx")?, need(&own.fy, "fy")?],
+        principal,
+        size,
+    )
 }
 
-fn from_frame(own: &Map<String, Value>, shared: &Map<String, Value>) -> Result<Camera, String> {
-    let find = |name: &str| Ok::<_, String>(number(own, name)?.or(number(shared, name)?));
-    let rows: [[f64; 4]; 4] = matrix(own.get("transform_matrix"), "transform_matrix")?;
+fn from_frame(own: &Fields, shared: &Fields) -> Result<Camera, String> {
+    let find = |field: fn(&Fields) -> &Option<Scalar>, name: &str| {
+        Ok::<_, String>(number(field(own), name)?.or(number(field(shared), name)?))
+    };
+    let rows = matrix(&own.transform_matrix, "transform_matrix")?;
     // OpenGL's y is up and its z backward.
     let axes = [(0, 1.0), (1, -1.0), (2, -1.0)].map(|(k, sign)| [0, 1, 2].map(|r| sign * rows[r][k]));
     let position = [rows[0][3], rows[1][3], rows[2][3]];
-    let width = find("w")?.unwrap_or(BLENDER_SIDE);
-    let height = find("h")?.unwrap_or(BLENDER_SIDE);
+    let width = find(|f| &f.w, "w")?.unwrap_or(BLENDER_SIDE);
+    let height = find(|f| &f.h, "h")?.unwrap_or(BLENDER_SIDE);
     let from_angle = |angle: Option<f64>, side: f64| angle.map(|angle| 0.5 * side / (0.5 * angle).tan());
-    let fx = find("fl_x")?
-        .or(from_angle(find("camera_angle_x")?, width))
+    let fx = find(|f| &f.fl_x, "fl_x")?
+        .or(from_angle(find(|f| &f.camera_angle_x, "camera_angle_x")?, width))
         .ok_or("neither fl_x nor camera_angle_x is given")?;
-    let fy = find("fl_y")?
-        .or(from_angle(find("camera_angle_y")?, height))
+    let fy = find(|f| &f.fl_y, "fl_y")?
+        .or(from_angle(find(|f| &f.camera_angle_y, "camera_angle_y")?, height))
         .unwrap_or(fx);
-    build(axes, position, [fx, fy], [find("cx")?, find("cy")?], [width, height])
+    let principal = [find(|f| &f.cx, "cx")?, find(|f| &f.cy, "cy")?];
+    build(axes, position, [fx, fy], principal, [width, height])
 }
 
 /// Checks and assembles: `axes` are the camera's x, y and z in the world.
@@ -151,6 +164,12 @@ fn build(
             return Err(format!("the focal length in {name} is {focal} pixels, must be above 0"));
         }
     }
+    let principal = [0, 1].map(|i| principal[i].unwrap_or(0.5 * size[i]) as f32);
+    for (name, principal) in ["cx", "cy"].iter().zip(principal) {
+        if !principal.is_finite() {
+            return Err(format!("{name} is out of range"));
+        }
+    }
     let position = position.map(|p| p as f32);
     let translation = rotation.map(|axis| -dot(axis, position));
     if translation.iter().any(|t| !t.is_finite()) {
@@ -161,39 +180,37 @@ fn build(
         height: size[1] as u32,
         fx: focal[0] as f32,
         fy: focal[1] as f32,
-        cx: principal[0].unwrap_or(0.5 * size[0]) as f32,
-        cy: principal[1].unwrap_or(0.5 * size[1]) as f32,
+        cx: principal[0],
+        cy: principal[1],
         rotation,
         translation,
     })
 }
 
-fn number(fields: &Map<String, Value>, name: &str) -> Result<Option<f64>, String> {
-    match fields.get(name) {
+fn number(value: &Option<Scalar>, name: &str) -> Result<Option<f64>, String> {
+    match value {
         None => Ok(None),
-        Some(value) => match value.as_f64() {
-            Some(number) => Ok(Some(number)),
-            None => Err(format!("{name} is {value}, not a number")),
-        },
+        Some(Scalar::Number(number)) => Ok(Some(*number)),
+        Some(Scalar::Other(other)) => Err(format!("{name} is {other}, not a number")),
     }
 }
 
-fn numbers<const N: usize>(value: Option<&Value>, name: &str) -> Result<[f64; N], String> {
-    let list = value.and_then(Value::as_array).and_then(|list| {
-        list.iter()
-            .map(Value::as_f64)
-            .collect::<Option<Vec<f64>>>()?
-            .try_into()
-            .ok()
-    });
-    list.ok_or_else(|| format!("{name} is missing or not {N} numbers"))
+fn numbers<const N: usize>(list: &Option<List<Scalar, N>>, name: &str) -> Result<[f64; N], String> {
+    let found = list.as_ref().and_then(List::numbers);
+    found.ok_or_else(|| format!("{name} is missing or not {N} numbers"))
 }
 
-fn matrix<const N: usize>(value: Option<&Value>, name: &str) -> Result<[[f64; N]; N], String> {
-    let bad = || format!("{name} is missing or not {N} rows of {N} numbers");
-    let rows = value.and_then(Value::as_array).ok_or_else(bad)?;
-    let rows: Option<Vec<[f64; N]>> = rows.iter().map(|row| numbers(Some(row), name).ok()).collect();
-    rows.and_then(|rows| rows.try_into().ok()).ok_or_else(bad)
+fn matrix<const N: usize>(rows: &Option<List<List<Scalar, N>, N>>, name: &str) -> Result<[[f64; N]; N], String> {
+    let rows = rows.as_ref().and_then(|rows| rows.0.as_ref());
+    let mut found = [[0.0; N]; N];
+    let all = rows.is_some_and(|rows| {
+        let pairs = found.iter_mut().zip(rows);
+        pairs
+            .map(|(slot, row)| row.numbers().map(|row| *slot = row))
+            .all(|row| row.is_some())
+    });
+    all.then_some(found)
+        .ok_or_else(|| format!("{name} is missing or not {N} rows of {N} numbers"))
 }
 
 /// An entry of `cameras.json`.
@@ -285,7 +302,7 @@ mod tests {
         // The identity pose of OpenGL looks along -z with y up; 4 back from the origin.
         let text = br#"{"camera_angle_x": 0.6911112, "frames": [{"file_path": "./train/r_0",
             "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
-        let camera = parse(text).unwrap().remove(0);
+        let camera = parse_cameras(text).unwrap().remove(0);
         let p = camera.to_camera([1.0, 2.0, 0.0]);
         assert_eq!(p, [1.0, -2.0, 4.0]);
         assert_eq!((camera.width, camera.height), (800, 800));
@@ -298,7 +315,7 @@ mod tests {
         // camera x = world y, y = world z, z = world x: the columns of the stored rotation.
         let text = br#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],
             "rotation": [[0,0,1],[1,0,0],[0,1,0]], "fy": 30, "fx": 40}]"#;
-        let camera = parse(text).unwrap().remove(0);
+        let camera = parse_cameras(text).unwrap().remove(0);
         assert_eq!(camera.centre(), [1.0, 2.0, 3.0]);
         assert_eq!(camera.to_camera([6.0, 2.5, 4.0]), [0.5, 1.0, 5.0]);
         assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (40.0, 30.0, 5.0, 10.0));
@@ -308,7 +325,7 @@ mod tests {
     fn what_is_wrong_is_named() {
         let good = r#"[{"width": 10, "height": 20, "position": [1, 2, 3],
             "rotation": [[0,0,1],[1,0,0],[0,1,0]], "fy": 30, "fx": 40}]"#;
-        assert!(parse(good.as_bytes()).is_ok());
+        assert!(parse_cameras(good.as_bytes()).is_ok());
         let cases = [
             ("\"width\": 10,", "", "camera 0: width is missing"),
             ("10", "1e9", "must be a whole number from 1 to 16384"),
@@ -318,10 +335,13 @@ mod tests {
             ("[0,1,0]", "[0,-1,0]", "rotation"),
             ("[0,1,0]", "[0,2,0]", "rotation"),
             ("[1, 2, 3]", "[1, 2, 1e300]", "out of range"),
+            ("\"fx\": 40", "\"fx\": 40, \"cx\": 1e300", "cx is out of range"),
+            ("\"fx\": 40", "\"fx\": [4, 0]", "fx is a list, not a number"),
+            ("[0,1,0]", "[0,1,[0]]", "rotation is missing or not 3 rows of 3 numbers"),
             ("[{", "{", "not JSON"),
         ];
         for (from, to, expected) in cases {
-            let reason = parse(good.replacen(from, to, 1).as_bytes()).unwrap_err();
+            let reason = parse_cameras(good.replacen(from, to, 1).as_bytes()).unwrap_err();
             assert!(reason.contains(expected), "{reason} does not have {expected}");
         }
         for (text, expected) in [
@@ -330,12 +350,12 @@ mod tests {
             ("3", "neither"),
             ("[1]", "camera 0"),
         ] {
-            let reason = parse(text.as_bytes()).unwrap_err();
+            let reason = parse_cameras(text.as_bytes()).unwrap_err();
             assert!(reason.contains(expected), "{reason}");
         }
         let frame = r#"{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
         assert!(
-            parse(frame.as_bytes())
+            parse_cameras(frame.as_bytes())
                 .unwrap_err()
                 .contains("neither fl_x nor camera_angle_x")
         );

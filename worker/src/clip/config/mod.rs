@@ -145,14 +145,22 @@ impl ClipConfig {
         let preprocessor = dir.join("preprocessor_config.json");
         if preprocessor.is_file() {
             let name = preprocessor.display().to_string();
-            if let Some(found) =
-                hugging_face::normalization(&read_bounded(&preprocessor)?).map_err(|e| bad(&name, e))?
-            {
-                config.normalization = found;
-                config.validate().map_err(|e| bad(&name, e))?;
-            }
+            config.preprocessed(&name, &read_bounded(&preprocessor)?)?;
         }
         Ok(config)
+    }
+
+    /// Takes mean and deviation from the text of a `preprocessor_config.json`, when it tells both; `name` is for error
+    /// messages.
+    ///
+    /// # Errors
+    /// [`Error::BadModel`] as for [`ClipConfig::read`].
+    pub fn preprocessed(&mut self, name: &str, json: &str) -> Result<()> {
+        if let Some(found) = hugging_face::normalization(json).map_err(|e| bad(name, e))? {
+            self.normalization = found;
+            self.validate().map_err(|e| bad(name, e))?;
+        }
+        Ok(())
     }
 
     /// Reads a configuration in either form from its text; `name` is for error messages.
@@ -193,7 +201,9 @@ impl ClipConfig {
                 blocks.validate("vision", vision.width)?;
             }
             VisionTower::ResNet { layers, heads } => {
-                layers.iter().try_for_each(|n| within("vision layers", *n, 128))?;
+                // Four times what was published: running averages take memory as soon as the tower is laid out.
+                layers.iter().try_for_each(|n| within("vision layers", *n, 64))?;
+                within("vision width", vision.width, 512)?;
                 divides("vision image_size", vision.image_size, "the total stride", 32)?;
                 divides("vision width", vision.width, "the stem's narrowing", 2)?;
                 within("vision heads", *heads, 4096)?;

@@ -82,6 +82,11 @@ fn what_does_not_fit_is_named() {
             "unknown field `hf_model_name`",
         ),
         ("\"layers\": [1, 1, 1, 1]", "\"layers\": 12", "patch_size is missing"),
+        (
+            "\"layers\": [1, 1, 1, 1]",
+            "\"layers\": [1, 1, 1, 65]",
+            "vision layers is 65, must be 1 to 64",
+        ),
     ] {
         assert!(SMALL.contains(from), "{from}");
         let found = reason(&SMALL.replace(from, to));

@@ -1,0 +1,49 @@
+//! Texts of users of the engine: cameras, settings, messages.
+use crate::memory::bounded;
+use guardsplat_worker::embed::Preset;
+use guardsplat_worker::message::{MAX_BITS, Message};
+use guardsplat_worker::view::parse_cameras;
+
+/// `cameras.json` and `transforms.json`.
+pub fn cameras(data: &[u8]) {
+    for camera in bounded(data.len(), || parse_cameras(data)).unwrap_or_default() {
+        let numbers = [camera.fx, camera.fy, camera.cx, camera.cy]
+            .into_iter()
+            .chain(camera.translation);
+        assert!(numbers.chain(camera.rotation.into_iter().flatten()).all(f32::is_finite));
+        assert!(camera.width > 0 && camera.height > 0 && camera.fx > 0.0 && camera.fy > 0.0);
+    }
+}
+
+/// Settings of an embedding, as JSON.
+pub fn embed_settings(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let standard = Preset::Standard.settings();
+    if let Ok(settings) = bounded(data.len(), || standard.overridden(text)) {
+        settings.check().expect("settings that were taken are checked");
+        let all = serde_json::to_string(&settings).expect("settings are JSON");
+        // What single precision rounds to infinity or zero would not come back.
+        assert_eq!(
+            standard
+                .overridden(&all)
+                .expect("settings that were taken are taken again"),
+            settings
+        );
+    }
+}
+
+/// Messages in hexadecimal, of which the server and the worker must think alike.
+pub fn message(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    for bits in [1, 3, 4, 32, 33, MAX_BITS] {
+        let parsed = bounded(data.len(), || Message::parse(text, bits));
+        let checked = guardsplat_server::api::strangers::message(text, bits as u32);
+        assert_eq!(parsed.is_ok(), checked.is_ok(), "{bits} bits");
+        if let Ok(message) = parsed {
+            assert_eq!(
+                Message::parse(&message.to_string(), bits).expect("it is read back"),
+                message
+            );
+        }
+    }
+}
