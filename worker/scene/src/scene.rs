@@ -145,6 +145,11 @@ impl Scene {
         }
     }
 
+    /// The Gaussians alone: what else is kept of the file, which is as large, is let go at once.
+    pub fn into_gaussians(self) -> Gaussians {
+        self.gaussians
+    }
+
     /// The format that [`Scene::write`] writes.
     pub fn format(&self) -> Format {
         self.source.as_ref().map_or(Format::Ply, |source| source.format())

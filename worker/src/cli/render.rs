@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let scene = Scene::read_with(&arguments.input, bad_rows)?;
     let ignored = scene.ignored().cloned();
     limits.admit(&needs_to_render(SceneSize::of(&scene), rest.pictures))?;
-    let scene = scene.gaussians;
+    let scene = scene.into_gaussians();
     let cameras = match given {
         Some(cameras) => cameras,
         None => {

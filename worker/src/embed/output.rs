@@ -92,7 +92,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     // The rows that were bad are so in the marked file too, and no others may be.
     let marked = Scene::read_with(&aside, job.bad_rows).map_err(|e| named(e, job.output))?;
     check_geometry(job.output, &scene, &marked)?;
-    let marked = marked.gaussians;
+    let marked = marked.into_gaussians();
 
     let total = job.settings.verify.views;
     let verification = verify(engine, &scene.gaussians, &marked, job.message, job.settings, |done| {

@@ -44,9 +44,10 @@ pub fn read(
             admission::to_read(path, &engine.limits, rest)?;
             let scene = Scene::read_with(path, views.bad_rows)?;
             let ignored = scene.ignored().cloned();
+            let gaussians = scene.into_gaussians();
             let reading = read_scene(
                 engine,
-                &scene.gaussians,
+                &gaussians,
                 views.count,
                 size,
                 views.background,
