@@ -7,8 +7,8 @@ use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Largest header that is read, here and of other safetensors files. The largest published CLIP needs 0.1 MB. A shape of
-/// many ones takes ten times its text in memory.
-pub(crate) const MAX_HEADER_BYTES: u64 = 4 << 20;
+/// many ones takes up to forty times its text while it is parsed.
+pub(crate) const MAX_HEADER_BYTES: u64 = 1 << 20;
 
 /// Checks the length that a whole safetensors file states of its header, before somebody believes it.
 pub(crate) fn check_header(bytes: &[u8]) -> Result<(), String> {

@@ -196,13 +196,14 @@ mod tests {
                 found.contains("100000 x 100000 pixels are more than 64000000"),
                 "{window}: {found}"
             );
-            let found = reason(&with(window, 8, &i32::MAX.to_le_bytes()));
+            let found = reason(&with(window, 8, &(1i32 << 27).to_le_bytes()));
             assert!(found.contains("a window or block of"), "{window}: {found}");
         }
-        let long = reason(&with("dataWindow", 8, &4_000_000i32.to_le_bytes()));
+        // The encoder writes tiles of 64 by 64 pixels.
+        let tiles = reason(&with("tiles", 0, &(1u32 << 20).to_le_bytes()));
         assert!(
-            long.contains("blocks of") && long.contains("may have 4194304 at most"),
-            "{long}"
+            tiles.contains("blocks of 805306368 bytes") && tiles.contains("may have 4194304 at most"),
+            "{tiles}"
         );
         let high = reason(&with("dataWindow", 12, &4_000_000i32.to_le_bytes()));
         assert!(high.contains("truncated: a table of"), "{high}");
