@@ -1,5 +1,5 @@
 //! How the cost of every stage grows with Gaussians and pixels, as a table and a plot, on an otherwise idle machine:
-//! `cargo run --release --workspace --example bench_growth -- [--gaussians 1000,10000] [--sizes 112,400] [--wgpu] [--plot FILE.svg]`.
+//! `cargo run --release --example bench_growth -- [--gaussians 1000,10000] [--sizes 112,400] [--wgpu] [--plot FILE.svg]`.
 //!
 //! Scenes are samples of degree 3. Exponents are between neighbouring rows: 1 is linear, below 1 is better.
 use std::path::PathBuf;

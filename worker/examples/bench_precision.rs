@@ -1,5 +1,5 @@
 //! What cheaper arithmetic costs, as a table:
-//! `cargo run --release --workspace --example bench_precision -- SCENE KEY MESSAGE [PRESET]`.
+//! `cargo run --release --example bench_precision -- SCENE KEY MESSAGE [PRESET]`.
 //!
 //! For every setting the scene is marked and the file verified as `embed` does it; pictures and gradients of the first
 //! training views are compared with those in single precision, where the setting changes them.

@@ -1,5 +1,5 @@
 //! What it saves to model only what a scene requires, as a table:
-//! `cargo run --release --workspace --example bench_saved -- SCENE...`.
+//! `cargo run --release --example bench_saved -- SCENE...`.
 //!
 //! "All" is every Gaussian, with every band that the file has room for; "required" those that training views show, with
 //! the bands that are in use and that the file can change. Memory is of the coefficients in use and of what is learned

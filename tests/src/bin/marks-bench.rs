@@ -1,6 +1,6 @@
 //! Marks scenes and reads the marks back, as a table: what README says of marks is made by this.
 //!
-//! `cargo run --release --workspace --bin marks-bench -- SCENE[@PRESET]...` (which needs
+//! `cargo run --release --bin marks-bench -- SCENE[@PRESET]...` (which needs
 //! `cargo build --release --workspace` before); `sample:SEED` is a sample of 50,000 Gaussians. Key and message are always
 //! the same: 32 bits, seed 1, 8f3a5c71.
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Holds the memory that embeddings are predicted to need against their peaks, as a table.
 //!
-//! `cargo run --release --workspace --bin memory-bench` (which needs `cargo build --release --workspace` before).
+//! `cargo run --release --bin memory-bench` (which needs `cargo build --release --workspace` before).
 //! Arguments: numbers of Gaussians (1000 100000 1000000), and settings in JSON that replace those of the preset `standard`
 //! (only 40 steps, by which the kept views fill their room). Exits with 1 when a prediction is off by 20 % or more.
 use std::process::ExitCode;

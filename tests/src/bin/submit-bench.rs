@@ -1,6 +1,6 @@
 //! Measures submission: how long `CreateJob` takes over the wire while the queue fills, and the server's memory then.
 //!
-//! `cargo run --release --workspace --bin submit-bench` (which needs `cargo build --release --workspace` before).
+//! `cargo run --release --bin submit-bench` (which needs `cargo build --release --workspace` before).
 //! Arguments: how many jobs (1000), and how many callers at once (1). Exits with 1 when the 99th percentile is not
 //! under 50 ms, or the server needs 256 MB or more.
 use std::process::ExitCode;

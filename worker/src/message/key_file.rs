@@ -140,9 +140,9 @@ pub(super) fn read(path: &Path) -> Result<Key> {
 
 /// A key from the file's bytes, checked against its id.
 pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
-    let not_a_key = |e: safetensors::SafeTensorError| format!("not a key file, or a truncated one ({e})");
-    check_header(bytes)?;
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(not_a_key)?;
+    let not_a_key = |e: &dyn std::fmt::Display| format!("not a key file, or a truncated one ({e})");
+    check_header(bytes).map_err(|e| not_a_key(&e))?;
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| not_a_key(&e))?;
     let json = metadata.metadata().as_ref().and_then(|m| m.get(HEADER));
     let json = json.ok_or("a safetensors file, but not a key")?;
     #[derive(Deserialize)]
@@ -163,7 +163,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     let mut secret = [0; 32];
     hex::decode_to_slice(&header.secret, &mut secret).map_err(|_| "its secret is not 64 hexadecimal digits")?;
 
-    let file = SafeTensors::deserialize(bytes).map_err(not_a_key)?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| not_a_key(&e))?;
     let matrix = file.tensor("projection.matrix_image").map_err(|e| e.to_string())?;
     let &[width, rank] = matrix.shape() else {
         return Err("projection.matrix_image is not a matrix".into());

@@ -15,6 +15,8 @@ use std::path::Path;
 
 /// Longest camera file, bytes.
 const MAX_FILE: u64 = 64 << 20;
+/// Shortest text of a camera: a pose, whose fields are stated for all.
+const MIN_ENTRY: usize = 60;
 /// Widest and highest picture, pixels.
 const MAX_SIDE: f64 = 16384.0;
 /// Side of a picture of the NeRF synthetic set, whose files do not state it.
@@ -84,7 +86,8 @@ pub fn parse_cameras(text: &[u8]) -> Result<Vec<Camera>, String> {
     if count == 0 {
         return Err("has no cameras".into());
     }
-    let mut cameras = Vec::with_capacity(count);
+    // No more than the text has room for: most entries may turn out to be no cameras.
+    let mut cameras = Vec::with_capacity(count.min(text.len() / MIN_ENTRY));
     json::for_each(text, |own| {
         let camera = match shared {
             None => from_entry(&own),
