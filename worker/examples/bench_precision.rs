@@ -2,7 +2,7 @@
 //! `cargo run --release --example bench_precision -- SCENE KEY MESSAGE [PRESET]`.
 //!
 //! For every setting the scene is marked and the file verified as `embed` does it; pictures and gradients of the first
-//! training views are compared with those in single precision, where the setting changes them.
+//! training views are compared with those of the preset, pictures where they have the same pixels.
 use std::path::Path;
 use std::time::Instant;
 
@@ -11,6 +11,7 @@ use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::{Job, Preset, Settings, embed};
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::Key;
+use guardsplat_worker::picture::Picture;
 use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
 use guardsplat_worker::splat::{Learnable, WeightCache, prepare, sh};
 use guardsplat_worker::view::{Split, ViewSampler};
@@ -20,10 +21,10 @@ type Failure = Box<dyn std::error::Error>;
 /// Views whose pictures and gradients are compared.
 const VIEWS: u64 = 4;
 
-/// How a setting's pictures and gradients differ from single precision.
+/// How a setting's pictures and gradients differ from the preset's.
 struct Difference {
-    max: f64,
-    mean: f64,
+    max: Option<f64>,
+    mean: Option<f64>,
     cosine: f64,
     bias: f64,
 }
@@ -42,7 +43,7 @@ fn main() -> Result<(), Failure> {
     let engine = Engine::new(compute, clip, &key, None)?;
     let scene = Scene::read(Path::new(scene_path))?.gaussians;
     let cases = [
-        ("single precision", standard),
+        ("the preset: single precision, 160 px, drawn at up to 3 times", standard),
         (
             "weights in half precision",
             Settings {
@@ -87,19 +88,12 @@ fn main() -> Result<(), Failure> {
         };
         let outcome = embed(&engine, &job, &mut |_| {})?;
         let seconds = start.elapsed().as_secs_f64();
-        let compared = match settings.half_weights {
-            true => {
-                let d = differences(&engine, &scene, &settings)?;
-                format!(
-                    "{:.1e} | {:.1e} | 1 - {:.0e} | {:.0e}",
-                    d.max,
-                    d.mean,
-                    1.0 - d.cosine,
-                    d.bias
-                )
-            }
-            false => "- | - | - | -".to_owned(),
+        let d = differences(&engine, &scene, [&standard, &settings])?;
+        let picture = match (d.max, d.mean) {
+            (Some(max), Some(mean)) => format!("{max:.1e} | {mean:.1e}"),
+            _ => "- | -".to_owned(),
         };
+        let compared = format!("{picture} | 1 - {:.0e} | {:.0e}", 1.0 - d.cosine, d.bias);
         println!(
             "| {name} | {:.2} % | {:.2} dB | {seconds:.0} | {:.0} MB | {compared} |",
             100.0 * outcome.verification.comparison.bit_accuracy,
@@ -110,43 +104,61 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn differences(engine: &Engine, scene: &Gaussians, settings: &Settings) -> Result<Difference, Failure> {
-    let sampler = ViewSampler::new(scene, settings.seed)?;
+/// Views as the one and as the other setting draws them at their largest: their pictures, where these have the same pixels,
+/// and the gradient to the coefficients that comes of the same waves over both.
+fn differences(engine: &Engine, scene: &Gaussians, both: [&Settings; 2]) -> Result<Difference, Failure> {
+    let sampler = ViewSampler::new(scene, both[0].seed)?;
     let learnable = Learnable::all(scene);
     let rasterizer = engine.rasterizer()?;
     let (mut max, mut sum, mut count) = (0.0f64, 0.0, 0);
     let mut gradients = [vec![0.0; learnable.len()], vec![0.0; learnable.len()]];
     for index in 0..VIEWS {
-        let camera = sampler
-            .camera(Split::Training, index, settings.size)
-            .enlarged(settings.enlarged);
         let mut pictures = Vec::new();
-        for (cache, gradient) in [WeightCache::Weights, WeightCache::HalfWeights]
-            .into_iter()
-            .zip(&mut gradients)
-        {
-            let view = prepare(scene, &camera, cache)?;
+        for (settings, gradient) in both.into_iter().zip(&mut gradients) {
+            let camera = sampler.camera(Split::Training, index, settings.size);
+            let cache = if settings.half_weights {
+                WeightCache::HalfWeights
+            } else {
+                WeightCache::Weights
+            };
+            let view = prepare(scene, &camera.enlarged(settings.enlarged), cache)?;
             let colours = sh::colours(&scene.sh, None, &view);
-            let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
-            let signs: Vec<f32> = (0..picture.pixels.len()).map(|i| (i as f32 * 0.61).sin()).collect();
-            let of_colours = rasterizer.backward(&view, &signs)?;
+            let picture = rasterizer.render(&view, &colours, [1.0; 3])?.shrunk(settings.enlarged);
+            let waves = waves(picture.width).spread(settings.enlarged);
+            let of_colours = rasterizer.backward(&view, &waves.pixels)?;
             sh::backward(&learnable, &view, &colours, &of_colours, gradient);
             pictures.push(picture.pixels);
         }
-        for (a, b) in pictures[0].iter().zip(&pictures[1]) {
-            let difference = f64::from((a - b).abs());
-            max = max.max(difference);
-            sum += difference;
-            count += 1;
+        if pictures[0].len() == pictures[1].len() {
+            for (a, b) in pictures[0].iter().zip(&pictures[1]) {
+                let difference = f64::from((a - b).abs());
+                max = max.max(difference);
+                sum += difference;
+                count += 1;
+            }
         }
     }
-    let [single, half] = &gradients;
+    let [first, other] = &gradients;
     let product = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
     let total = |a: &[f32]| a.iter().map(|v| f64::from(v.abs())).sum::<f64>();
     Ok(Difference {
-        max,
-        mean: sum / f64::from(count),
-        cosine: product(single, half) / (product(single, single) * product(half, half)).sqrt(),
-        bias: (total(half) - total(single)) / total(single),
+        max: (count > 0).then_some(max),
+        mean: (count > 0).then_some(sum / f64::from(count)),
+        cosine: product(first, other) / (product(first, first) * product(other, other)).sqrt(),
+        bias: (total(other) - total(first)) / total(first),
     })
+}
+
+/// Some waves across a picture of any size, as the gradient of a sum that does not grow with its pixels.
+fn waves(side: u32) -> Picture {
+    let side_f = side as f32;
+    let pixels = (0..3 * side * side).map(|i| {
+        let (x, y) = ((i / 3 % side) as f32 + 0.5, (i / 3 / side) as f32 + 0.5);
+        ((40.0 * x + 25.0 * y) / side_f + (i % 3) as f32).sin() / side_f.powi(2)
+    });
+    Picture {
+        width: side,
+        height: side,
+        pixels: pixels.collect(),
+    }
 }
