@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, protos, lints, all tests, and a little fuzzing. Six to ten minutes on two cores when all
-# dependencies are built; building them takes some twenty more.
+# Checks everything: formatting, protos, lints, all tests, and a little fuzzing. Eighteen minutes on two cores when all
+# dependencies are built; building them takes some twenty-five more.
 # Scenes for the tests that want real ones are taken from $GUARDSPLAT_SCENES or ../shared/scenes; without them those
 # tests are skipped, unless CI is set.
 set -euo pipefail
