@@ -7,6 +7,10 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+if ! command -v c++ >/dev/null; then
+    echo "fuzz: the fuzzer is built with a C++ compiler, and there is none; Debian's package is g++" >&2
+    exit 1
+fi
 seconds=${1:-60}
 shift $(($# > 0))
 targets=("$@")

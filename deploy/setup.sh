@@ -38,10 +38,11 @@ install_packages() {
 
 # What only the tests need: npm for the check of the protos, Python for a client of another language, and kill as a
 # program, which a shell has built in, for tests that send signals. Without the first two those checks are skipped,
-# unless CI is set.
+# unless CI is set. The fuzzer is C++; a C compiler may be there without one for that.
 setup_tests() {
     local missing=()
     command -v npm >/dev/null || missing+=(npm)
+    command -v c++ >/dev/null || missing+=(g++)
     type -P kill >/dev/null || missing+=(procps)
     # The interpreter may be there without what makes an environment of its own.
     python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
