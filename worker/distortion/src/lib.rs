@@ -1,0 +1,1 @@
+//! Differentiable distortions of pictures, for training marks that stand them.

@@ -1,0 +1,1 @@
+//! What was measured, kept on disk as it comes in, and told as JSON, CSV and HTML with plots.

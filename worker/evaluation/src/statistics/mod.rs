@@ -1,0 +1,1 @@
+//! Confidence intervals, receiver operating characteristics, Pareto fronts.

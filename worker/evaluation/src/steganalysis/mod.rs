@@ -1,0 +1,1 @@
+//! Detectors of hidden messages in pictures.
