@@ -139,7 +139,7 @@ mod tests {
         assert!(wrong("embed IN --key K --message 0").contains("--output"));
         assert!(wrong("verify --key K").contains("PATH"));
         assert!(wrong("verify A --key K --views 0").contains("1..=10000"));
-        assert!(wrong("key create --bits 76").contains("1..=75"));
+        assert!(wrong("key create --bits 151").contains("1..=150"));
         assert!(wrong("embed IN -o O --key K --message 0 --size 8").contains("16..=4096"));
         let long = format!("key create --bits 8 --display-name {}", "é".repeat(64));
         assert!(wrong(&long).contains("64 characters, at most 63"));

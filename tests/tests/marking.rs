@@ -211,8 +211,8 @@ fn what_does_not_fit_the_key_is_refused() {
             &["no/out.ply"],
         ),
         (
-            "key create --bits 76 -o new.key --device cpu".into(),
-            &["bits", "1 to 75"],
+            "key create --bits 151 -o new.key --device cpu".into(),
+            &["bits", "1 to 150"],
         ),
         ("key create --bits 8 -o no/new.key --device cpu".into(), &["no/new.key"]),
         (

@@ -13,7 +13,7 @@ use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::Key;
 use guardsplat_worker::picture::Picture;
 use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
-use guardsplat_worker::splat::{Learnable, WeightCache, prepare, sh};
+use guardsplat_worker::splat::{Learnable, WeightCache, prepare_averaged, sh};
 use guardsplat_worker::view::{Split, ViewSampler};
 
 type Failure = Box<dyn std::error::Error>;
@@ -55,7 +55,7 @@ fn main() -> Result<(), Failure> {
         (
             "views drawn at their size only",
             Settings {
-                enlarged: 1,
+                enlarged: 1.0,
                 ..standard
             },
         ),
@@ -121,10 +121,10 @@ fn differences(engine: &Engine, scene: &Gaussians, both: [&Settings; 2]) -> Resu
             } else {
                 WeightCache::Weights
             };
-            let view = prepare(scene, &camera.enlarged(settings.enlarged), cache)?;
+            let view = prepare_averaged(scene, &camera, settings.enlarged, cache)?;
             let colours = sh::colours(&scene.sh, None, &view);
-            let picture = rasterizer.render(&view, &colours, [1.0; 3])?.shrunk(settings.enlarged);
-            let waves = waves(picture.width).spread(settings.enlarged);
+            let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
+            let waves = waves(picture.width);
             let of_colours = rasterizer.backward(&view, &waves.pixels)?;
             sh::backward(&learnable, &view, &colours, &of_colours, gradient);
             pictures.push(picture.pixels);

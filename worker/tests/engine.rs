@@ -41,13 +41,18 @@ fn new_key(compute: &Compute, seed: u64) -> Result<Key> {
 fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut(NewKey)) -> Result<Key> {
     let options = KeyOptions {
         bits: BITS,
+        bits_per_token: None,
         seed: Some(seed),
         training: TrainingOptions {
             noise: 0.2,
             ..TrainingOptions::default()
         },
     };
-    let fit = FitOptions { remove: 2, keep: None };
+    let fit = FitOptions {
+        remove: 2,
+        keep: None,
+        ranked: false,
+    };
     let identity = ClipIdentity {
         name: "tiny".into(),
         hash: "00".repeat(32),

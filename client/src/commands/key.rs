@@ -28,8 +28,8 @@ pub enum Command {
 /// Arguments of `key create`.
 #[derive(Args)]
 pub struct Create {
-    /// Bits of its messages, 1 to 75
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=75))]
+    /// Bits of its messages, 1 to 150
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=150))]
     bits: u32,
     /// Makes the key reproducible, and no more secret than this number; without it, it is drawn at random
     #[arg(long, value_name = "NUMBER")]

@@ -2,7 +2,7 @@
 use crate::error::{Error, Result};
 
 /// Most bits of a key.
-pub const MAX_BITS: u32 = 75;
+pub const MAX_BITS: u32 = 150;
 
 /// Checks that `text` is a message of exactly `bits` bits: ceil(`bits` / 4) hexadecimal digits, with or without `0x`,
 /// and zeros in the bits of the first digit that are too many.

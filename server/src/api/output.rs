@@ -12,7 +12,7 @@ use crate::artifacts::{Announced, ArtifactPath, Check};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactRow, JobKind, NewArtifact, Origin};
 
-/// Most bytes of a key file. One of 75 bits has less than 3 MiB.
+/// Most bytes of a key file. One of 150 bits has less than 3 MiB.
 const MAX_KEY_BYTES: u64 = 4 << 20;
 
 impl Api {

@@ -23,9 +23,12 @@ pub enum Command {
 
 #[derive(Args)]
 pub struct Create {
-    /// Bits of its messages, 1 to 75
+    /// Bits of its messages, 1 to 150
     #[arg(long)]
     bits: usize,
+    /// Bits that one CLIP token stands for, 1 to 4; unless given the fewest that make room
+    #[arg(long, hide_short_help = true)]
+    bits_per_token: Option<usize>,
     /// Makes the key reproducible, and no more secret than this number; without it, it is drawn at random
     #[arg(long)]
     seed: Option<u64>,
@@ -73,6 +76,7 @@ pub fn run(command: Command) -> Result<Exit> {
     };
     let options = KeyOptions {
         bits: arguments.bits,
+        bits_per_token: arguments.bits_per_token,
         seed: arguments.seed,
         training: TrainingOptions {
             noise: arguments.noise,

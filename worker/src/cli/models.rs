@@ -59,6 +59,24 @@ pub struct Train {
     /// Pairs a step
     #[arg(long, default_value_t = TrainOptions::default().batch)]
     batch: usize,
+    /// Filters a scale
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().filters)]
+    filters: usize,
+    /// Sides of the squares that are averaged into one pixel of a scale
+    #[arg(long, hide_short_help = true, value_delimiter = ',', default_values_t = TrainOptions::default().scales)]
+    scales: Vec<usize>,
+    /// Least norm of a filter, for pictures of unit deviation
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().norm[0])]
+    least_norm: f32,
+    /// Largest norm of a filter
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().norm[1])]
+    largest_norm: f32,
+    /// Width of the features
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().dims)]
+    dims: usize,
+    /// Width of the text tower
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().text_width)]
+    text_width: usize,
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
@@ -86,6 +104,11 @@ fn train(arguments: &Train) -> Result<Exit> {
         scenes: arguments.scenes,
         steps: arguments.steps,
         batch: arguments.batch,
+        filters: arguments.filters,
+        scales: arguments.scales.clone(),
+        norm: [arguments.least_norm, arguments.largest_norm],
+        dims: arguments.dims,
+        text_width: arguments.text_width,
     };
     let mut display = Display::new("scenes");
     let mut stage = 0;

@@ -105,7 +105,7 @@ mod tests {
     const SIZE: usize = 64;
 
     fn config() -> ClipConfig {
-        let mut config = crate::train::config();
+        let mut config = crate::train::config(&crate::train::TrainOptions::default());
         config.vision.image_size = SIZE;
         config.vision.width = 8;
         config.embed_dim = 6;
@@ -130,7 +130,7 @@ mod tests {
 
     /// A tower with filters as the shipped model has them.
     fn shipped_filters() -> StatisticsTower {
-        let (filters, phases) = crate::train::filters(8 * 3, 1);
+        let (filters, phases) = crate::train::filters(8 * 3, crate::train::NORM, 1);
         tower().with_filters(&filters, &phases)
     }
 

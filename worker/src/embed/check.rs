@@ -33,7 +33,7 @@ impl HeldOut {
         let indices: Vec<u64> = (first..first + stop.views as u64).collect();
         let views = engine.each(&indices, |&index| {
             let camera = sampler.camera(Split::HeldOut, index, size);
-            let mut view = PooledView::new(engine, gaussians, &camera, 1, settings.half_weights, [1.0; 3])?;
+            let mut view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?;
             view.reference = view.reference.to_8_bit();
             Ok(view)
         })?;

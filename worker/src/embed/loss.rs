@@ -1,6 +1,6 @@
 //! The part of the loss that is computed on pictures: reconstruction and message, and its gradient to the pictures.
 //!
-//! `reconstruction * (l1 * L1 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
+//! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
 //! of a step.
 use burn::tensor::{Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
@@ -63,9 +63,11 @@ impl<'a> Loss<'a> {
         let original = batch(references, device)?.clamp(0.0, 1.0);
         let original = Tensor::from_inner(original);
 
-        let l1 = (marked.clone() - original.clone()).abs().mean();
+        let difference = marked.clone() - original.clone();
+        let l1 = difference.clone().abs().mean();
+        let l2 = difference.square().mean();
         let ssim = -self.ssim.mean(original.clone(), marked.clone()) + 1.0;
-        let mut reconstruction = l1.clone() * lambda.l1 + ssim.clone() * lambda.ssim;
+        let mut reconstruction = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * lambda.ssim;
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
         let lpips = match lpips {
             Some(lpips) => {

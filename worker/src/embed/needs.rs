@@ -63,22 +63,14 @@ pub struct ViewSize {
 }
 
 impl ViewSize {
-    /// Measured on one training view of the largest size.
+    /// Measured on one training view that stands for a picture of its own size: those of larger ones have narrower splats.
     ///
     /// # Errors
     /// An empty scene, a failing device.
     pub fn measure(engine: &Engine, gaussians: &Gaussians, settings: &Settings) -> Result<Self> {
         let sampler = ViewSampler::new(gaussians, settings.seed)?;
         let camera = sampler.camera(Split::Training, 0, settings.size);
-        let view = PooledView::new(
-            engine,
-            gaussians,
-            &camera,
-            settings.enlarged,
-            settings.half_weights,
-            [1.0; 3],
-        )?
-        .view;
+        let view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?.view;
         Ok(Self::of(&view))
     }
 
@@ -89,7 +81,6 @@ impl ViewSize {
     pub fn on_cpu(gaussians: &Gaussians, settings: &Settings) -> Result<Self> {
         let sampler = ViewSampler::new(gaussians, settings.seed)?;
         let camera = sampler.camera(Split::Training, 0, settings.size);
-        let camera = camera.enlarged(settings.enlarged);
         let cache = cpu_weight_cache(camera.width, settings.half_weights);
         Ok(Self::of(&prepare(gaussians, &camera, cache)?))
     }
@@ -110,11 +101,9 @@ impl ViewSize {
     }
 }
 
-/// Mean pixels of a training view as it is drawn: at 1 to so many times its size.
+/// Pixels of a training view.
 fn drawn_pixels(settings: &Settings) -> f64 {
-    let times = f64::from(settings.enlarged);
-    let mean_square = (times + 1.0) * (2.0 * times + 1.0) / 6.0;
-    f64::from(settings.size).powi(2) * mean_square
+    f64::from(settings.size).powi(2)
 }
 
 /// Bytes of the models that are loaded.

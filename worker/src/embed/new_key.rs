@@ -35,7 +35,7 @@ pub enum NewKey {
 /// image features must be centred alike to be read by the same decoder. `projection` decides what it drops.
 ///
 /// # Errors
-/// A length outside 1 to 75, a CLIP without room for the key's sequences, too few pictures, those of the pictures, those
+/// A length outside its limits, a CLIP without room for the key's sequences, too few pictures, those of the pictures, those
 /// of [`train`], and [`Error::Stopped`].
 pub fn create_key(
     options: &KeyOptions,
@@ -48,15 +48,17 @@ pub fn create_key(
     mut progress: impl FnMut(NewKey),
 ) -> Result<Key> {
     crate::message::bits::check_bits(options.bits)?;
-    check_text_tower(clip, &identity, options.bits)?;
+    let bits_per_token = options.bits_per_token();
     let secret = match options.seed {
         Some(seed) => Secret::from_seed(seed),
         None => Secret::random()?,
     };
-    let table = TokenTable::new(secret.expose(), options.bits)?;
+    let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;
+    let length = table.positions() + 2;
+    check_text_tower(clip, &identity, length)?;
     let mut encode = |sequences: &[[i64; CONTEXT]]| {
         stop.check()?;
-        text_features(clip, compute, options.bits, sequences)
+        text_features(clip, compute, length, sequences)
     };
 
     let images = natural::features(clip, compute, pictures, stop, |done| {
@@ -76,6 +78,7 @@ pub fn create_key(
     Ok(Key {
         secret,
         seed: options.seed,
+        bits_per_token,
         clip: identity,
         projection,
         decoder: trained.weights,
@@ -104,8 +107,7 @@ fn fit_projection(
 }
 
 /// Features of token sequences. What follows the end token has no influence and is cut off.
-fn text_features(clip: &Clip, compute: &Compute, bits: usize, sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
-    let length = bits + 2;
+fn text_features(clip: &Clip, compute: &Compute, length: usize, sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
     let tokens: Vec<i64> = sequences.iter().flat_map(|s| &s[..length]).copied().collect();
     let tokens = TensorData::new(tokens, [sequences.len(), length]);
     let tokens = Tensor::<2, Int>::from_data(tokens, &compute.device);
@@ -116,16 +118,12 @@ fn text_features(clip: &Clip, compute: &Compute, bits: usize, sequences: &[[i64;
     })
 }
 
-fn check_text_tower(clip: &Clip, identity: &ClipIdentity, bits: usize) -> Result<()> {
+fn check_text_tower(clip: &Clip, identity: &ClipIdentity, length: usize) -> Result<()> {
     let text = &clip.config.text;
     let reason = if text.vocab_size < 49408 {
         format!("its vocabulary has {} tokens, keys use 49408", text.vocab_size)
-    } else if text.context_length < bits + 2 {
-        format!(
-            "its texts have {} tokens, {bits} bits need {}",
-            text.context_length,
-            bits + 2
-        )
+    } else if text.context_length < length {
+        format!("its texts have {} tokens, the key's need {length}", text.context_length)
     } else {
         return Ok(());
     };

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::adam::{Adam, Penalty};
 use super::balance::Balancer;
 use super::check::HeldOut;
+use super::descent::Descent;
 use super::learned::Learned;
 use super::loss::{Loss, finite};
 use super::pool::{Coverage, Pool, PooledView};
@@ -97,6 +98,12 @@ pub fn optimise(
     })
 }
 
+/// What moves the offsets.
+enum Optimiser {
+    Adam(Adam),
+    Descent(Descent),
+}
+
 /// The state of a run.
 struct Run<'a> {
     engine: &'a Engine,
@@ -104,7 +111,7 @@ struct Run<'a> {
     settings: &'a Settings,
     loss: Loss<'a>,
     pool: Pool,
-    adam: Adam,
+    optimiser: Optimiser,
     balancer: Balancer,
     augmentation: ChaCha8Rng,
     learned: Learned,
@@ -125,13 +132,20 @@ impl<'a> Run<'a> {
         let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
         augmentation.set_stream(u64::MAX - 1);
         let (rows, columns) = (learnable.rows().len(), learnable.columns());
+        let optimiser = match settings.descent {
+            Some(options) => {
+                let energies: Vec<f32> = learnable.rows().iter().map(|r| coverage.energies[*r as usize]).collect();
+                Optimiser::Descent(Descent::new(options, columns, &energies))
+            }
+            None => Optimiser::Adam(Adam::new(settings.adam, rows, columns, scene.gaussians.len())),
+        };
         let run = Self {
             engine,
             scene,
             settings,
             loss: Loss::new(engine, settings, message),
             pool,
-            adam: Adam::new(settings.adam, rows, columns, scene.gaussians.len()),
+            optimiser,
             balancer: Balancer::new(settings.balance),
             augmentation,
             gradient: vec![0.0; learnable.len()],
@@ -155,8 +169,14 @@ impl<'a> Run<'a> {
         figures.terms.offset = penalty.value(&self.learned.values, columns, gaussians) as f32;
         finite(step, "offset", figures.terms.offset)?;
         let rate = self.rate(step);
-        self.adam
-            .step(rate, penalty, &mut self.learned.values, &mut self.gradient);
+        let (offsets, gradient) = (&mut self.learned.values, &mut self.gradient);
+        match &mut self.optimiser {
+            Optimiser::Adam(adam) => adam.step(rate, penalty, offsets, gradient),
+            Optimiser::Descent(descent) => {
+                let pixels = 3.0 * (self.settings.size as f32).powi(2);
+                descent.step(rate, pixels, offsets, gradient);
+            }
+        }
         self.learned.settle(self.scene);
         self.balancer.update(figures.psnr_db, figures.bit_accuracy);
         timing.lap(Stage::Adam);
@@ -202,7 +222,8 @@ impl<'a> Run<'a> {
 
     /// Factor on the learning rates: a half cosine from 1 to the final rate.
     fn rate(&self, step: usize) -> f32 {
-        let last = self.settings.adam.final_rate;
+        let s = self.settings;
+        let last = s.descent.map_or(s.adam.final_rate, |d| d.final_rate);
         let turn = std::f32::consts::PI * (step - 1) as f32 / self.settings.steps as f32;
         last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
     }
@@ -247,6 +268,7 @@ mod tests {
         projection.matrix_image.iter_mut().for_each(|v| *v *= 8.0);
         let key = Key {
             secret: Secret::from_seed(1),
+            bits_per_token: 1,
             seed: None,
             clip: ClipIdentity {
                 name: String::new(),

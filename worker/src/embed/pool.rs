@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::extract::Engine;
 use crate::picture::Picture;
 use crate::scene::Gaussians;
-use crate::splat::{PreparedView, prepare, sh};
+use crate::splat::{PreparedView, prepare_averaged, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
@@ -26,44 +26,47 @@ const MOST_COVERING: usize = 128;
 pub(super) struct PooledView {
     pub view: PreparedView,
     background: [f32; 3],
-    /// The view is drawn so many times larger than its picture, and averaged down.
-    times: u32,
     /// The unmarked picture.
     pub reference: Picture,
 }
 
 impl PooledView {
-    /// `camera` has the size of the picture; `half` keeps what is drawn with in half precision.
+    /// `camera` has the size of the picture, which stands for one `times` as large, averaged down; `half` keeps what is
+    /// drawn with in half precision.
     pub fn new(
         engine: &Engine,
         gaussians: &Gaussians,
         camera: &Camera,
-        times: u32,
+        times: f32,
         half: bool,
         background: [f32; 3],
     ) -> Result<Self> {
-        let camera = camera.enlarged(times);
-        let view = prepare(gaussians, &camera, engine.weight_cache(camera.width, half))?;
+        let view = prepare_averaged(gaussians, camera, times, engine.weight_cache(camera.width, half))?;
         let colours = sh::colours(&gaussians.sh, None, &view);
-        let reference = engine.rasterizer()?.render(&view, &colours, background)?.shrunk(times);
+        let reference = engine.rasterizer()?.render(&view, &colours, background)?;
         Ok(Self {
             view,
             background,
-            times,
             reference,
         })
     }
 
     /// The picture with these colours of the visible Gaussians.
     pub fn draw(&self, engine: &Engine, colours: &[f32]) -> Result<Picture> {
-        let picture = engine.rasterizer()?.render(&self.view, colours, self.background)?;
-        Ok(picture.shrunk(self.times))
+        engine.rasterizer()?.render(&self.view, colours, self.background)
     }
 
     /// Takes a gradient to the picture back to these colours.
     pub fn backward(&self, engine: &Engine, gradient: &Picture) -> Result<Vec<f32>> {
-        let gradient = gradient.spread(self.times);
         engine.rasterizer()?.backward(&self.view, &gradient.pixels)
+    }
+
+    /// Of each visible Gaussian three times the sum over pixels of its weight times the cover of the pixel.
+    fn energies(&self, engine: &Engine) -> Result<Vec<f32>> {
+        let rasterizer = engine.rasterizer()?;
+        let ones = vec![1.0; 3 * self.view.visible.len()];
+        let cover = rasterizer.render(&self.view, &ones, [0.0; 3])?;
+        rasterizer.backward(&self.view, &cover.pixels)
     }
 
     fn bytes(&self) -> usize {
@@ -87,6 +90,9 @@ pub struct Coverage {
     pub views: usize,
     /// Whether any of them shows a Gaussian.
     pub seen: Vec<bool>,
+    /// Mean over them of the sum over pixels of a Gaussian's weight times the cover of the pixel: what a change of its
+    /// colour, together with that of its neighbours, costs in squares.
+    pub energies: Vec<f32>,
 }
 
 impl Coverage {
@@ -112,6 +118,7 @@ impl Pool {
     /// Fills the pool with the first views, as many as show every Gaussian that can be seen.
     pub fn cover(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<Coverage> {
         let mut seen = vec![false; gaussians.len()];
+        let mut energies = vec![0.0; gaussians.len()];
         let (mut views, mut count) = (0, 0);
         loop {
             let made = self.make(engine, gaussians, self.settings.views_per_step)?;
@@ -123,9 +130,15 @@ impl Pool {
                 *seen = true;
             }
             count += new;
+            for (view, energy) in made.iter().zip(engine.each(&made, |view| view.energies(engine))?) {
+                for (row, energy) in view.view.visible.iter().zip(energy.chunks_exact(3)) {
+                    energies[*row as usize] += energy[0];
+                }
+            }
             self.keep(made);
             if new as f64 <= NEWLY_SEEN * count as f64 || views >= MOST_COVERING {
-                return Ok(Coverage { views, seen });
+                energies.iter_mut().for_each(|e| *e /= views as f32);
+                return Ok(Coverage { views, seen, energies });
             }
         }
     }
@@ -188,11 +201,11 @@ impl Pool {
 
     /// Background and enlargement of a training view, seeded: white, or black for a share of the views; drawn at up to
     /// [`Settings::enlarged`] times its size.
-    fn chosen(&self, index: u64) -> ([f32; 3], u32) {
+    fn chosen(&self, index: u64) -> ([f32; 3], f32) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed.wrapping_add(1));
         rng.set_stream(index);
         let black = rng.random::<f32>() < self.settings.black_backgrounds;
-        let times = rng.random_range(1..=self.settings.enlarged);
+        let times = 1.0 + (self.settings.enlarged - 1.0) * rng.random::<f32>();
         (if black { [0.0; 3] } else { [1.0; 3] }, times)
     }
 }

@@ -23,6 +23,7 @@ struct Made {
 pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done> {
     let options = KeyOptions {
         bits: spec.bits as usize,
+        bits_per_token: None,
         seed: spec.seed,
         training: TrainingOptions::default(),
     };

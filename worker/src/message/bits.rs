@@ -1,12 +1,12 @@
-//! A message: up to 75 bits, most significant first, told in hexadecimal.
+//! A message: up to 150 bits, most significant first, told in hexadecimal.
 use std::fmt;
 
 use rand::Rng;
 
 use crate::error::{Error, Result};
 
-/// Most bits a message can have: CLIP's 77 text positions less the start and end tokens.
-pub const MAX_BITS: usize = 75;
+/// Most bits a message can have: two at each of [`POSITIONS`](super::tokens::POSITIONS).
+pub const MAX_BITS: usize = 150;
 
 /// Bits, most significant first; never empty and never longer than [`MAX_BITS`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -166,8 +166,8 @@ mod tests {
         assert!(reason("", 32).contains("shorter"));
         assert!(reason("1234567g", 32).contains("character 8 is 'g'"));
         assert!(reason("8", 3).contains("more than the key's 3 bits"));
-        assert!(reason("0", 0).contains("1 to 75"));
-        assert!(reason("0", 76).contains("1 to 75"));
+        assert!(reason("0", 0).contains("1 to 150"));
+        assert!(reason("0", 151).contains("1 to 150"));
         assert!(reason(&"f".repeat(1_000_000), 75).contains("1000000 hexadecimal digits"));
         assert!(reason("é", 4).contains("character 1"));
     }

@@ -9,8 +9,8 @@ use super::matrix::{congruence, dot, product};
 use super::projection::{MAX_WIDTH, Projection};
 use crate::error::{Error, Result};
 
-/// Smallest variance of text features that is believed, against the largest.
-const SMALLEST_TEXT_VARIANCE: f64 = 1e-4;
+/// Smallest variance of features that is believed, against the largest.
+const SMALLEST_VARIANCE: f64 = 1e-4;
 
 /// How to build a projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,11 +19,18 @@ pub struct FitOptions {
     pub remove: usize,
     /// Dimensions to keep: those of the rest along which texts vary most. `None` keeps all.
     pub keep: Option<usize>,
+    /// Features are ranked: a mark moves the first dimensions most, against how much they vary by themselves, and so on
+    /// down. Then nothing is removed, the first `keep` are kept, and natural variation is made alike in all of them.
+    pub ranked: bool,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { remove: 64, keep: None }
+        Self {
+            remove: 64,
+            keep: None,
+            ranked: false,
+        }
     }
 }
 
@@ -38,13 +45,11 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
     if width == 0 || width > MAX_WIDTH {
         return bad("width", format!("{width} is outside 1 to {MAX_WIDTH}"));
     }
-    if options.remove >= width {
-        return bad(
-            "remove",
-            format!("{} directions leave nothing of {width}", options.remove),
-        );
+    let remove = if options.ranked { 0 } else { options.remove };
+    if remove >= width {
+        return bad("remove", format!("{remove} directions leave nothing of {width}"));
     }
-    let rest = width - options.remove;
+    let rest = width - remove;
     let rank = options.keep.unwrap_or(rest);
     if rank == 0 || rank > rest {
         return bad("keep", format!("{rank} is outside 1 to {rest}"));
@@ -52,32 +57,53 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
     let (mean_image, image) = covariance("image features", images, width)?;
     let (mean_text, text) = covariance("text features", texts, width)?;
     let samples = images.len() / width;
-    if samples <= options.remove + 1 {
-        return bad(
-            "remove",
-            format!("{samples} pictures do not show {} directions", options.remove),
-        );
+    if samples <= remove + 1 {
+        return bad("remove", format!("{samples} pictures do not show {remove} directions"));
     }
 
-    let natural = decompose(image.clone(), width)?;
-    let mut basis = natural[options.remove * width..].to_vec(); // rest x width, orthonormal rows
-    if rank < rest {
-        let turn = decompose(congruence(&basis, &text, width), rest)?;
-        basis = product(&turn[..rank * rest], &basis, rest, width);
-    }
+    let basis = match options.ranked {
+        true => first_axes(rank, width),
+        false => strongest_texts(&image, &text, width, remove, rank)?,
+    };
     let (image, text) = (congruence(&basis, &image, width), congruence(&basis, &text, width));
-    let image_scale = unit_spread("image", &image, rank)?;
-    let whitener = whitener(text, rank)?;
-    let scaled: Vec<f64> = image.iter().map(|c| c * image_scale * image_scale).collect();
+    let to_image = match options.ranked {
+        true => whitener("image", &image, rank)?,
+        false => scaled_identity(unit_spread("image", &image, rank)?, rank),
+    };
+    let to_text = whitener("text", &text, rank)?;
     Ok(Projection {
         width,
         rank,
         mean_image: mean_image.iter().map(|&v| v as f32).collect(),
         mean_text: mean_text.iter().map(|&v| v as f32).collect(),
-        matrix_image: transposed(&basis, width, image_scale),
-        matrix_text: transposed(&product(&whitener, &basis, rank, width), width, 1.0),
-        noise: cholesky(scaled, rank),
+        matrix_image: transposed(&product(&to_image, &basis, rank, width), width),
+        matrix_text: transposed(&product(&to_text, &basis, rank, width), width),
+        noise: cholesky(congruence(&to_image, &image, rank), rank),
     })
+}
+
+/// The first `rank` axes, `[rank][width]`.
+fn first_axes(rank: usize, width: usize) -> Vec<f64> {
+    (0..rank * width)
+        .map(|i| f64::from(u8::from(i / width == i % width)))
+        .collect()
+}
+
+/// Without the `remove` directions in which natural pictures vary most, the `rank` ones along which texts vary most,
+/// `[rank][width]`, orthonormal rows.
+fn strongest_texts(image: &[f64], text: &[f64], width: usize, remove: usize, rank: usize) -> Result<Vec<f64>> {
+    let rest = width - remove;
+    let natural = decompose(image.to_vec(), width)?;
+    let basis = natural[remove * width..].to_vec();
+    if rank == rest {
+        return Ok(basis);
+    }
+    let turn = decompose(congruence(&basis, text, width), rest)?;
+    Ok(product(&turn[..rank * rest], &basis, rest, width))
+}
+
+fn scaled_identity(scale: f64, n: usize) -> Vec<f64> {
+    (0..n * n).map(|i| if i / n == i % n { scale } else { 0.0 }).collect()
 }
 
 /// Mean and covariance (`width` x `width`) of feature rows.
@@ -126,12 +152,12 @@ fn no_directions() -> Error {
     }
 }
 
-/// The symmetric matrix that gives text features of this covariance the same variance in every direction, and unit
-/// spread. Messages of one key fill a few directions only; natural variation would hide what the others tell.
-fn whitener(text: Vec<f64>, n: usize) -> Result<Vec<f64>> {
-    unit_spread("text", &text, n)?;
-    let eigen = eigen::symmetric(text.clone(), n).ok_or_else(no_directions)?;
-    let floor = eigen.values[0] * SMALLEST_TEXT_VARIANCE;
+/// The symmetric matrix that gives features of this covariance the same variance in every direction, and unit spread.
+/// Messages of one key fill a few directions only; natural variation would hide what the others tell.
+fn whitener(what: &str, covariance: &[f64], n: usize) -> Result<Vec<f64>> {
+    unit_spread(what, covariance, n)?;
+    let eigen = eigen::symmetric(covariance.to_vec(), n).ok_or_else(no_directions)?;
+    let floor = eigen.values[0] * SMALLEST_VARIANCE;
     let mut out = vec![0.0; n * n];
     for (row, value) in eigen.vectors.chunks_exact(n).zip(&eigen.values) {
         let factor = 1.0 / value.max(floor).sqrt();
@@ -140,7 +166,7 @@ fn whitener(text: Vec<f64>, n: usize) -> Result<Vec<f64>> {
         }
     }
     // Directions under the floor are not brought up to the others: scale to unit spread all the same.
-    let spread = unit_spread("text", &congruence(&out, &text, n), n)?;
+    let spread = unit_spread(what, &congruence(&out, covariance, n), n)?;
     out.iter_mut().for_each(|v| *v *= spread);
     Ok(out)
 }
@@ -165,10 +191,10 @@ fn unit_spread(what: &str, covariance: &[f64], n: usize) -> Result<f64> {
     Ok((n as f64 / trace).sqrt())
 }
 
-/// `scale * B^T` as f32: columns are the basis vectors.
-fn transposed(basis: &[f64], width: usize, scale: f64) -> Vec<f32> {
+/// `B^T` as f32: columns are the rows of B.
+fn transposed(basis: &[f64], width: usize) -> Vec<f32> {
     (0..width)
-        .flat_map(|i| basis.iter().skip(i).step_by(width).map(move |v| (scale * v) as f32))
+        .flat_map(|i| basis.iter().skip(i).step_by(width).map(|v| *v as f32))
         .collect()
 }
 
@@ -224,7 +250,17 @@ mod tests {
     #[test]
     fn strong_natural_directions_vanish_and_spreads_agree() {
         let (images, texts) = features();
-        let p = fit(&images, &texts, WIDTH, FitOptions { remove: 2, keep: None }).unwrap();
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: None,
+                ranked: false,
+            },
+        )
+        .unwrap();
         p.check().unwrap();
         assert_eq!((p.width, p.rank), (WIDTH, 10));
         for matrix in [&p.matrix_image, &p.matrix_text] {
@@ -245,6 +281,7 @@ mod tests {
             FitOptions {
                 remove: 2,
                 keep: Some(9),
+                ranked: false,
             },
         )
         .unwrap();
@@ -261,7 +298,17 @@ mod tests {
     fn noise_has_the_covariance_of_projected_pictures() {
         let (images, texts) = features();
         for keep in [None, Some(4)] {
-            let p = fit(&images, &texts, WIDTH, FitOptions { remove: 3, keep }).unwrap();
+            let p = fit(
+                &images,
+                &texts,
+                WIDTH,
+                FitOptions {
+                    remove: 3,
+                    keep,
+                    ranked: false,
+                },
+            )
+            .unwrap();
             let covariance = check_spread(&p.project_image(&images), p.rank);
             let f: Vec<f64> = p.noise.iter().map(|&v| f64::from(v)).collect();
             for (i, row) in f.chunks_exact(p.rank).enumerate() {
@@ -283,6 +330,7 @@ mod tests {
             FitOptions {
                 remove: 2,
                 keep: Some(9),
+                ranked: false,
             },
         )
         .unwrap();
@@ -296,14 +344,28 @@ mod tests {
     fn fewer_pictures_than_dimensions_are_enough() {
         let (_, texts) = features();
         let images = rows(6, 4, 0.0, |_| 1.0);
-        let p = fit(&images, &texts, WIDTH, FitOptions { remove: 2, keep: None }).unwrap();
+        let p = fit(
+            &images,
+            &texts,
+            WIDTH,
+            FitOptions {
+                remove: 2,
+                keep: None,
+                ranked: false,
+            },
+        )
+        .unwrap();
         p.check().unwrap();
     }
 
     #[test]
     fn bad_input_is_refused() {
         let (images, texts) = features();
-        let options = |remove, keep| FitOptions { remove, keep };
+        let options = |remove, keep| FitOptions {
+            remove,
+            keep,
+            ranked: false,
+        };
         let reason = |i: &[f32], t: &[f32], o| fit(i, t, WIDTH, o).unwrap_err().to_string();
         assert!(reason(&images, &texts, options(12, None)).contains("leave nothing of 12"));
         assert!(reason(&images, &texts, options(2, Some(11))).contains("1 to 10"));

@@ -12,7 +12,7 @@ use super::decoder::DecoderWeights;
 use super::key_file;
 use super::projection::Projection;
 use super::reader::Reader;
-use super::tokens::{CONTEXT, TokenTable, hmac_sha256};
+use super::tokens::{CONTEXT, TokenTable, fewest_bits_per_token, hmac_sha256};
 use super::training::{Progress, TrainingOptions, train};
 use crate::error::{Error, Result};
 use crate::stop::Stop;
@@ -29,12 +29,21 @@ pub struct ClipIdentity {
 /// What a key is made from, besides a CLIP.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyOptions {
-    /// Bits of its messages, 1 to 75.
+    /// Bits of its messages, 1 to [`MAX_BITS`](super::bits::MAX_BITS).
     pub bits: usize,
+    /// Bits that one CLIP token stands for; `None` takes the fewest that make room.
+    pub bits_per_token: Option<usize>,
     /// Makes the key reproducible, and only as secret as the seed; `None` asks the operating system for a secret.
     pub seed: Option<u64>,
     /// How to train the decoder; its own seed is replaced.
     pub training: TrainingOptions,
+}
+
+impl KeyOptions {
+    /// Bits a token, as asked for or the fewest that make room.
+    pub fn bits_per_token(&self) -> usize {
+        self.bits_per_token.unwrap_or(fewest_bits_per_token(self.bits))
+    }
 }
 
 /// 32 secret bytes that do not show up in logs.
@@ -81,6 +90,8 @@ pub struct Key {
     pub secret: Secret,
     /// The seed that the secret came from, if it did.
     pub seed: Option<u64>,
+    /// Bits that one CLIP token stands for.
+    pub bits_per_token: usize,
     /// The CLIP whose features the decoder reads.
     pub clip: ClipIdentity,
     /// What happens to features before the decoder.
@@ -115,7 +126,8 @@ impl Key {
             Some(seed) => Secret::from_seed(seed),
             None => Secret::random()?,
         };
-        let table = TokenTable::new(secret.expose(), options.bits)?;
+        let bits_per_token = options.bits_per_token();
+        let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;
         // The training's seed follows from the secret, so that one seed decides the whole file.
         let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
         let seed = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
@@ -127,6 +139,7 @@ impl Key {
         Ok(Self {
             secret,
             seed: options.seed,
+            bits_per_token,
             clip,
             projection,
             decoder: trained.weights,
@@ -148,13 +161,18 @@ impl Key {
             .map(key_file::Named::little_endian)
             .collect();
         let mut parts: Vec<&[u8]> = vec![b"guardsplat key id v1", &bits, self.clip.hash.as_bytes()];
+        // Keys of one bit a token came first, and keep their names.
+        let per_token = [self.bits_per_token as u8];
+        if self.bits_per_token != 1 {
+            parts.extend([b" bits a token ".as_slice(), &per_token]);
+        }
         parts.extend(tensors.iter().map(Vec::as_slice));
         hex::encode(&hmac_sha256(self.secret.expose(), &parts)[..16])
     }
 
     /// The key's token table.
     pub fn tokens(&self) -> Result<TokenTable> {
-        TokenTable::new(self.secret.expose(), self.bits())
+        TokenTable::new(self.secret.expose(), self.bits(), self.bits_per_token)
     }
 
     /// Parses a message of the key's length from hexadecimal.
@@ -235,6 +253,7 @@ mod tests {
         };
         let options = KeyOptions {
             bits: 8,
+            bits_per_token: None,
             seed,
             training,
         };

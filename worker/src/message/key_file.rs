@@ -11,6 +11,7 @@ use super::bits::MAX_BITS;
 use super::decoder::{DecoderWeights, HIDDEN, LayerWeights};
 use super::key::{ClipIdentity, Key, Secret};
 use super::projection::Projection;
+use super::tokens::check_bits_per_token;
 use crate::clip::check_header;
 use crate::error::{Error, Result};
 
@@ -26,11 +27,18 @@ struct Header {
     version: u32,
     id: String,
     bits: usize,
+    #[serde(default = "one")]
+    bits_per_token: usize,
     secret: String,
     seed: Option<u64>,
     clip: ClipIdentity,
     accuracy_unseen: Option<f64>,
     accuracy_unseen_noisy: Option<f64>,
+}
+
+/// Keys of more than one bit a token came later.
+fn one() -> usize {
+    1
 }
 
 /// One tensor of a key.
@@ -97,6 +105,7 @@ pub(super) fn serialize(key: &Key) -> Result<Vec<u8>, String> {
         version: VERSION,
         id: key.id(),
         bits: key.bits(),
+        bits_per_token: key.bits_per_token,
         secret: hex::encode(key.secret.expose()),
         seed: key.seed,
         clip: key.clip.clone(),
@@ -160,6 +169,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     if !(1..=MAX_BITS).contains(&header.bits) {
         return Err(format!("{} bits are outside 1 to {MAX_BITS}", header.bits));
     }
+    check_bits_per_token(header.bits, header.bits_per_token).map_err(|e| e.to_string())?;
     let mut secret = [0; 32];
     hex::decode_to_slice(&header.secret, &mut secret).map_err(|_| "its secret is not 64 hexadecimal digits")?;
 
@@ -199,6 +209,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     let key = Key {
         secret: Secret::new(secret),
         seed: header.seed,
+        bits_per_token: header.bits_per_token,
         clip: header.clip,
         projection,
         decoder,
@@ -244,6 +255,7 @@ mod tests {
         Key {
             secret: Secret::from_seed(5),
             seed: Some(5),
+            bits_per_token: 1,
             clip: ClipIdentity {
                 name: "tiny".into(),
                 hash: "ab".repeat(32),
@@ -329,7 +341,7 @@ mod tests {
         };
         assert!(start > 0);
         assert!(with(b"version\\\":1", b"version\\\":2").contains("version 2"));
-        assert!(with(b"bits\\\":32", b"bits\\\":99").contains("99 bits are outside 1 to 75"));
+        assert!(with(b"bits\\\":32", b"bits\\\":99").contains("1 is outside 2 to 4"));
         assert!(with(b"bits\\\":32", b"bits\\\":31").contains("decoder.2.weight is F32 [256, 32]"));
         assert!(with(b"guardsplat_key", b"guardsplat_kex").contains("not a key"));
         assert!(with(b"projection.noise", b"projection.moise").contains("projection.noise is missing"));

@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn unseen_messages_are_read_and_the_seed_decides() {
-        let table = TokenTable::new(&[9; 32], 16).unwrap();
+        let table = TokenTable::new(&[9; 32], 16, 1).unwrap();
         let projection = projection(&table, 0.1);
         let run = |seed| {
             let options = TrainingOptions { seed, ..options() };
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn noise_costs_accuracy_and_none_costs_none() {
-        let table = TokenTable::new(&[9; 32], 16).unwrap();
+        let table = TokenTable::new(&[9; 32], 16, 1).unwrap();
         let run = |noise| {
             train(
                 &table,
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn one_bit_has_nothing_unseen() {
-        let table = TokenTable::new(&[9; 32], 1).unwrap();
+        let table = TokenTable::new(&[9; 32], 1, 1).unwrap();
         let trained = train(
             &table,
             &projection(&table, 0.0),
@@ -338,7 +338,7 @@ mod tests {
 
     #[test]
     fn failures_are_errors() {
-        let table = TokenTable::new(&[9; 32], 8).unwrap();
+        let table = TokenTable::new(&[9; 32], 8, 1).unwrap();
         let p = Projection::identity(WIDTH);
         let run = |encode: fn(&[[i64; CONTEXT]]) -> Result<Vec<f32>>, options: &TrainingOptions| {
             train(&table, &p, encode, options, &Device::flex(), &Stop::default(), |_| {})
@@ -358,7 +358,7 @@ mod tests {
 
     #[test]
     fn progress_is_told_to_the_end() {
-        let table = TokenTable::new(&[9; 32], 8).unwrap();
+        let table = TokenTable::new(&[9; 32], 8, 1).unwrap();
         let mut told = Vec::new();
         let options = TrainingOptions {
             epochs: Some(1),

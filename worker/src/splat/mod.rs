@@ -24,7 +24,7 @@ use crate::picture::Picture;
 pub use cpu::CpuRasterizer;
 pub use gpu::GpuRasterizer;
 pub use learnable::{Changes, Learnable};
-pub use prepare::{PrepareTimes, PreparedView, WeightCache, prepare, prepare_timed};
+pub use prepare::{PrepareTimes, PreparedView, WeightCache, prepare, prepare_averaged, prepare_timed};
 pub use project::Splat2d;
 pub use tiles::{MAX_PAIRS, TILE, TileLists};
 

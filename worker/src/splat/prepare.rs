@@ -112,6 +112,20 @@ pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Re
     prepare_timed(gaussians, camera, cache).map(|(view, _)| view)
 }
 
+/// [`prepare`] for a view that stands for a picture `times` as large, at least 1, averaged down to the camera's size, at
+/// the cost of the small one. Splats have no finer detail than their width in both, so this is near, not exact.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_averaged(
+    gaussians: &Gaussians,
+    camera: &Camera,
+    times: f32,
+    cache: WeightCache,
+) -> Result<PreparedView> {
+    prepare_with(gaussians, camera, f64::from(times.max(1.0)), cache).map(|(view, _)| view)
+}
+
 /// [`prepare`], and where its time went.
 ///
 /// # Errors
@@ -121,11 +135,20 @@ pub fn prepare_timed(
     camera: &Camera,
     cache: WeightCache,
 ) -> Result<(PreparedView, PrepareTimes)> {
+    prepare_with(gaussians, camera, 1.0, cache)
+}
+
+fn prepare_with(
+    gaussians: &Gaussians,
+    camera: &Camera,
+    larger: f64,
+    cache: WeightCache,
+) -> Result<(PreparedView, PrepareTimes)> {
     check_camera(camera)?;
     let mut clock = Instant::now();
     let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed();
     let mut times = PrepareTimes::default();
-    let projector = Projector::new(camera);
+    let projector = Projector::new(camera, larger);
     let n = gaussians.len();
     let chunks: Vec<Vec<(u32, (Splat2d, TileRect))>> = (0..n.div_ceil(CHUNK))
         .into_par_iter()

@@ -8,6 +8,8 @@ use bytemuck::{Pod, Zeroable};
 pub const NEAR: f32 = 0.2;
 /// Added to the diagonal of the 2D covariance, in square pixels: no splat is thinner than about a pixel.
 pub const LOW_PASS: f64 = 0.3;
+/// Variance of a pixel's area about its middle, in square pixels.
+const PIXEL: f64 = 1.0 / 12.0;
 /// Smallest contribution that is drawn.
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 /// Log scales are clamped to this: far beyond any scene, and its fourth power is still finite.
@@ -62,10 +64,21 @@ pub(crate) struct Projector {
     limit: [f64; 2],
     centre: [f64; 3],
     tiles: [u32; 2],
+    /// Low pass of the larger picture that the view stands for, in the view's square pixels.
+    fine: f64,
+    /// That, and the mean over the view's pixels.
+    low_pass: f64,
 }
 
 impl Projector {
-    pub fn new(camera: &Camera) -> Self {
+    /// For a view that stands for a picture `times` as large, averaged down to the camera's size; at 1 for itself.
+    ///
+    /// Splats of the larger picture are widened by its own pixels only, and then by the mean over a pixel of the view,
+    /// whose box is replaced by the normal distribution of its variance; the mean keeps a splat's sum, so its opacity
+    /// falls as its area grows.
+    pub fn new(camera: &Camera, times: f64) -> Self {
+        let share = times.powi(-2);
+        let fine = LOW_PASS * share;
         let rotation = camera.rotation.map(|r| r.map(f64::from));
         let translation = camera.translation.map(f64::from);
         let focal = [camera.fx, camera.fy].map(f64::from);
@@ -78,6 +91,8 @@ impl Projector {
             limit: std::array::from_fn(|k| 1.3 * f64::from(size[k]) / (2.0 * focal[k])),
             centre: std::array::from_fn(|k| -(0..3).map(|r| rotation[r][k] * translation[r]).sum::<f64>()),
             tiles: size.map(|s| s.div_ceil(TILE)),
+            fine,
+            low_pass: fine + PIXEL * (1.0 - share),
         }
     }
 
@@ -106,21 +121,26 @@ impl Projector {
         if !(t[2] > f64::from(NEAR) && t[2].is_finite()) {
             return None;
         }
-        let opacity = gaussians.opacity(row);
-        let reach = 2.0 * (255.0 * f64::from(opacity)).ln();
-        if reach.is_nan() || reach < -1e-4 {
-            return None;
-        }
         let inverse_depth = 1.0 / (t[2] + 1e-7);
         let mean: [f64; 2] = std::array::from_fn(|k| self.focal[k] * t[k] * inverse_depth + self.principal[k] - 0.5);
         let m = self.footprint(t, rotation(gaussians.rotations[row]), gaussians.log_scales[row]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (plain_xx, xy, plain_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
-        let (xx, yy) = (plain_xx + LOW_PASS, plain_yy + LOW_PASS);
+        let low_pass = self.low_pass;
+        let (xx, yy) = (plain_xx + low_pass, plain_yy + low_pass);
         // Cauchy-Binet: det(M M^T) is the sum of the squared minors of M, which does not cancel.
         let minor = |i: usize, j: usize| m[0][i] * m[1][j] - m[0][j] * m[1][i];
         let minors = minor(0, 1).powi(2) + minor(0, 2).powi(2) + minor(1, 2).powi(2);
-        let det = LOW_PASS * LOW_PASS + LOW_PASS * (plain_xx + plain_yy) + minors;
+        let determinant = |low_pass: f64| low_pass * low_pass + low_pass * (plain_xx + plain_yy) + minors;
+        let det = determinant(low_pass);
+        let mut opacity = gaussians.opacity(row);
+        if self.fine < low_pass {
+            opacity *= (determinant(self.fine) / det).sqrt() as f32;
+        }
+        let reach = 2.0 * (255.0 * f64::from(opacity)).ln();
+        if reach.is_nan() || reach < -1e-4 {
+            return None;
+        }
         let half = 0.5 * (xx - yy);
         let largest = 0.5 * (xx + yy) + (half * half + xy * xy).max(0.1).sqrt();
         let radius = (3.0 * largest.sqrt()).ceil();

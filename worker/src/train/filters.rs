@@ -12,11 +12,11 @@ pub(crate) const KERNEL: usize = 1;
 /// by a radian. With weaker filters, colours that differ from view to view and from scene to scene weigh more than
 /// what a mark adds, above all on smooth surfaces; with stronger ones, the shading of a surface and the mixture of
 /// colours in a pixel turn the sine too far from view to view.
-const NORM: [f32; 2] = [14.0, 28.0];
+pub(crate) const NORM: [f32; 2] = [14.0, 28.0];
 
 /// Filters `[count][3][KERNEL][KERNEL]` and phases `[count]`. From black to white a filter makes whole turns, and its
 /// phase makes black 0, so that a ground of either adds nothing to an average, however much of it is seen.
-pub(crate) fn filters(count: usize, seed: u64) -> (Vec<f32>, Vec<f32>) {
+pub(crate) fn filters(count: usize, norm: [f32; 2], seed: u64) -> (Vec<f32>, Vec<f32>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Normalization { mean, std } = Normalization::default();
     let black_to_white = std.map(f32::recip);
@@ -26,7 +26,7 @@ pub(crate) fn filters(count: usize, seed: u64) -> (Vec<f32>, Vec<f32>) {
     for _ in 0..count {
         let direction: [f32; 3] = std::array::from_fn(|_| (0..4).map(|_| rng.random_range(-1.0..1.0_f32)).sum()); // nearly normal
         let length = direction.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
-        let norm = NORM[0] * (NORM[1] / NORM[0]).powf(rng.random());
+        let norm = norm[0] * (norm[1] / norm[0]).powf(rng.random());
         let wave = direction.map(|v| norm * v / length);
         let angle = dot(&wave, &black_to_white);
         let change = ((angle / TAU).round() * TAU - angle) / squares;
@@ -48,19 +48,19 @@ mod tests {
 
     #[test]
     fn norms_stay_near_their_limits_and_the_seed_decides() {
-        let (weights, phases) = filters(50, 3);
+        let (weights, phases) = filters(50, NORM, 3);
         for filter in weights.chunks_exact(3) {
             let norm = filter.iter().map(|v| v * v).sum::<f32>().sqrt();
             // Whole turns from black to white move a filter by less than half a turn over their distance.
             assert!((NORM[0] - 0.5..NORM[1] + 0.5).contains(&norm), "{norm}");
         }
-        assert_eq!(filters(50, 3), (weights.clone(), phases));
-        assert_ne!(filters(50, 4).0, weights);
+        assert_eq!(filters(50, NORM, 3), (weights.clone(), phases));
+        assert_ne!(filters(50, NORM, 4).0, weights);
     }
 
     #[test]
     fn black_and_white_are_nothing() {
-        let (weights, phases) = filters(50, 3);
+        let (weights, phases) = filters(50, NORM, 3);
         let Normalization { mean, std } = Normalization::default();
         for (wave, phase) in weights.as_chunks::<3>().0.iter().zip(phases) {
             for level in [0.0, 1.0] {

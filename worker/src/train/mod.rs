@@ -19,7 +19,7 @@ mod steering;
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
 #[cfg(test)]
-pub(crate) use filters::filters;
+pub(crate) use filters::{NORM, filters};
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
@@ -28,7 +28,7 @@ use crate::error::{Error, Result};
 use burn::tensor::Tensor;
 
 /// How to train.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrainOptions {
     /// Decides everything that is random.
     pub seed: u64,
@@ -38,6 +38,16 @@ pub struct TrainOptions {
     pub steps: usize,
     /// Pairs a step.
     pub batch: usize,
+    /// Filters a scale.
+    pub filters: usize,
+    /// Sides of the squares that are averaged into one pixel of a scale.
+    pub scales: Vec<usize>,
+    /// Least and largest norm of a filter; see [`filters`].
+    pub norm: [f32; 2],
+    /// Width of the features.
+    pub dims: usize,
+    /// Width of the text tower.
+    pub text_width: usize,
 }
 
 impl Default for TrainOptions {
@@ -47,6 +57,11 @@ impl Default for TrainOptions {
             scenes: 640,
             steps: 200,
             batch: 64,
+            filters: 128,
+            scales: vec![1, 2, 4],
+            norm: filters::NORM,
+            dims: 96,
+            text_width: 128,
         }
     }
 }
@@ -79,36 +94,30 @@ pub struct TrainedClip {
 
 /// Side of the pictures that the model takes.
 const IMAGE_SIZE: usize = 160;
-/// Filters a scale.
-const FILTERS: usize = 128;
-/// Sides of the squares that are averaged into one pixel of a scale.
-const SCALES: [usize; 3] = [1, 2, 4];
-/// Width of the features.
-const EMBED_DIM: usize = 96;
 
-/// The sizes of the model that is shipped.
-pub fn config() -> ClipConfig {
+/// The sizes of the model that these options make.
+pub fn config(options: &TrainOptions) -> ClipConfig {
     let blocks = BlockConfig {
         layers: 2,
         heads: 2,
-        mlp_width: 512,
+        mlp_width: 4 * options.text_width,
         activation: Activation::QuickGelu,
         norm_epsilon: 1e-5,
     };
     ClipConfig {
-        embed_dim: EMBED_DIM,
+        embed_dim: options.dims,
         vision: VisionConfig {
             image_size: IMAGE_SIZE,
-            width: FILTERS,
+            width: options.filters,
             tower: VisionTower::Statistics {
-                scales: SCALES.to_vec(),
+                scales: options.scales.clone(),
                 kernel: filters::KERNEL,
             },
         },
         text: TextConfig {
             context_length: 77,
             vocab_size: 49408,
-            width: 128,
+            width: options.text_width,
             blocks,
             end: EndToken::Largest,
         },
@@ -126,9 +135,9 @@ pub fn train_clip(
     mut progress: impl FnMut(TrainProgress),
 ) -> Result<TrainedClip> {
     check(options)?;
-    let config = config();
+    let config = config(options);
     let model = ClipModel::init(&config, Parts::Both, &compute.device, options.seed);
-    let (filters, phases) = filters::filters(FILTERS * SCALES.len(), options.seed);
+    let (filters, phases) = filters::filters(options.filters * options.scales.len(), options.norm, options.seed);
     let tower = tower(&model)?.with_filters(&filters, &phases);
     let head = head::fit(&tower, &config, options, compute, &mut progress)?;
     let tower = tower.with_head(head.matrix, head.bias);
@@ -160,6 +169,8 @@ fn check(options: &TrainOptions) -> Result<()> {
         ("--scenes", options.scenes, 8, 1 << 16),
         ("--steps", options.steps, 1, 1 << 20),
         ("--batch", options.batch, 2, 1024),
+        ("--filters", options.filters, 1, 4096),
+        ("--dims", options.dims, 1, options.filters * options.scales.len()),
     ] {
         if !(least..=most).contains(&value) {
             return Err(Error::BadOption {

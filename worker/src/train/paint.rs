@@ -80,7 +80,7 @@ mod tests {
             is_gpu: false,
             max_buffer: None,
         };
-        let config = crate::train::config();
+        let config = crate::train::config(&crate::train::TrainOptions::default());
         let model = ClipModel::init(&config, Parts::Image, &device, 3);
         let tower = model.visual.unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(2);

@@ -11,9 +11,10 @@ use super::load;
 /// What the projection ignores and keeps of CLIP's features, where experiments ask for something else than usual.
 #[derive(Clone, Copy, Default)]
 pub struct Kept {
-    /// Directions of strongest natural variation to drop; 64 unless given, at most an eighth of all.
+    /// Directions of strongest natural variation to drop; 64 unless given, at most an eighth of all. None of a CLIP with
+    /// ranked features.
     pub remove: Option<usize>,
-    /// Dimensions to keep of the rest; all unless given.
+    /// Dimensions to keep of the rest; unless given all, or of ranked features as many as the message takes.
     pub keep: Option<usize>,
 }
 
@@ -27,11 +28,21 @@ pub fn create(
     progress: impl FnMut(NewKey),
 ) -> Result<Key> {
     let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
+    let ranked = clip.config.is_ranked();
     let projection = FitOptions {
         remove: kept.remove.unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
-        keep: kept.keep,
+        keep: kept
+            .keep
+            .or(ranked.then(|| ranked_dimensions(options.bits, clip.dim()))),
+        ranked,
     };
     stop.check()?;
     let pictures = natural::pictures(compute, clip.config.vision.image_size as u32)?;
     create_key(options, projection, &clip, identity, compute, pictures, stop, progress)
+}
+
+/// Dimensions of ranked features that a message of so many bits is read from: every further one is weaker than those
+/// before it.
+fn ranked_dimensions(bits: usize, width: usize) -> usize {
+    bits.max(8).min(width)
 }

@@ -40,6 +40,7 @@ fn engine(machine: &Machine, lpips: Option<PathBuf>, change: impl FnOnce(&mut De
     change(&mut decoder);
     let key = Key {
         secret: Secret::from_seed(1),
+        bits_per_token: 1,
         seed: None,
         clip: ClipIdentity {
             name: String::new(),
@@ -58,7 +59,7 @@ fn short(preset: Preset) -> Settings {
     let mut settings = preset.settings();
     (settings.seed, settings.steps) = (3, 3);
     (settings.views_per_step, settings.fresh_per_step, settings.pool_views) = (2, 1, 4);
-    (settings.size, settings.enlarged) = (32, settings.enlarged.min(2));
+    (settings.size, settings.enlarged) = (32, settings.enlarged.min(2.0));
     (settings.verify.views, settings.verify.message_views) = (2, 1);
     settings.verify.size = Some(32);
     if let Some(stop) = &mut settings.early_stop {
@@ -212,7 +213,7 @@ pub fn poison(machine: &Machine) {
 /// It is refused before the first step, and before the output is touched.
 pub fn too_much_for_the_adapter(machine: &Machine) {
     let mut settings = short(Preset::Standard);
-    (settings.size, settings.enlarged) = (160, 3);
+    (settings.size, settings.enlarged) = (160, 3.0);
     let tiles = u64::from((160 * 3 / TILE).pow(2));
     let limit = machine.compute.max_buffer.unwrap();
     // Twelve bytes of gradient a (Gaussian, tile) pair.

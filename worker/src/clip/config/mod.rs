@@ -188,6 +188,12 @@ impl ClipConfig {
         open_clip::write(self).map_err(|e| bad("OpenCLIP configuration", e))
     }
 
+    /// Whether features are ranked: a mark moves the first dimensions most, against how much they vary by themselves.
+    /// So it is with heads that this project fits.
+    pub fn is_ranked(&self) -> bool {
+        matches!(self.vision.tower, VisionTower::Statistics { .. })
+    }
+
     /// Checks every size against its limit and against the sizes it must divide or be divided by.
     fn validate(&self) -> Result<(), String> {
         within("embed_dim", self.embed_dim, 8192)?;
