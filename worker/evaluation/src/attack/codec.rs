@@ -7,6 +7,8 @@ use std::io::Cursor;
 use crate::{Error, Result};
 
 /// Baseline JPEG of a quality of 1 to 100, with the tables of libjpeg (ITU-T T.81, annex K) and 4:2:0 at every quality.
+///
+/// Loses as much as libjpeg-turbo does up to quality 75, and some tenths of a dB more at 95, by the encoder's arithmetic.
 pub(super) fn jpeg(picture: &RgbImage, quality: u8) -> Result<RgbImage> {
     let side = |side: u32| u16::try_from(side).map_err(|error| failed("jpeg", error));
     let (width, height) = (side(picture.width())?, side(picture.height())?);
