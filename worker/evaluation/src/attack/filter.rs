@@ -79,12 +79,14 @@ pub(super) fn sharpen(picture: &RgbImage, factor: f32) -> RgbImage {
         if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
             return pixel;
         }
+        let around = (y - 1..=y + 1).flat_map(|row| (x - 1..=x + 1).map(move |column| (column, row)));
+        let Rgb(smooth) = weighted(around.map(|(column, row)| {
+            let weight = if (column, row) == (x, y) { 5.0 } else { 1.0 };
+            (weight / 13.0, picture.get_pixel(column, row).0.map(f32::from))
+        }));
         Rgb(std::array::from_fn(|channel| {
             let value = f32::from(pixel.0[channel]);
-            let around = (y - 1..=y + 1).flat_map(|row| (x - 1..=x + 1).map(move |column| (column, row)));
-            let sum: f32 = around.map(|(x, y)| f32::from(picture.get_pixel(x, y).0[channel])).sum();
-            let smooth = (sum + 4.0 * value) / 13.0;
-            (smooth + factor * (value - smooth)).round() as u8
+            (smooth[channel] + factor * (value - smooth[channel])).round() as u8
         }))
     })
 }

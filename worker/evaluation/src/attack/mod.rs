@@ -5,7 +5,18 @@
 //!
 //! Whatever is random follows from a seed and the index of the picture, so that every picture gets its own and gets it
 //! again. Pictures are taken as they are stored, without linearising their colours, as nearly all software does. AVIF and
-//! HEIC are left out: their encoders need more than a C compiler, or take minutes a picture.
+//! HEIC are left out: to read them back needs libraries of the system.
+//!
+//! ```
+//! use guardsplat_evaluation::attack::Attack;
+//! use image::RgbImage;
+//!
+//! let attack: Attack = "crop:0.6+brightness:0.5..1.5+jpeg:50".parse()?;
+//! let attacked = attack.apply(&RgbImage::new(64, 50), 7, 0)?;
+//! assert_eq!(attacked.dimensions(), (38, 30));
+//! assert_eq!(attack.to_string(), "crop:0.6+brightness:0.5..1.5+jpeg:50");
+//! # Ok::<(), guardsplat_evaluation::Error>(())
+//! ```
 mod chain;
 mod codec;
 mod colour;

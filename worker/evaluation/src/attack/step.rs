@@ -56,9 +56,8 @@ impl Step {
         let (Some(limits), Some(strength)) = (self.kind.spec(), self.strength) else {
             return self;
         };
-        let value = limits.draw(strength, source);
         Self {
-            strength: Strength::new(value, value).ok(),
+            strength: Some(strength.became(limits.draw(strength, source))),
             ..self
         }
     }

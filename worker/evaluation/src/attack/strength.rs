@@ -30,6 +30,15 @@ impl Strength {
         })
     }
 
+    /// What was drawn from this range.
+    pub(super) fn became(self, value: f64) -> Self {
+        let value = value.clamp(self.low, self.high);
+        Self {
+            low: value,
+            high: value,
+        }
+    }
+
     /// The lower end.
     pub fn low(self) -> f64 {
         self.low

@@ -1,6 +1,8 @@
 //! What holds for every attack.
 use image::RgbImage;
+use proptest::prelude::*;
 
+use super::text::step;
 use super::{attack, done, varied};
 use crate::attack::kind::Grid;
 use crate::attack::{Attack, Kind, Step, Strength};
@@ -149,4 +151,21 @@ fn chains_are_their_steps_one_after_the_other() {
         one_by_one(&["crop:0.6", "jpeg:50"]),
         one_by_one(&["jpeg:50", "crop:0.6"])
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn chains_give_pictures_and_the_same_again(
+        steps in prop::collection::vec(step(), 1..=2),
+        (width, height) in (1u32..=12, 1u32..=12),
+        (seed, index) in any::<(u64, u64)>(),
+    ) {
+        let attack = Attack::new(steps).unwrap();
+        let picture = varied(width, height);
+        let result = attack.apply(&picture, seed, index).unwrap();
+        prop_assert!(result.width() > 0 && result.height() > 0);
+        prop_assert_eq!(&result, &attack.apply(&picture, seed, index).unwrap());
+        prop_assert_eq!(&result, &attack.drawn(seed, index).apply(&picture, seed, index).unwrap());
+    }
 }

@@ -100,7 +100,7 @@ fn names_are_distinct_and_short_enough_for_keys() {
 }
 
 /// Any step, its strength a number or a range within the limits.
-fn step() -> impl Strategy<Value = Step> {
+pub(super) fn step() -> impl Strategy<Value = Step> {
     (0..Kind::ALL.len(), 0.0..=1.0f64, 0.0..=1.0f64, any::<bool>()).prop_map(|(kind, one, other, range)| {
         let kind = Kind::ALL[kind];
         let strength = kind.limits().map(|(least, most)| {
