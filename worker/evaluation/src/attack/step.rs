@@ -1,0 +1,185 @@
+//! One step of an attack: what is done, and how strongly.
+use std::fmt;
+use std::str::FromStr;
+
+use image::{Rgb, RgbImage};
+use rand::RngExt;
+
+use super::draw::{Source, Use};
+use super::kind::{Grid, Kind, Limits};
+use super::strength::{Strength, start_of};
+use super::{codec, colour, cover, filter, frame, noise, resample, rotate};
+use crate::{Error, Result};
+
+/// One step of an attack: what is done, and how strongly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    kind: Kind,
+    strength: Option<Strength>,
+}
+
+impl Step {
+    /// A step, if its strength is within the limits of its kind, or absent where it has none.
+    ///
+    /// # Errors
+    /// [`Error::BadOption`] with the limits.
+    pub fn new(kind: Kind, strength: Option<Strength>) -> Result<Self> {
+        let bad = |reason| Error::BadOption {
+            field: kind.name(),
+            reason,
+        };
+        match (kind.spec(), strength) {
+            (None, None) => {}
+            (None, Some(strength)) => return Err(bad(format!("takes no strength, but has {strength}"))),
+            (Some(limits), None) => return Err(bad(format!("needs {limits}"))),
+            (Some(limits), Some(strength)) => {
+                if !(limits.allow(strength.low()) && limits.allow(strength.high())) {
+                    return Err(bad(format!("{strength} is not {limits}")));
+                }
+            }
+        }
+        Ok(Self { kind, strength })
+    }
+
+    /// What is done.
+    pub fn kind(self) -> Kind {
+        self.kind
+    }
+
+    /// How strongly, for kinds that have a strength.
+    pub fn strength(self) -> Option<Strength> {
+        self.strength
+    }
+
+    /// The step with the one strength that a picture draws.
+    pub(super) fn drawn(self, source: Source) -> Self {
+        let (Some(limits), Some(strength)) = (self.kind.spec(), self.strength) else {
+            return self;
+        };
+        Self {
+            strength: Some(strength.became(limits.draw(strength, source))),
+            ..self
+        }
+    }
+
+    /// Does it, with the lower end of its strength: ranges are [`Step::drawn`] before.
+    pub(super) fn apply(self, picture: RgbImage, source: Source) -> Result<RgbImage> {
+        let value = self.strength.map_or(0.0, Strength::low);
+        if self.strength.is_some() && self.kind.spec().and_then(|limits| limits.identity) == Some(value) {
+            return Ok(picture);
+        }
+        let random = &mut source.random(Use::Pixels);
+        Ok(match self.kind {
+            Kind::Jpeg => codec::jpeg(&picture, value as u8)?,
+            Kind::Webp => codec::webp(&picture, value as f32)?,
+            Kind::Noise => noise::add(picture, value as f32, random),
+            Kind::Blur => filter::blur(&picture, value as u32),
+            Kind::Median => filter::median(&picture, value as u32),
+            Kind::Sharpen => filter::sharpen(&picture, value as f32),
+            Kind::Scale => resample::scale(&picture, value)?,
+            Kind::Rescale => resample::rescale(&picture, value)?,
+            Kind::Fit => resample::fit(picture, value as u32)?,
+            Kind::Rotate => rotate::rotate(&picture, value),
+            Kind::QuarterTurns => rotate::quarter_turns(picture, value as u8),
+            Kind::Flip => image::imageops::flip_horizontal(&picture),
+            Kind::Crop => frame::crop(&picture, value),
+            Kind::CropRandom => frame::crop_random(&picture, value, random),
+            Kind::Window => frame::window(&picture, value as u32),
+            Kind::Border => frame::border(&picture, value)?,
+            Kind::Brightness => colour::brightness(picture, value),
+            Kind::Contrast => colour::contrast(picture, value),
+            Kind::Gamma => colour::gamma(picture, value),
+            Kind::Hue => colour::hue(picture, value),
+            Kind::Saturation => colour::saturation(picture, value),
+            Kind::Grey => colour::saturation(picture, 0.0),
+            Kind::Bits => colour::bits(picture, value as u32),
+            Kind::Mask => cover::cover(picture, value, 4, 2.0, Rgb([128; 3]), random),
+            // Ratio of sides as torchvision's RandomErasing.
+            Kind::Erase => cover::cover(picture, value, 1, 3.3, Rgb([0; 3]), random),
+        })
+    }
+}
+
+impl Limits {
+    fn allow(self, value: f64) -> bool {
+        let on_grid = match self.grid {
+            Grid::Real => true,
+            Grid::Whole => value.fract() == 0.0,
+            Grid::Odd => value.rem_euclid(2.0) == 1.0,
+        };
+        on_grid && (self.least..=self.most).contains(&value)
+    }
+
+    /// Uniform over the numbers that are allowed.
+    fn draw(self, strength: Strength, source: Source) -> f64 {
+        let (low, high) = (strength.low(), strength.high());
+        if strength.is_fixed() {
+            return low;
+        }
+        let random = &mut source.random(Use::Strength);
+        let mut whole = |every: f64| low + every * f64::from(random.random_range(0..=((high - low) / every) as u32));
+        match self.grid {
+            Grid::Whole => whole(1.0),
+            Grid::Odd => whole(2.0),
+            Grid::Real => random.random_range(low..=high),
+        }
+    }
+}
+
+impl fmt::Display for Limits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = match self.grid {
+            Grid::Real => "a number",
+            Grid::Whole => "a whole number",
+            Grid::Odd => "an odd number",
+        };
+        write!(f, "{numbers} from {} to {}", self.least, self.most)
+    }
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.strength {
+            None => f.write_str(self.kind.name()),
+            Some(strength) => write!(f, "{}:{strength}", self.kind.name()),
+        }
+    }
+}
+
+impl FromStr for Step {
+    type Err = Error;
+
+    /// Reads `flip`, `jpeg:10` or `rotate:-30..30`.
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, strength) = match text.split_once(':') {
+            Some((name, strength)) => (name, Some(strength)),
+            None => (text, None),
+        };
+        let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.name() == name) else {
+            return Err(Error::BadOption {
+                field: "attack",
+                reason: format!(
+                    "{:?} is none of none, {}",
+                    start_of(name),
+                    Kind::ALL.map(Kind::name).join(", ")
+                ),
+            });
+        };
+        let strength = strength.map(|text| text.parse().map_err(|error| named(kind, error)));
+        Self::new(kind, strength.transpose()?)
+    }
+}
+
+/// An error of a strength, told of the attack that it is for, with its limits.
+fn named(kind: Kind, error: Error) -> Error {
+    match error {
+        Error::BadOption { reason, .. } => Error::BadOption {
+            field: kind.name(),
+            reason: match kind.spec() {
+                Some(limits) => format!("{reason}; needs {limits}"),
+                None => format!("{reason}; takes no strength"),
+            },
+        },
+        other => other,
+    }
+}
