@@ -27,8 +27,9 @@ struct Balance {
 /// The paper's equation, from the groups of every `step`th row and column.
 ///
 /// With `d0 = R_M - S_M` and `d-0 = R_-M - S_-M` of the picture, `d1` and `d-1` the same after all bits are flipped, `x`
-/// is the root of `2(d1 + d0) x² + (d-0 - d-1 - d1 - 3 d0) x + d0 - d-0 = 0` with the smaller absolute value, and the rate
-/// is `x / (x - 1/2)`.
+/// is a root of `a x² + b x + c = 0`, `a = 2(d1 + d0)`, `b = d-0 - d-1 - d1 - 3 d0`, `c = d0 - d-0`, and the rate is
+/// `p = x / (x - 1/2)`. At full embedding `x` is infinite, so here the equation is that of `p`,
+/// `(a/4 + b/2 + c) p² - (b/2 + 2c) p + c = 0`, and its smaller root is taken instead of the smaller `x`.
 fn rate(channel: &Channel, step: usize) -> Result<f64, NoResult> {
     let (mut plain, mut flipped) = (Balance::default(), Balance::default());
     let mut groups = 0_usize;
@@ -48,17 +49,10 @@ fn rate(channel: &Channel, step: usize) -> Result<f64, NoResult> {
     }
     let (d0, d0_negative) = (plain.positive, plain.negative);
     let (d1, d1_negative) = (flipped.positive, flipped.negative);
-    let x = smaller_root(
-        2.0 * (d1 + d0),
-        d0_negative - d1_negative - d1 - 3.0 * d0,
-        d0 - d0_negative,
-    )?;
-    let rate = x / (x - 0.5);
-    if rate.is_finite() {
-        Ok(rate)
-    } else {
-        Err(NoResult::NoRoot)
-    }
+    let a = 2.0 * (d1 + d0);
+    let b = d0_negative - d1_negative - d1 - 3.0 * d0;
+    let c = d0 - d0_negative;
+    smaller_root(a / 4.0 + b / 2.0 + c, -(b / 2.0 + 2.0 * c), c)
 }
 
 /// Counts a group under both masks: regular where flipping makes it rougher, singular where smoother.

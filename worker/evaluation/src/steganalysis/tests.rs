@@ -32,9 +32,10 @@ fn scores(detector: Detector, pictures: &[RgbImage]) -> Vec<f64> {
 fn replaced_bits_are_found_in_photographs() {
     let Some(clean) = photographs() else { return };
     for (rate, limits) in [
-        (1.0, [0.99, 0.99, 0.99, 0.9, 0.99]),
-        (0.5, [0.97, 0.97, 0.4, 0.9, 0.95]),
-        (0.2, [0.9, 0.9, 0.4, 0.7, 0.8]),
+        (1.0, [0.999, 0.999, 0.98, 0.99, 0.999]),
+        // Scattered bits escape the chi-square attack, which its paper says.
+        (0.5, [0.999, 0.999, 0.55, 0.99, 0.99]),
+        (0.2, [0.99, 0.99, 0.45, 0.99, 0.95]),
     ] {
         let curves = roc_of(&clean, &marked(&clean, rate), 0.95).unwrap();
         for (curve, limit) in curves.iter().zip(limits) {
@@ -54,27 +55,29 @@ fn replaced_bits_are_found_in_photographs() {
     }
 }
 
+/// Median and largest error over the photographs. At full embedding the roots of the equations coincide, so that the
+/// smaller one of two that noise has parted is a few percent too small.
 #[test]
 fn rates_are_estimated() {
     let Some(clean) = photographs() else { return };
     for rate in [0.0, 0.2, 0.5, 1.0] {
         let pictures = marked(&clean, rate);
-        for (detector, tolerance) in [
-            (Detector::RsAnalysis, 0.05),
-            (Detector::SamplePairs, 0.05),
-            (Detector::PrimarySets, 0.1),
+        for (detector, median, largest) in [
+            (Detector::RsAnalysis, 0.01, 0.1),
+            (Detector::SamplePairs, 0.01, 0.1),
+            (Detector::PrimarySets, 0.02, 0.2),
         ] {
-            let errors: Vec<f64> = scores(detector, &pictures).iter().map(|score| score - rate).collect();
-            let absolute: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
-            let (summary, absolute) = (
-                Summary::of(&errors).unwrap().unwrap(),
-                Summary::of(&absolute).unwrap().unwrap(),
-            );
+            let factor = if rate == 1.0 { 5.0 } else { 1.0 };
+            let errors: Vec<f64> = (scores(detector, &pictures).iter())
+                .map(|score| (score - rate).abs())
+                .collect();
+            let summary = Summary::of(&errors).unwrap().unwrap();
             eprintln!(
-                "{rate}: {detector:<12} error {:.4}, median of its size {:.4}, largest {:.4}",
-                summary.mean, absolute.median, absolute.max
+                "{rate}: {detector:<12} median error {:.4}, largest {:.4}",
+                summary.median, summary.max
             );
-            assert!(absolute.median < tolerance, "{detector} at {rate}");
+            assert!(summary.median < median * factor, "{detector} at {rate}");
+            assert!(summary.max < largest, "{detector} at {rate}");
         }
     }
 }

@@ -32,78 +32,71 @@ const STEPS: [(usize, isize); 4] = [(0, 1), (1, 0), (1, 1), (1, -1)];
 pub(super) fn features(planes: &[Plane]) -> Vec<f64> {
     let mut features = Vec::with_capacity(FEATURES);
     for steps in STEPS.chunks_exact(2) {
-        let mut mean = vec![0.0; MATRIX];
+        let mut sums = vec![0.0; MATRIX];
         for step in steps {
-            let mut forwards = Transitions::new();
-            let mut backwards = Transitions::new();
+            let mut counts = [[[0; CODES]; CODES]; CODES];
             for plane in planes {
-                count(plane, *step, &mut forwards, &mut backwards);
+                count(plane, *step, &mut counts);
             }
-            forwards.add_probabilities(&mut mean);
-            backwards.add_probabilities(&mut mean);
+            add_probabilities(&mut sums, |w, v, u| counts[w][v][u]);
+            // Backwards the order is the other one, and a drop is a rise.
+            add_probabilities(&mut sums, |w, v, u| counts[opposite(u)][opposite(v)][opposite(w)]);
         }
-        features.extend(mean.iter().map(|sum| sum / 4.0));
+        features.extend(sums.iter().map(|sum| sum / 4.0));
     }
     features
 }
 
+/// Differences of -3 to 3, and one code for all larger ones.
+const CODES: usize = VALUES + 1;
+
+/// How often each three differences follow each other.
+type Counts = [[[u64; CODES]; CODES]; CODES];
+
+fn code(difference: i16) -> usize {
+    let limit = LIMIT as i16;
+    if (-limit..=limit).contains(&difference) {
+        (difference + limit) as usize
+    } else {
+        VALUES
+    }
+}
+
+/// The code of a difference with the other sign.
+fn opposite(code: usize) -> usize {
+    if code < VALUES { VALUES - 1 - code } else { code }
+}
+
 /// Counts the four pixels in a row along a step that begin at every place.
-fn count(plane: &Plane, (down, right): (usize, isize), forwards: &mut Transitions, backwards: &mut Transitions) {
-    if plane.width == 0 {
+fn count(plane: &Plane, (down, right): (usize, isize), counts: &mut Counts) {
+    let reach = 3 * right.unsigned_abs();
+    let length = plane.width.saturating_sub(reach);
+    if length == 0 {
         return;
     }
-    let width = plane.width as isize;
-    let columns = (-3 * right).max(0)..(width - (3 * right).max(0)).max(0);
-    let height = plane.values.len() / plane.width;
-    for y in 0..height.saturating_sub(3 * down) {
-        for x in columns.clone() {
-            // In range: three steps along the line stay in the picture.
-            let at = |steps: usize| {
-                let column = (x + steps as isize * right) as usize;
-                i32::from(plane.values[(y + steps * down) * plane.width + column])
-            };
-            let (a, b, c, d) = (at(0), at(1), at(2), at(3));
-            forwards.add(a - b, b - c, c - d);
-            backwards.add(d - c, c - b, b - a);
-        }
-    }
-}
-
-/// How often what follows two differences.
-struct Transitions {
-    /// `[w][v][u]`
-    triples: Vec<u64>,
-    /// `[w][v]`, whatever follows.
-    pairs: Vec<u64>,
-}
-
-impl Transitions {
-    fn new() -> Self {
-        Self {
-            triples: vec![0; MATRIX],
-            pairs: vec![0; VALUES * VALUES],
-        }
-    }
-
-    fn add(&mut self, w: i32, v: i32, u: i32) {
-        let index = |difference: i32| usize::try_from(difference + LIMIT).ok().filter(|index| *index < VALUES);
-        let (Some(w), Some(v)) = (index(w), index(v)) else {
-            return;
+    let first = if right < 0 { reach } else { 0 };
+    let rows: Vec<&[i16]> = plane.values.chunks_exact(plane.width).collect();
+    for lines in rows.windows(3 * down + 1) {
+        // In range: `length` pixels from `start` on stay in the row whatever the step.
+        let line = |step: usize| {
+            let start = first.saturating_add_signed(step as isize * right);
+            &lines[step * down][start..start + length]
         };
-        let pair = w * VALUES + v;
-        self.pairs[pair] += 1;
-        if let Some(u) = index(u) {
-            self.triples[pair * VALUES + u] += 1;
+        let pixels = line(0).iter().zip(line(1)).zip(line(2)).zip(line(3));
+        for (((a, b), c), d) in pixels {
+            counts[code(a - b)][code(b - c)][code(c - d)] += 1;
         }
     }
+}
 
-    fn add_probabilities(&self, sums: &mut [f64]) {
-        let counts = self.triples.chunks_exact(VALUES).zip(&self.pairs);
-        for (sums, (triples, pair)) in sums.chunks_exact_mut(VALUES).zip(counts) {
-            if *pair > 0 {
-                for (sum, triple) in sums.iter_mut().zip(triples) {
-                    *sum += *triple as f64 / *pair as f64;
-                }
+/// Adds `Pr(u | w, v)` to `sums`, `[w][v][u]`.
+fn add_probabilities(sums: &mut [f64], count: impl Fn(usize, usize, usize) -> u64) {
+    for (pair, sums) in sums.chunks_exact_mut(VALUES).enumerate() {
+        let (w, v) = (pair / VALUES, pair % VALUES);
+        let all: u64 = (0..CODES).map(|u| count(w, v, u)).sum();
+        if all > 0 {
+            for (u, sum) in sums.iter_mut().enumerate() {
+                *sum += count(w, v, u) as f64 / all as f64;
             }
         }
     }
