@@ -7,6 +7,7 @@ mod archive;
 mod convert;
 mod opcode;
 mod pickle;
+mod reader;
 mod value;
 
 use super::{FileEntry, LPIPS, bad};

@@ -4,15 +4,14 @@
 //! tell what an object was made by. Here are the opcodes that the checkpoint has. What has parts cannot be referred to
 //! again, so there are neither cycles nor files that grow while they are read.
 use super::opcode;
+use super::reader::Reader;
 use super::value::{self, Atom, Value};
 use std::collections::BTreeMap;
 
-/// Most opcodes; the checkpoint has 480. It bounds memory too: an opcode leaves at most one value.
+/// Most opcodes; the checkpoint has 499. It bounds memory too: an opcode leaves at most one value.
 const MAX_OPCODES: usize = 1024;
 /// Tuples and dictionaries within one another; the checkpoint has three.
 const MAX_DEPTH: usize = 4;
-/// Longest name of a module or of what is in it.
-const MAX_NAME: usize = 64;
 
 /// The value of a pickle, which borrows texts and numbers from its bytes.
 ///
@@ -20,13 +19,12 @@ const MAX_NAME: usize = 64;
 /// In words, with the byte where reading ended.
 pub fn load(bytes: &[u8]) -> Result<Value<'_>, String> {
     let mut machine = Machine {
-        bytes,
-        at: 0,
+        reader: Reader::new(bytes),
         stack: Vec::new(),
         memo: BTreeMap::new(),
     };
     for count in 0..MAX_OPCODES {
-        let start = machine.at;
+        let start = machine.reader.at();
         match machine.step(count == 0) {
             Ok(None) => (),
             Ok(Some(value)) => return Ok(value),
@@ -35,7 +33,7 @@ pub fn load(bytes: &[u8]) -> Result<Value<'_>, String> {
     }
     Err(format!(
         "byte {}: there are more than {MAX_OPCODES} opcodes",
-        machine.at
+        machine.reader.at()
     ))
 }
 
@@ -45,8 +43,7 @@ enum Item<'a> {
 }
 
 struct Machine<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    reader: Reader<'a>,
     stack: Vec<Item<'a>>,
     /// What was remembered; `None` for what has parts.
     memo: BTreeMap<u8, Option<Atom<'a>>>,
@@ -55,13 +52,13 @@ struct Machine<'a> {
 impl<'a> Machine<'a> {
     /// Does what the next opcode says; gives the result after the last.
     fn step(&mut self, first: bool) -> Result<Option<Value<'a>>, String> {
-        let code = self.byte()?;
+        let code = self.reader.byte()?;
         if first != (code == opcode::PROTO) {
             return Err("a pickle has its protocol first, and once".into());
         }
         let value = match code {
             opcode::PROTO => {
-                return match self.byte()? {
+                return match self.reader.byte()? {
                     3 => Ok(None),
                     other => Err(format!("the pickle has protocol {other}, expected 3")),
                 };
@@ -79,20 +76,20 @@ impl<'a> Machine<'a> {
             opcode::NONE => Value::Atom(Atom::None),
             opcode::NEWTRUE => Value::Atom(Atom::Bool(true)),
             opcode::NEWFALSE => Value::Atom(Atom::Bool(false)),
-            opcode::BININT1 => Value::Atom(Atom::Int(self.byte()?.into())),
-            opcode::BININT2 => Value::Atom(Atom::Int(u16::from_le_bytes(self.word()?).into())),
-            opcode::BININT => Value::Atom(Atom::Int(i32::from_le_bytes(self.word()?))),
-            opcode::BINUNICODE => Value::Atom(Atom::Text(self.text()?)),
+            opcode::BININT1 => Value::Atom(Atom::Int(self.reader.byte()?.into())),
+            opcode::BININT2 => Value::Atom(Atom::Int(u16::from_le_bytes(self.reader.word()?).into())),
+            opcode::BININT => Value::Atom(Atom::Int(i32::from_le_bytes(self.reader.word()?))),
+            opcode::BINUNICODE => Value::Atom(Atom::Text(self.reader.text()?)),
             opcode::SHORT_BINBYTES => {
-                let length = self.byte()?;
-                Value::Atom(Atom::Bytes(self.take(length.into())?))
+                let length = self.reader.byte()?;
+                Value::Atom(Atom::Bytes(self.reader.take(length.into())?))
             }
             opcode::BINBYTES => {
-                let length = self.length()?;
-                Value::Atom(Atom::Bytes(self.take(length)?))
+                let length = self.reader.length()?;
+                Value::Atom(Atom::Bytes(self.reader.take(length)?))
             }
             opcode::GLOBAL => {
-                let (module, name) = (self.line()?, self.line()?);
+                let (module, name) = (self.reader.line()?, self.reader.line()?);
                 Value::Atom(value::global(module, name)?)
             }
             opcode::EMPTY_DICT => Value::Dict(BTreeMap::new()),
@@ -130,47 +127,6 @@ impl<'a> Machine<'a> {
         }
         self.stack.push(Item::Value(value));
         Ok(None)
-    }
-
-    fn take(&mut self, length: usize) -> Result<&'a [u8], String> {
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        let taken = rest.get(..length).ok_or_else(|| {
-            let left = rest.len();
-            format!("the pickle ends here: {length} bytes are announced, {left} are left")
-        })?;
-        self.at += length;
-        Ok(taken)
-    }
-
-    fn word<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let taken = self.take(N)?;
-        taken
-            .first_chunk()
-            .copied()
-            .ok_or_else(|| "the pickle ends here".into())
-    }
-
-    fn byte(&mut self) -> Result<u8, String> {
-        self.word().map(|[byte]| byte)
-    }
-
-    fn length(&mut self) -> Result<usize, String> {
-        let length = u32::from_le_bytes(self.word()?);
-        usize::try_from(length).map_err(|e| e.to_string())
-    }
-
-    fn text(&mut self) -> Result<&'a str, String> {
-        let length = self.length()?;
-        std::str::from_utf8(self.take(length)?).map_err(|e| format!("a text is not UTF-8: {e}"))
-    }
-
-    fn line(&mut self) -> Result<&'a str, String> {
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        let end = rest.iter().take(MAX_NAME + 1).position(|byte| *byte == b'\n');
-        let end = end.ok_or_else(|| format!("a name has no end within {MAX_NAME} bytes"))?;
-        let line = self.take(end)?;
-        self.byte()?;
-        std::str::from_utf8(line).map_err(|e| format!("a name is not UTF-8: {e}"))
     }
 
     fn pop(&mut self) -> Result<Value<'a>, String> {
@@ -219,7 +175,7 @@ impl<'a> Machine<'a> {
     }
 
     fn remember(&mut self) -> Result<(), String> {
-        let index = self.byte()?;
+        let index = self.reader.byte()?;
         let atom = match self.stack.last() {
             Some(Item::Value(Value::Atom(atom))) => Some(*atom),
             Some(Item::Value(_)) => None,
@@ -230,7 +186,7 @@ impl<'a> Machine<'a> {
     }
 
     fn recall(&mut self) -> Result<Value<'a>, String> {
-        let index = self.byte()?;
+        let index = self.reader.byte()?;
         match self.memo.get(&index) {
             Some(Some(atom)) => Ok(Value::Atom(*atom)),
             Some(None) => Err(format!("value {index} is used twice and has parts")),
@@ -240,7 +196,7 @@ impl<'a> Machine<'a> {
 
     fn result(&mut self) -> Result<Value<'a>, String> {
         let value = self.pop()?;
-        match (self.stack.len(), self.bytes.len() - self.at) {
+        match (self.stack.len(), self.reader.left().len()) {
             (0, 0) => Ok(value),
             (0, tail) => Err(format!("{tail} bytes follow the end")),
             (left, _) => Err(format!("{left} values are left over at the end")),
