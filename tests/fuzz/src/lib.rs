@@ -5,6 +5,7 @@
 //! something is wrong, and never for bytes that are refused.
 pub mod memory;
 mod models;
+mod packages;
 mod pictures;
 mod scenes;
 mod server;
@@ -12,6 +13,7 @@ pub mod sog;
 mod texts;
 
 pub use models::{TINY_CLIP, clip_config, clip_weights, key, lpips, manifest};
+pub use packages::{lpips_checkpoint, lpips_package};
 pub use pictures::{exr, picture};
 pub use scenes::{compressed_ply, ply, scene, splat, spz, summary};
 pub use server::{names, page_token, requests, sealed, server_settings};
@@ -49,6 +51,8 @@ targets![
     clip_config,
     clip_weights,
     lpips,
+    lpips_checkpoint,
+    lpips_package,
     manifest,
     picture,
     exr,

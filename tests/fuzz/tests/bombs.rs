@@ -59,6 +59,8 @@ fn nothing_takes_many_times_its_size() {
         ("scene", vec![0; SIZE]),
         ("spz", filled("NGSP\u{3}\0\0\0", "\0", "")),
         ("sog", filled("{\"means\":[", "0,", "0]}")),
+        ("lpips_checkpoint", [&b"\x80\x03"[..], &vec![b'}'; SIZE]].concat()),
+        ("lpips_checkpoint", [&b"\x80\x03N"[..], &vec![b'\x85'; SIZE]].concat()),
         ("message", filled("", "f", "")),
         ("names", filled("jobs/", "é", "")),
         ("page_token", filled("", "0", "")),

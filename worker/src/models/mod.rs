@@ -3,6 +3,7 @@
 //! Each lies in a folder of its own under `models/` in the data folder, with a manifest of file hashes.
 mod add;
 mod fetch;
+pub mod lpips;
 
 use crate::clip::hash;
 use crate::error::{Error, Result};

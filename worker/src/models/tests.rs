@@ -27,14 +27,14 @@ fn a_model_is_added_listed_verified_and_loaded() {
     let models = Models::at(home.path());
     assert_eq!(models.list().unwrap(), []);
     let entry = models
-        .add("tiny", source.path().to_str().unwrap(), &sha256.to_uppercase())
+        .add("tiny", source.path().to_str().unwrap(), Some(&sha256.to_uppercase()))
         .unwrap();
     assert_eq!(entry.files.keys().collect::<Vec<_>>(), [CONFIG, WEIGHTS]);
     assert_eq!(models.list().unwrap(), std::slice::from_ref(&entry));
     assert_eq!(models.verify("tiny").unwrap(), entry);
     let clip = Clip::load(&models.dir("tiny").unwrap(), &Device::flex(), Parts::Both).unwrap();
     assert_eq!(clip.hash, sha256);
-    assert!(reason(models.add("tiny", source.path().to_str().unwrap(), &sha256)).contains("is there already"));
+    assert!(reason(models.add("tiny", source.path().to_str().unwrap(), Some(&sha256))).contains("is there already"));
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn verify_names_the_file_that_changed() {
     let ((source, sha256), home) = (tiny(), tempfile::tempdir().unwrap());
     let models = Models::at(home.path());
     let weights = source.path().join(WEIGHTS);
-    models.add("tiny", weights.to_str().unwrap(), &sha256).unwrap();
+    models.add("tiny", weights.to_str().unwrap(), Some(&sha256)).unwrap();
     std::fs::write(models.dir("tiny").unwrap().join(CONFIG), "{}").unwrap();
     assert!(reason(models.verify("tiny")).contains("config.json has hash"));
     assert!(reason(models.verify("other")).contains("models add"));
@@ -66,17 +66,17 @@ fn what_fails_leaves_nothing_behind() {
             "has no model.safetensors",
         ),
     ] {
-        let found = reason(models.add("tiny", source, &sha256));
+        let found = reason(models.add("tiny", source, Some(&sha256)));
         assert!(found.contains(needle), "{source}: {found}");
     }
     std::fs::copy(source.path().join(WEIGHTS), &lone).unwrap();
-    assert!(reason(models.add("tiny", path_of(&lone), &sha256)).contains("config.json does not exist"));
+    assert!(reason(models.add("tiny", path_of(&lone), Some(&sha256))).contains("config.json does not exist"));
     // A configuration that parses but does not fit the weights.
     let wrong = std::fs::read_to_string(source.path().join(CONFIG))
         .unwrap()
         .replace("\"embed_dim\": 8", "\"embed_dim\": 6");
     std::fs::write(empty.path().join(CONFIG), wrong).unwrap();
-    assert!(reason(models.add("tiny", path_of(&lone), &sha256)).contains("expected [6"));
+    assert!(reason(models.add("tiny", path_of(&lone), Some(&sha256))).contains("expected [6"));
     assert_eq!(models.list().unwrap(), []);
     assert_eq!(std::fs::read_dir(home.path().join("models")).unwrap().count(), 0);
 }
@@ -99,7 +99,7 @@ fn lpips_needs_no_configuration() {
     std::fs::remove_file(source.path().join(CONFIG)).unwrap();
     let models = Models::at(home.path());
     let entry = models
-        .add(LPIPS, path_of(&source.path().join(WEIGHTS)), &sha256)
+        .add(LPIPS, path_of(&source.path().join(WEIGHTS)), Some(&sha256))
         .unwrap();
     assert_eq!(entry.files.len(), 1);
 }

@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example seeds`. Files that are there stay as they are.
 mod models;
+mod packages;
 mod pictures;
 mod scenes;
 mod server;
@@ -34,6 +35,7 @@ fn main() {
     scenes::put_all();
     sog::put_all();
     models::put_all();
+    packages::put_all();
     pictures::put_all();
     texts::put_all();
     server::put_all();
