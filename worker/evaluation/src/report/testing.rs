@@ -1,5 +1,6 @@
 //! Records for the tests of reports.
-use super::record::{Detection, Embedding, Mark, Reading};
+use super::record::{Detection, Embedding, Mark, Reading, Record};
+use super::store::Records;
 
 /// A mark whose results are round numbers.
 pub fn mark(scene: &str, bits: u32, variant: &str, seed: u64) -> Mark {
@@ -63,4 +64,15 @@ pub fn detection(marks: &[Mark]) -> Detection {
         auc: 0.75,
         auc_interval: [0.2, 0.98],
     }
+}
+
+/// Records as a store would keep them.
+pub fn records(all: impl IntoIterator<Item = Record>) -> Records {
+    let mut records = Records::default();
+    for record in all {
+        let id = record.id();
+        records.check(&id, &record).unwrap();
+        records.insert(id, record);
+    }
+    records
 }

@@ -104,7 +104,7 @@ impl Records {
     }
 
     /// Whether a record may be added.
-    pub(super) fn check(&self, id: &Id, record: &Record) -> Result<()> {
+    pub(in crate::report) fn check(&self, id: &Id, record: &Record) -> Result<()> {
         let bad = |field, reason| Err(Error::BadOption { field, reason });
         record.check()?;
         if self.has(id) {
@@ -124,7 +124,7 @@ impl Records {
     }
 
     /// Adds a record that was checked.
-    pub(super) fn insert(&mut self, id: Id, record: Record) {
+    pub(in crate::report) fn insert(&mut self, id: Id, record: Record) {
         let place = match record {
             Record::Mark(mark) => {
                 self.marks.push((id.clone(), mark));
