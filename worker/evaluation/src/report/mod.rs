@@ -1,7 +1,9 @@
 //! What was measured, kept on disk as it comes in, and told as JSON, CSV and HTML with plots.
 mod interval;
+pub mod named;
 pub mod names;
 pub mod paper;
+pub mod plot;
 pub mod record;
 pub mod selection;
 pub mod store;

@@ -203,7 +203,10 @@ mod tests {
         };
         assert_eq!(Cell::share(Some(&share)).to_string(), "8 of 10 (49 to 94 %)");
         assert_eq!(against(Some(99.64), 99.64, Some(0.0)), "99.64 ✓");
-        assert_eq!(against(Some(99.64), 99.0, Some(0.42)), "99.64, bar 99.00 (missed by 0.42)");
+        assert_eq!(
+            against(Some(99.64), 99.0, Some(0.42)),
+            "99.64, bar 99.00 (missed by 0.42)"
+        );
         assert_eq!(against(None, 99.0, Some(0.001)), "bar 99.00 (missed by under 0.01)");
         assert_eq!(against(Some(99.64), 99.64, None), "99.64");
     }
