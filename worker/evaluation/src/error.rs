@@ -36,6 +36,28 @@ pub enum Error {
         /// Line and reason.
         reason: String,
     },
+    /// A store is open already, here or in another process.
+    #[error("{path}: another process is writing results here")]
+    Locked {
+        /// The file that is locked.
+        path: PathBuf,
+    },
+    /// A file has no place for a table, or more than one.
+    #[error("{path}: {reason}")]
+    BadMarkers {
+        /// The file.
+        path: PathBuf,
+        /// Which marker, and what is wrong.
+        reason: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Io`] at `path`, for `map_err`.
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { path, source }
+    }
 }
 
 /// Result of this crate.

@@ -1,0 +1,55 @@
+//! Names that records carry and reports ask for: experiments' variants of the settings, and attacks.
+//!
+//! Records may carry any others; these are the ones that a report expects, and says are "not measured" without.
+
+/// The variant with all settings as they are by default: DC and rest are learned, with all three losses.
+pub const STANDARD: &str = "standard";
+/// All attributes of the Gaussians are learned.
+pub const ALL_ATTRIBUTES: &str = "all attributes";
+/// Only the constant band of the spherical harmonics is learned.
+pub const DC: &str = "dc";
+/// Only the other bands are learned.
+pub const REST: &str = "rest";
+/// Only the message counts.
+pub const MESSAGE_ONLY: &str = "message only";
+/// Message and likeness count, the offsets' size does not.
+pub const NO_OFFSET: &str = "no offset penalty";
+
+/// Variants that change the weight of likeness are called this, and the weight.
+pub const LAMBDA_RECON: &str = "lambda-recon:";
+/// Variants that change the weight of the message are called this, and the weight.
+pub const LAMBDA_MSG: &str = "lambda-msg:";
+/// Variants that change the weight of the offsets' size are called this, and the weight.
+pub const LAMBDA_OFFSET: &str = "lambda-offset:";
+
+/// Views as they are.
+pub const NONE: &str = "none";
+/// Lowest opacity first, a quarter of the Gaussians.
+pub const PRUNE_LOWEST: &str = "prune-lowest:0.25";
+/// At random, a quarter of the Gaussians.
+pub const PRUNE_RANDOM: &str = "prune-random:0.25";
+/// Attacks that remove the Gaussians of lowest opacity are called this, and the share.
+pub const PRUNE_LOWEST_PREFIX: &str = "prune-lowest:";
+/// Attacks that remove Gaussians at random are called this, and the share.
+pub const PRUNE_RANDOM_PREFIX: &str = "prune-random:";
+/// Attacks that add noise to the spherical harmonics are called this, and its standard deviation.
+pub const SH_NOISE: &str = "sh-noise:";
+/// Attacks that cover part of each view are called this, and the share.
+pub const OCCLUSION: &str = "occlusion:";
+/// Conversions to another format and back are called this, and the format.
+pub const FORMAT: &str = "format:";
+/// Formats that scenes can have.
+pub const FORMATS: [&str; 5] = ["ply", "compressed-ply", "spz", "splat", "sog"];
+/// Attacks of the paper's Table 2, in its order.
+pub const PAPER_ATTACKS: [&str; 10] = [
+    NONE,
+    "noise:0.1",
+    "rotation:30",
+    "scaling:0.25",
+    "blur:3",
+    "crop:0.4",
+    "brightness:0.5",
+    "jpeg:10",
+    "vae:3",
+    "combined",
+];
