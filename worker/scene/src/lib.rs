@@ -2,13 +2,16 @@
 //!
 //! A written file differs from the one read in nothing but its colours, and is of the same format. Only the bands of
 //! spherical harmonics that hold something are in memory, whatever the file has room for.
+pub mod alter;
 mod container;
+pub mod convert;
 mod error;
 mod gaussians;
 mod ignored;
 mod names;
 mod packed;
 mod ply;
+pub mod quantise;
 mod range;
 mod rest;
 mod scene;

@@ -1,7 +1,7 @@
 //! Numbers stored as whole fractions of a range: colours and opacities as bytes.
 
 /// The constant spherical harmonic: a colour in [0, 1] is `0.5 + C0 * f_dc`.
-const C0: f64 = 0.282_094_791_773_878_14;
+pub(crate) const C0: f64 = 0.282_094_791_773_878_14;
 
 /// What the smallest and the largest whole number stand for; those between lie on a line.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use crate::range::{Range, logit};
 
 /// Largest magnitude of an end of a range of colours: more than any colour, and so much less than single precision
 /// holds that no coefficient within the range or near it is infinite.
-const LARGEST_COLOUR: f32 = 1e30;
+pub(crate) const LARGEST_COLOUR: f32 = 1e30;
 
 /// What the words of 256 Gaussians are fractions of.
 #[derive(Clone, Copy, Debug)]

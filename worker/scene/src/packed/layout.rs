@@ -6,7 +6,7 @@ use crate::ply::header::{Storage, bytes, element, quote, scalars, storage};
 use ply_rs::ply::{Header, ScalarType};
 
 /// The ranges of a chunk's positions and log scales: minima, then maxima.
-pub(super) const GEOMETRY: [&str; 12] = [
+pub(crate) const GEOMETRY: [&str; 12] = [
     "min_x",
     "min_y",
     "min_z",
@@ -21,9 +21,9 @@ pub(super) const GEOMETRY: [&str; 12] = [
     "max_scale_z",
 ];
 /// The ranges of a chunk's colours, which files of older writers have not.
-pub(super) const COLOUR: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
+pub(crate) const COLOUR: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
 /// The words of a Gaussian.
-const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
+pub(crate) const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
 /// Rows of fixed size in the body.
 #[derive(Clone, Copy, Debug)]

@@ -6,10 +6,10 @@
 //! read in nothing but the ranges of colours in the chunks and the bytes of colours: the header, the order of
 //! everything, other elements and properties and anything after them keep their bytes. With the colours that were
 //! read it is the file that was read.
-mod decode;
+pub(crate) mod decode;
 mod grid;
-mod layout;
-mod rest;
+pub(crate) mod layout;
+pub(crate) mod rest;
 
 use crate::Result;
 use crate::container::{Container, Format};
@@ -26,7 +26,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Gaussians of a chunk; the last may have fewer.
-const CHUNK: usize = 256;
+pub(crate) const CHUNK: usize = 256;
 
 /// A compressed PLY as it was read.
 #[derive(Debug)]

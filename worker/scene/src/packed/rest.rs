@@ -8,7 +8,7 @@ use crate::range;
 const ZERO: u8 = 128;
 
 /// The coefficient that a byte stands for.
-pub(super) fn value(byte: u8) -> f32 {
+pub(crate) fn value(byte: u8) -> f32 {
     match byte {
         0 => -4.0,
         255 => 4.0,
@@ -17,7 +17,7 @@ pub(super) fn value(byte: u8) -> f32 {
 }
 
 /// The byte whose coefficient is nearest to a finite one; that of 0 is the writers'.
-pub(super) fn nearest(coefficient: f32) -> u8 {
+pub(crate) fn nearest(coefficient: f32) -> u8 {
     // In double precision, in which tiny coefficients do not get lost; out of range the conversion takes the ends.
     let guess = ((f64::from(coefficient) + 4.0) * 32.0).floor() as u8;
     range::nearest(coefficient, guess, value)

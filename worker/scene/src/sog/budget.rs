@@ -11,7 +11,7 @@ const MAX_RATIO: u64 = 64;
 const SLACK: u64 = 1 << 20;
 
 /// What is left of the allowance.
-pub(super) struct Budget {
+pub(crate) struct Budget {
     limit: u64,
     left: u64,
 }

@@ -2,7 +2,7 @@
 
 /// A table of up to 256 numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Codebook {
+pub(crate) struct Codebook {
     /// NaN where there is none.
     values: [f32; 256],
     /// The numbers that new colours may have, each once, ascending, with its index.

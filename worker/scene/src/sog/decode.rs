@@ -7,10 +7,10 @@ use crate::ignored::Sieve;
 use std::f64::consts::SQRT_2;
 
 /// The first three values of the alpha of rotations are no component's.
-const FIRST_COMPONENT: u8 = 252;
+pub(crate) const FIRST_COMPONENT: u8 = 252;
 
 /// What a Gaussian needs in memory besides pictures.
-pub(super) fn bytes_per_gaussian(degree: usize) -> u64 {
+pub(crate) fn bytes_per_gaussian(degree: usize) -> u64 {
     let numbers = 11 + 3 * (degree + 1) * (degree + 1);
     4 * numbers as u64
 }

@@ -3,7 +3,7 @@ use super::codebook::Codebook;
 use super::json::{Json, Property, files, range};
 
 /// Largest magnitude of the logarithms of positions: beyond 88.7 their exponentials are not in single precision.
-const MAX_LOG: f64 = 88.0;
+pub(crate) const MAX_LOG: f64 = 88.0;
 
 /// Longest part of the parser's message, which quotes the file.
 const MAX_MESSAGE: usize = 200;

@@ -4,13 +4,13 @@
 //! a table of 256 values a channel, which stays as it is. Higher bands are a palette that Gaussians share, and stay
 //! as they are too. Every other entry of the ZIP keeps its bytes.
 mod archive;
-mod budget;
-mod codebook;
-mod decode;
+pub(crate) mod budget;
+pub(crate) mod codebook;
+pub(crate) mod decode;
 mod json;
-mod meta;
-mod palette;
-mod picture;
+pub(crate) mod meta;
+pub(crate) mod palette;
+pub(crate) mod picture;
 
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};

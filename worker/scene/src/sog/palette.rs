@@ -4,7 +4,7 @@ use super::picture::Picture;
 use crate::ignored::Sieve;
 
 /// Rows of the palette side by side in its picture.
-const SIDE_BY_SIDE: usize = 64;
+pub(crate) const SIDE_BY_SIDE: usize = 64;
 
 /// The palette and each Gaussian's place in it, without bands that nobody uses.
 #[derive(Debug)]

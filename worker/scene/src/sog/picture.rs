@@ -5,7 +5,7 @@ use std::io::{self, Cursor};
 
 /// Width and height in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Size {
+pub(crate) struct Size {
     /// Pixels in a row.
     pub width: u32,
     /// Rows.
@@ -40,12 +40,18 @@ impl Role {
 
 /// A decoded picture.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Picture {
+pub(crate) struct Picture {
     size: Size,
     rgba: Vec<u8>,
 }
 
 impl Picture {
+    /// A picture of these pixels, four bytes each and as many as `size` says.
+    pub fn new(size: Size, rgba: Vec<u8>) -> Picture {
+        debug_assert_eq!(size.bytes(), rgba.len() as u64);
+        Picture { size, rgba }
+    }
+
     /// Memory of its pixels.
     pub fn bytes(&self) -> usize {
         self.rgba.len()

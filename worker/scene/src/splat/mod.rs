@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Bytes of a Gaussian.
-const ROW: usize = 32;
+pub(crate) const ROW: usize = 32;
 /// First byte of the colour of a row.
 const COLOUR: usize = 24;
 /// How far the length of a rotation may be from 1. Its bytes make up for 0.02, other conventions for rounding as much.

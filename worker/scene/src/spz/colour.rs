@@ -8,23 +8,24 @@ use crate::gaussians::Sh;
 /// Bytes for each unit of the constant term: 255 for the whole range of colours, of which a unit is 0.15.
 const CONSTANT: f64 = 0.15 * 255.0;
 /// Bytes for each unit of the other terms.
-const HARMONIC: f64 = 128.0;
+pub(crate) const HARMONIC: f64 = 128.0;
 /// The byte of a harmonic that is 0.
-pub(super) const ZERO: u8 = 128;
+pub(crate) const ZERO: u8 = 128;
 
 /// The constant term that a byte stands for.
-pub(super) fn constant(byte: u8) -> f32 {
+pub(crate) fn constant(byte: u8) -> f32 {
     ((f64::from(byte) - 127.5) / CONSTANT) as f32
 }
 
 /// Any other term that a byte stands for.
-pub(super) fn harmonic(byte: u8) -> f32 {
+pub(crate) fn harmonic(byte: u8) -> f32 {
     ((f64::from(byte) - f64::from(ZERO)) / HARMONIC) as f32
 }
 
 // Conversion to an integer truncates, which rounds what was moved up by half a step, and stays within 0 to 255.
 
-fn constant_byte(value: f32) -> u8 {
+/// The byte nearest to a constant term.
+pub(crate) fn constant_byte(value: f32) -> u8 {
     (f64::from(value) * CONSTANT + 128.0) as u8
 }
 

@@ -2,9 +2,9 @@
 use crate::gaussians::MAX_DEGREE;
 
 /// The first bytes of every header.
-pub(super) const MAGIC: [u8; 4] = *b"NGSP";
+pub(crate) const MAGIC: [u8; 4] = *b"NGSP";
 /// Bytes of the header of versions 2 and 3, and of the part of it that version 4 begins with.
-pub(super) const HEADER: usize = 16;
+pub(crate) const HEADER: usize = 16;
 /// More bits after the point than the 24 that a coordinate has make no sense.
 const MAX_FRACTIONAL_BITS: u8 = 24;
 /// Sections in the order of all versions.

@@ -11,7 +11,7 @@ const MOST: u64 = 8 << 30;
 pub(super) const MOST_AFTER: u64 = 16 << 20;
 
 /// Compares the bytes that a header promises with those of the file; `Err` is the reason for which it is refused.
-pub(super) fn check(promised: u64, file: u64) -> Result<(), String> {
+pub(crate) fn check(promised: u64, file: u64) -> Result<(), String> {
     let allowed = file.saturating_mul(RATIO).saturating_add(SLACK).min(MOST);
     if promised <= allowed {
         return Ok(());

@@ -13,10 +13,10 @@
 //! Gaussians. Every byte is a colour, so that a file has 8 bits for each coefficient, also where its writer rounded
 //! spherical harmonics to 5 or 4.
 mod attributes;
-mod colour;
+pub(crate) mod colour;
 mod gzip;
-mod header;
-mod limits;
+pub(crate) mod header;
+pub(crate) mod limits;
 mod streams;
 
 use crate::Result;
