@@ -88,6 +88,9 @@ pub enum Error {
         /// Its value.
         value: f32,
     },
+    /// Judging marks failed.
+    #[error(transparent)]
+    Evaluation(guardsplat_evaluation::Error),
     /// Somebody asked for the end ([`crate::stop::Stop`]).
     #[error("stopped before it was done; nothing was written")]
     Stopped,

@@ -4,6 +4,7 @@ pub mod clip;
 pub mod device;
 pub mod embed;
 pub mod error;
+pub mod evaluate;
 pub mod extract;
 pub mod memory;
 pub mod message;

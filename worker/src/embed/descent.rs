@@ -23,7 +23,9 @@ const FLOOR: f32 = 1e-2;
 pub struct DescentOptions {
     /// Length of a step: the root mean square change of a picture.
     pub length: f32,
-    /// Share of coefficients other than constant (DC) ones.
+    /// Share of constant (DC) coefficients in it; 0 leaves them alone.
+    pub dc: f32,
+    /// Share of all others.
     pub rest: f32,
     /// The length falls along a half cosine to this share at the last step; 1 keeps it.
     pub final_rate: f32,
@@ -35,7 +37,8 @@ impl Default for DescentOptions {
     fn default() -> Self {
         Self {
             length: 2e-3,
-            rest: 1.0,
+            dc: 1.0,
+            rest: 0.1,
             final_rate: 0.05,
             momentum: 0.8,
         }
@@ -45,6 +48,7 @@ impl Default for DescentOptions {
 impl DescentOptions {
     pub(super) fn check(&self) -> Result<()> {
         within("descent.length", f64::from(self.length), 0.0, 1.0)?;
+        within("descent.dc", f64::from(self.dc), 0.0, 100.0)?;
         within("descent.rest", f64::from(self.rest), 0.0, 100.0)?;
         within("descent.final_rate", f64::from(self.final_rate), 0.0, 1.0)?;
         within("descent.momentum", f64::from(self.momentum), 0.0, 0.999)
@@ -91,7 +95,7 @@ impl Descent {
                 for (row, inverse) in inverse.iter().enumerate() {
                     let mut squares = 0.0;
                     for (k, at) in (row * stride..(row + 1) * stride).enumerate() {
-                        let share = if k < 3 { 1.0 } else { o.rest };
+                        let share = if k < 3 { o.dc } else { o.rest };
                         let step = share * inverse * gradient[at];
                         gradient[at] = 0.0;
                         velocity[at] = o.momentum * velocity[at] + (1.0 - o.momentum) * step;

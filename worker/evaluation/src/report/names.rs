@@ -44,12 +44,12 @@ pub const FORMATS: [&str; 5] = ["ply", "compressed-ply", "spz", "splat", "sog"];
 pub const PAPER_ATTACKS: [&str; 10] = [
     NONE,
     "noise:0.1",
-    "rotation:30",
-    "scaling:0.25",
+    "rotate:-30..30",
+    "scale:0.75..1.25",
     "blur:3",
     "crop:0.4",
-    "brightness:0.5",
+    "brightness:0.5..1.5",
     "jpeg:10",
     "vae:3",
-    "combined",
+    "crop:0.4+brightness:0.5..1.5+jpeg:10",
 ];

@@ -1,0 +1,193 @@
+//! What the experiments of the paper, and ours, need: marks, and what is done to them.
+use guardsplat_evaluation::attack::Attack;
+use guardsplat_evaluation::report::named::Kind;
+use guardsplat_evaluation::report::names;
+
+use super::trial::Trial;
+use crate::embed::{DescentOptions, Settings};
+use crate::error::Result;
+
+/// Bits of most experiments.
+const BITS: usize = 32;
+/// Bits of the paper's robustness table.
+const ROBUST_BITS: usize = 16;
+/// Bits that other work has a figure for.
+const LONGER_BITS: usize = 128;
+
+/// Marks of one length and one variant of the settings, and how they are read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// The experiment that asked first.
+    pub experiment: Kind,
+    /// Bits of the message.
+    pub bits: usize,
+    /// What reports call the settings.
+    pub variant: String,
+    /// The settings, but for their seed.
+    pub settings: Settings,
+    /// What is done before marks are read.
+    pub trials: Vec<Trial>,
+}
+
+/// Everything that some experiments need.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// One of each length and variant.
+    pub wanted: Vec<Wanted>,
+}
+
+impl Plan {
+    fn add(&mut self, experiment: Kind, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
+        let same = |w: &&mut Wanted| w.bits == bits && w.variant == variant;
+        if let Some(known) = self.wanted.iter_mut().find(same) {
+            for trial in trials {
+                if !known.trials.contains(&trial) {
+                    known.trials.push(trial);
+                }
+            }
+            return;
+        }
+        self.wanted.push(Wanted {
+            experiment,
+            bits,
+            variant: variant.into(),
+            settings,
+            trials,
+        });
+    }
+}
+
+/// What these experiments need with `standard` settings. `bits` restricts lengths, where given.
+///
+/// # Errors
+/// None but a suite of attacks that cannot be read, which the tests rule out.
+pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize]) -> Result<Plan> {
+    let mut plan = Plan::default();
+    for &kind in experiments {
+        let mut add = |bits_of: usize, variant: &str, settings: Settings, trials: &[&str]| -> Result<()> {
+            if bits.is_empty() || bits.contains(&bits_of) {
+                plan.add(kind, bits_of, variant, settings, parsed(trials)?);
+            }
+            Ok(())
+        };
+        let none = [names::NONE];
+        match kind {
+            Kind::Capacity => {
+                for bits in [16, 32, 48, 64, 72] {
+                    add(bits, names::STANDARD, *standard, &none)?;
+                }
+            }
+            Kind::Longer => add(LONGER_BITS, names::STANDARD, *standard, &none)?,
+            Kind::Robustness => {
+                let attacks: Vec<String> = Attack::suite("all")
+                    .map_err(super::judged)?
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect();
+                let attacks: Vec<&str> = attacks.iter().map(String::as_str).collect();
+                add(ROBUST_BITS, names::STANDARD, *standard, &attacks)?;
+            }
+            Kind::Trained => {
+                add(BITS, names::STANDARD, *standard, &none)?;
+                add(BITS, names::DC, learning(standard, 1.0, 0.0), &none)?;
+                add(BITS, names::REST, learning(standard, 0.0, 1.0), &none)?;
+            }
+            Kind::Losses => {
+                add(BITS, names::STANDARD, *standard, &none)?;
+                let mut alone = *standard;
+                alone.lambda.reconstruction = 0.0;
+                (alone.lambda.offset_dc, alone.lambda.offset_rest) = (0.0, 0.0);
+                (alone.balance, alone.early_stop) = (None, None);
+                add(BITS, names::MESSAGE_ONLY, alone, &none)?;
+                let mut fixed = *standard;
+                (fixed.balance, fixed.early_stop) = (None, None);
+                add(BITS, FIXED_WEIGHTS, fixed, &none)?;
+            }
+            Kind::Pruning => {
+                let trials = [names::NONE, names::PRUNE_LOWEST, names::PRUNE_RANDOM];
+                add(BITS, names::STANDARD, *standard, &trials)?;
+            }
+            Kind::Perturbations => add(BITS, names::STANDARD, *standard, &PERTURBATIONS)?,
+            Kind::Sensitivity => {
+                add(BITS, names::STANDARD, *standard, &none)?;
+                for weight in [0.25, 0.5, 2.0, 4.0] {
+                    let mut likeness = *standard;
+                    likeness.lambda.reconstruction *= weight as f32;
+                    add(BITS, &format!("{}{weight}", names::LAMBDA_RECON), likeness, &none)?;
+                    let mut message = *standard;
+                    message.lambda.message *= weight as f32;
+                    add(BITS, &format!("{}{weight}", names::LAMBDA_MSG), message, &none)?;
+                }
+            }
+            Kind::Elevation => add(BITS, names::STANDARD, *standard, &none)?,
+            Kind::Formats => {
+                let mut trials = vec![names::NONE.to_string(), "sh-degree:0".into()];
+                trials.extend(names::FORMATS.map(|format| format!("{}{format}", names::FORMAT)));
+                let trials: Vec<&str> = trials.iter().map(String::as_str).collect();
+                add(BITS, names::STANDARD, *standard, &trials)?;
+            }
+            // Made from marks that are there; see `security`.
+            Kind::Security => add(BITS, names::STANDARD, *standard, &none)?,
+        }
+    }
+    Ok(plan)
+}
+
+/// The variant whose weights of the loss stay as they are, instead of being changed so that a PSNR is held.
+const FIXED_WEIGHTS: &str = "fixed weights";
+const PERTURBATIONS: [&str; 8] = [
+    names::NONE,
+    "sh-noise:0.01",
+    "sh-noise:0.02",
+    "sh-noise:0.05",
+    "sh-noise:0.1",
+    "occlusion:0.1",
+    "occlusion:0.2",
+    "occlusion:0.3",
+];
+
+fn parsed(texts: &[&str]) -> Result<Vec<Trial>> {
+    texts.iter().map(|text| text.parse()).collect()
+}
+
+/// Settings that learn constant and other coefficients at these shares of their rates.
+fn learning(standard: &Settings, dc: f32, rest: f32) -> Settings {
+    let mut settings = *standard;
+    settings.adam.rate_dc *= dc;
+    settings.adam.rate_rest *= rest;
+    settings.descent = settings.descent.map(|descent| DescentOptions {
+        dc: descent.dc * dc,
+        rest: descent.rest * rest,
+        ..descent
+    });
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::Preset;
+
+    #[test]
+    fn a_mark_that_several_experiments_need_is_made_once() {
+        let standard = Preset::Standard.settings();
+        let plan = plan(&Kind::ALL, &standard, &[]).unwrap();
+        for (i, one) in plan.wanted.iter().enumerate() {
+            one.settings.check().unwrap();
+            let again = |other: &Wanted| (other.bits, &other.variant) == (one.bits, &one.variant);
+            assert!(!plan.wanted[i + 1..].iter().any(again), "{} {}", one.bits, one.variant);
+        }
+        let standard = plan.wanted.iter().find(|w| w.bits == 32 && w.variant == "standard").unwrap();
+        let names: Vec<String> = standard.trials.iter().map(ToString::to_string).collect();
+        for name in ["none", "prune-random:0.25", "format:spz", "sh-degree:0", "occlusion:0.2"] {
+            assert_eq!(names.iter().filter(|n| *n == name).count(), 1, "{name}");
+        }
+    }
+
+    #[test]
+    fn lengths_can_be_chosen() {
+        let plan = plan(&[Kind::Capacity], &Preset::Standard.settings(), &[32, 64]).unwrap();
+        let bits: Vec<usize> = plan.wanted.iter().map(|w| w.bits).collect();
+        assert_eq!(bits, [32, 64]);
+    }
+}

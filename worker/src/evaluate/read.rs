@@ -1,0 +1,141 @@
+//! Views of a scene as 8-bit pictures, and what is read of them after something was done to them.
+use std::collections::BTreeMap;
+
+use guardsplat_evaluation::attack::Attack;
+use guardsplat_evaluation::report::record::{Id, Reading as Record};
+use image::RgbImage;
+
+use crate::error::{Error, Result};
+use crate::extract::{Engine, Reading};
+use crate::message::Message;
+use crate::picture::Picture;
+use crate::quality::{mean_psnr, psnr};
+use crate::scene::Gaussians;
+use crate::view::{Camera, Split, ViewSampler};
+
+/// Numbers of views from which the whole message is read.
+const MESSAGE_VIEWS: [u32; 3] = [1, 5, 10];
+
+/// A camera, and how high it stands over the scene's horizon in degrees.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub camera: Camera,
+    pub elevation: f32,
+}
+
+/// Held-out cameras around a scene.
+pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64) -> Result<Vec<Placed>> {
+    let sampler = ViewSampler::new(gaussians, seed)?;
+    let (up, centre) = (sampler.extent().up, sampler.extent().centre);
+    let place = |index: usize| {
+        let camera = sampler.camera(Split::HeldOut, index as u64, size);
+        let eye: [f32; 3] =
+            std::array::from_fn(|k| -(0..3).map(|r| camera.rotation[r][k] * camera.translation[r]).sum::<f32>());
+        let from: [f32; 3] = std::array::from_fn(|k| eye[k] - centre[k]);
+        let length = from.iter().map(|v| v * v).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
+        let height: f32 = from.iter().zip(up).map(|(f, u)| f * u).sum::<f32>() / length;
+        Placed {
+            camera,
+            elevation: height.clamp(-1.0, 1.0).asin().to_degrees(),
+        }
+    };
+    Ok((0..views).map(place).collect())
+}
+
+/// Pictures of a scene from some cameras, over white.
+pub(super) struct Views {
+    pub cameras: Vec<Placed>,
+    pub images: Vec<RgbImage>,
+}
+
+impl Views {
+    pub fn render(engine: &Engine, gaussians: &Gaussians, cameras: &[Placed]) -> Result<Self> {
+        let images = cameras
+            .iter()
+            .map(|placed| to_image(&engine.picture(gaussians, &placed.camera, [1.0; 3])?))
+            .collect::<Result<_>>()?;
+        Ok(Self {
+            cameras: cameras.to_vec(),
+            images,
+        })
+    }
+
+    pub fn pictures(&self) -> Result<Vec<Picture>> {
+        Ok(self.images.iter().map(to_picture).collect())
+    }
+
+    /// Logits of all views.
+    pub fn read(&self, engine: &Engine) -> Result<Reading> {
+        let mut logits = Vec::with_capacity(self.images.len());
+        // One at a time: large pictures of all views need not be there as floats.
+        for image in &self.images {
+            logits.extend(engine.read_logits(&[to_picture(image)])?);
+        }
+        Reading::new(logits)
+    }
+
+    /// The same views after an attack on each.
+    pub fn attacked(&self, attack: &Attack, seed: u64) -> Result<Self> {
+        let images = self.images.iter().enumerate();
+        let images = images
+            .map(|(index, image)| attack.apply(image, seed, index as u64).map_err(super::judged))
+            .collect::<Result<_>>()?;
+        Ok(Self {
+            cameras: self.cameras.clone(),
+            images,
+        })
+    }
+
+    /// What is read of these views, which were `before` until something was done to them.
+    pub fn record(&self, engine: &Engine, message: &Message, mark: &Id, attack: &str, before: &Views) -> Result<Record> {
+        let reading = self.read(engine)?;
+        let right = reading
+            .views
+            .iter()
+            .map(|logits| Ok(Message::from_logits(logits)?.matches(message) as u16))
+            .collect::<Result<Vec<u16>>>()?;
+        let mut from = BTreeMap::new();
+        for views in MESSAGE_VIEWS.into_iter().filter(|n| *n as usize <= right.len()) {
+            from.insert(views, reading.of_first(views as usize)?.message()? == *message);
+        }
+        Ok(Record {
+            mark: mark.clone(),
+            attack: attack.into(),
+            size: self.cameras.first().map_or(0, |placed| placed.camera.width),
+            views: right.len() as u32,
+            bits: message.len() as u32,
+            bits_right: right,
+            message_right_from: from,
+            psnr_db: self.psnr(before)?,
+            elevation_deg: Some(self.cameras.iter().map(|placed| placed.elevation).collect()),
+        })
+    }
+
+    /// Mean PSNR against other pictures of the same sizes, if they are, and differ.
+    fn psnr(&self, before: &Views) -> Result<Option<f64>> {
+        let pairs = || self.images.iter().zip(&before.images);
+        if pairs().any(|(a, b)| a.dimensions() != b.dimensions()) {
+            return Ok(None);
+        }
+        let each = pairs()
+            .map(|(a, b)| psnr(&to_picture(a), &to_picture(b)))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(mean_psnr(&each)?.psnr_db)
+    }
+}
+
+fn to_image(picture: &Picture) -> Result<RgbImage> {
+    let bytes = picture.pixels.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8);
+    RgbImage::from_raw(picture.width, picture.height, bytes.collect()).ok_or_else(|| Error::BadOption {
+        field: "picture",
+        reason: format!("{} numbers are not {} x {} pixels", picture.pixels.len(), picture.width, picture.height),
+    })
+}
+
+fn to_picture(image: &RgbImage) -> Picture {
+    Picture {
+        width: image.width(),
+        height: image.height(),
+        pixels: image.as_raw().iter().map(|v| f32::from(*v) / 255.0).collect(),
+    }
+}

@@ -1,0 +1,200 @@
+//! Does what a plan wants and the store does not have yet.
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use guardsplat_evaluation::report::record::{Embedding, Record, reading_id};
+use guardsplat_evaluation::report::store::Store;
+use rand::SeedableRng;
+use rand_chacha::ChaCha20Rng;
+use sha2::{Digest, Sha256};
+
+use super::mark::{Making, path};
+use super::plan::{Plan, Wanted};
+use super::read::{Views, cameras};
+use super::trial::Trial;
+use crate::embed;
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+use crate::message::{Key, Message};
+use crate::scene::Scene;
+
+/// Over what a plan is carried out.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Scene files; what they are called in reports is their file name.
+    pub scenes: Vec<PathBuf>,
+    /// Seeds, each with a key, a message and views of its own.
+    pub seeds: Vec<u64>,
+    /// Side of the pictures that are read, in pixels.
+    pub size: u32,
+    /// Held-out views of each mark.
+    pub views: usize,
+}
+
+/// What a run tells whoever watches it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Progress {
+    /// A mark begins: which, of how many, and in words.
+    Mark(usize, usize, String),
+    /// How its embedding goes.
+    Embedding(embed::Progress),
+    /// A mark was read under an attack, with this share of bits right.
+    Read(String, f64),
+}
+
+/// Carries out `plan`. `engine` makes the engine for a length and a seed, with the key, and says how long the key took if
+/// it was made now; it is called once for each pair that something is left to do for.
+///
+/// # Errors
+/// Whatever reading, embedding and writing may fail with. What was recorded before stays, and is not done again.
+pub fn run(
+    plan: &Plan,
+    options: &Options,
+    store: &mut Store,
+    mut engine: impl FnMut(usize, u64) -> Result<(Engine, Key, Option<f64>)>,
+    mut progress: impl FnMut(Progress),
+) -> Result<()> {
+    let total = plan.wanted.len() * options.scenes.len() * options.seeds.len();
+    let mut done = 0;
+    // Seed by seed and length by length, so that what there is after a while is even over scenes.
+    for &seed in &options.seeds {
+        for wanted in &plan.wanted {
+            let mut loaded: Option<(Engine, Key, Option<f64>)> = None;
+            for scene in &options.scenes {
+                done += 1;
+                if loaded.is_none() {
+                    loaded = Some(engine(wanted.bits, seed)?);
+                }
+                let Some((engine, key, key_seconds)) = &mut loaded else {
+                    continue;
+                };
+                let name = name(scene);
+                progress(Progress::Mark(
+                    done,
+                    total,
+                    format!("{name}, {} bits, {}, seed {seed}", wanted.bits, wanted.variant),
+                ));
+                let one = One {
+                    wanted,
+                    options,
+                    seed,
+                    engine,
+                    key,
+                    key_seconds: key_seconds.take(),
+                };
+                one.carry_out(scene, &name, store, &mut progress)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What a scene is called.
+fn name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+/// The message of a seed: none that a decoder was trained on, but for lengths of few messages.
+fn message(bits: usize, seed: u64) -> Result<Message> {
+    let mut rng = ChaCha20Rng::seed_from_u64(seed ^ 0x6d65_7373_6167_6500);
+    Message::random(bits, &mut rng)
+}
+
+/// One mark and its readings.
+struct One<'a> {
+    wanted: &'a Wanted,
+    options: &'a Options,
+    seed: u64,
+    engine: &'a Engine,
+    key: &'a Key,
+    key_seconds: Option<f64>,
+}
+
+impl One<'_> {
+    fn embedding(&self, name: &str, message: &Message) -> Result<Embedding> {
+        let settings = serde_json::to_vec(&self.wanted.settings).map_err(|e| Error::BadOption {
+            field: "settings",
+            reason: e.to_string(),
+        })?;
+        Ok(Embedding {
+            scene: name.into(),
+            bits: self.wanted.bits as u32,
+            variant: self.wanted.variant.clone(),
+            settings_hash: hex::encode(&Sha256::digest(settings)[..8]),
+            seed: self.seed,
+            key_seed: self.key.seed.unwrap_or(0),
+            message: message.to_string(),
+            clip: self.key.clip.name.clone(),
+            clip_hash: self.key.clip.hash.clone(),
+            engine_version: env!("CARGO_PKG_VERSION").into(),
+            size: self.options.size,
+        })
+    }
+
+    fn carry_out(
+        &self,
+        path_of_scene: &Path,
+        name: &str,
+        store: &mut Store,
+        progress: &mut impl FnMut(Progress),
+    ) -> Result<()> {
+        let message = message(self.wanted.bits, self.seed)?;
+        let embedding = self.embedding(name, &message)?;
+        let id = embedding.id();
+        let (size, views) = (self.options.size, self.options.views);
+        let left = |store: &Store| -> Vec<&Trial> {
+            let is_left = |trial: &&Trial| !store.has(&reading_id(&id, &trial.to_string(), size, views as u32));
+            self.wanted.trials.iter().filter(is_left).collect()
+        };
+        if store.has(&id) && left(store).is_empty() {
+            return Ok(());
+        }
+        let scene = Scene::read(path_of_scene)?;
+        let cameras = cameras(&scene.gaussians, views, size, self.seed)?;
+        let file = path(store.folder(), &id.to_string(), &scene);
+        let marked = if store.has(&id) && file.is_file() {
+            Scene::read(&file)?.into_gaussians()
+        } else {
+            let settings = embed::Settings {
+                seed: self.seed,
+                ..self.wanted.settings
+            };
+            let making = Making {
+                engine: self.engine,
+                scene: &scene,
+                message: &message,
+                settings: &settings,
+                folder: store.folder(),
+            };
+            let unmarked = Views::render(self.engine, &scene.gaussians, &cameras)?;
+            let key = (self.key_seconds, self.key.accuracy_unseen);
+            let start = Instant::now();
+            let (mark, marked) = making.make(embedding, self.wanted.experiment.name(), key, &unmarked, &mut |p| {
+                progress(Progress::Embedding(p));
+            })?;
+            tracing::debug!(seconds = start.elapsed().as_secs_f64(), "marked");
+            // A file that was lost is made again; its mark is known.
+            if !store.has(&id) {
+                store.append(Record::Mark(mark)).map_err(super::judged)?;
+            }
+            marked
+        };
+        let trials = left(store);
+        let plain = Views::render(self.engine, &marked, &cameras)?;
+        for trial in trials {
+            let read = match trial {
+                Trial::Pictures { attack, .. } => plain.attacked(attack, self.seed)?,
+                Trial::Scene(change) => {
+                    let changed = change.apply(&marked, self.seed)?;
+                    Views::render(self.engine, &changed, &cameras)?
+                }
+            };
+            let attack = trial.to_string();
+            let record = read.record(self.engine, &message, &id, &attack, &plain)?;
+            let accuracy = record.accuracy();
+            store.append(Record::Reading(record)).map_err(super::judged)?;
+            progress(Progress::Read(attack, accuracy));
+        }
+        Ok(())
+    }
+}
