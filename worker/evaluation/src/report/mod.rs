@@ -2,6 +2,7 @@
 mod interval;
 pub mod named;
 pub mod names;
+pub mod output;
 pub mod paper;
 pub mod plot;
 pub mod record;
@@ -11,4 +12,3 @@ pub mod summary;
 pub mod table;
 #[cfg(test)]
 mod testing;
-mod whole;

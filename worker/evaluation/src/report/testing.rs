@@ -2,6 +2,9 @@
 use super::record::{Detection, Embedding, Mark, Reading, Record};
 use super::store::Records;
 
+/// A change of a record, and the field that it is of.
+pub type Change<T> = (&'static str, fn(&mut T));
+
 /// A mark whose results are round numbers.
 pub fn mark(scene: &str, bits: u32, variant: &str, seed: u64) -> Mark {
     Mark {

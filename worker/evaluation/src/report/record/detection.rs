@@ -73,7 +73,7 @@ pub fn detection_id(detector: &str, scenes: &[String], marks: &[Id], seed: u64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::{detection, mark};
+    use crate::report::testing::{Change, detection, mark};
 
     #[test]
     fn order_does_not_identify_but_seeds_do() {
@@ -91,7 +91,7 @@ mod tests {
     fn impossible_detections_are_refused() {
         let marks = [mark("lego", 16, "standard", 1)];
         detection(&marks).check().unwrap();
-        let changes: [(&str, fn(&mut Detection)); 5] = [
+        let changes: [Change<Detection>; 5] = [
             ("marks", |d| d.marks.clear()),
             ("clean", |d| d.clean.clear()),
             ("scores", |d| d.marked.push(f64::INFINITY)),

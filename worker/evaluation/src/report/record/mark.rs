@@ -158,7 +158,7 @@ fn present<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::mark;
+    use crate::report::testing::{Change, mark};
 
     #[test]
     fn results_experiment_and_device_do_not_identify() {
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn impossible_marks_are_refused() {
         mark("lego", 16, "standard", 1).check().unwrap();
-        let changes: [(&str, fn(&mut Mark)); 9] = [
+        let changes: [Change<Mark>; 9] = [
             ("psnr_db", |m| m.psnr_db = Some(f64::INFINITY)),
             ("ssim", |m| m.ssim = f64::NAN),
             ("lpips", |m| m.lpips = Some(-0.1)),

@@ -16,6 +16,7 @@ use crate::error::Result;
 use serde::{Deserialize, Serialize};
 
 /// One line of a store.
+#[allow(clippy::large_enum_variant)] // Records are passed on one by one, and kept by kind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Record {

@@ -107,7 +107,7 @@ impl Reading {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::{mark, reading};
+    use crate::report::testing::{Change, mark, reading};
 
     #[test]
     fn accuracy_is_the_share_of_bits_by_view() {
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn impossible_readings_are_refused() {
         let mark = mark("lego", 16, "standard", 1);
-        let changes: [(&str, fn(&mut Reading)); 6] = [
+        let changes: [Change<Reading>; 6] = [
             ("bits_right", |r| r.views = 3),
             ("bits_right", |r| r.bits_right = vec![17, 0]),
             ("message_right_from", |r| {

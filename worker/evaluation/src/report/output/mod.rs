@@ -1,0 +1,18 @@
+//! Reports as files: JSON and CSV for programs, HTML for people, Markdown for documents. The same records give the same
+//! bytes.
+mod csv;
+mod html;
+mod json;
+mod markdown;
+mod markers;
+mod picture;
+mod whole;
+
+pub use csv::{to_csv, write_csv};
+pub use html::{to_html, write_html};
+pub use json::{to_json, write_json};
+pub use markdown::{to_markdown, write_markdown};
+pub use markers::{replace_between, replace_in_file};
+
+#[cfg(test)]
+mod tests;
