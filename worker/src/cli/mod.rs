@@ -1,6 +1,7 @@
 //! The command line: what there is to say, and what the process exits with.
 mod display;
 mod embed;
+mod evaluate;
 mod inspect;
 mod key;
 mod models;
@@ -69,6 +70,8 @@ enum Command {
     /// Weights of other CLIP models and of LPIPS
     #[command(subcommand)]
     Models(models::Command),
+    /// Measures marks: scenes, lengths and seeds under attacks, kept in a folder, with reports
+    Evaluate(Box<evaluate::Arguments>),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
 }
@@ -145,6 +148,7 @@ fn carry_out(command: Command) -> Result<Exit> {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Models(command) => models::run(command),
         Command::Run(arguments) => Ok(run::run(arguments)),

@@ -1,0 +1,175 @@
+//! `evaluate`.
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
+use guardsplat_evaluation::report::output;
+use guardsplat_evaluation::report::selection::Selection;
+use guardsplat_evaluation::report::store::Store;
+use guardsplat_worker::device::{Compute, DeviceChoice, open};
+use guardsplat_worker::embed::{self, Preset, Settings};
+use guardsplat_worker::evaluate::{Options, Progress, plan, run as carry_out};
+use guardsplat_worker::extract::Engine;
+use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
+use guardsplat_worker::stop::Stop;
+use guardsplat_worker::{Error, Result};
+
+use super::display::Display;
+use super::{Budget, Exit, print_line};
+use crate::work::{keys, load};
+
+#[derive(Args)]
+pub struct Arguments {
+    /// A folder for results; what is there already is not done again
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Scene files
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    scenes: Vec<PathBuf>,
+    /// Which experiments: capacity, robustness, trained, losses, pruning, longer, perturbations, sensitivity, elevation,
+    /// formats, security
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "capacity")]
+    experiments: Vec<Kind>,
+    /// Only messages of these lengths
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    bits: Vec<usize>,
+    /// Seeds, each with a key, a message and views of its own
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2,3")]
+    seeds: Vec<u64>,
+    /// The settings that are called standard: draft, standard or paper
+    #[arg(long, default_value = "standard")]
+    preset: Preset,
+    /// A JSON file with settings in place of the preset's
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
+    settings: Option<PathBuf>,
+    /// Side of the pictures that are read, in pixels
+    #[arg(long, value_name = "PX", default_value_t = 160, value_parser = clap::value_parser!(u32).range(16..=4096))]
+    size: u32,
+    /// Held-out views of each mark
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    views: u32,
+    /// A CLIP that was added with `models add`, instead of the shipped one
+    #[arg(long)]
+    clip: Option<String>,
+    /// Where to compute: auto, wgpu or cpu
+    #[arg(long, default_value = "auto")]
+    device: DeviceChoice,
+    #[command(flatten)]
+    budget: Budget,
+    /// Makes the reports of what is there, and nothing new
+    #[arg(long)]
+    report_only: bool,
+    /// A Markdown file whose tables between markers are replaced too
+    #[arg(long, value_name = "FILE")]
+    document: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let mut store = Store::open(&arguments.folder).map_err(Error::Evaluation)?;
+    if !arguments.report_only {
+        measure(arguments, &mut store)?;
+    }
+    write_reports(arguments, &store)?;
+    Ok(Exit::Done)
+}
+
+fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
+    if arguments.scenes.is_empty() {
+        return Err(Error::BadOption {
+            field: "scenes",
+            reason: "name at least one, or ask for --report-only".into(),
+        });
+    }
+    let plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits)?;
+    let options = Options {
+        scenes: arguments.scenes.clone(),
+        seeds: arguments.seeds.clone(),
+        size: arguments.size,
+        views: arguments.views as usize,
+    };
+    let folder = arguments.folder.join("keys");
+    std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
+    let mut display = Display::new("marking");
+    let engine = |bits, seed| engine(arguments, &folder, open(arguments.device)?, bits, seed);
+    carry_out(&plan, &options, store, engine, |progress| match progress {
+        Progress::Mark(done, total, what) => display.say(&format!("mark {done} of {total}: {what}")),
+        Progress::Embedding(embed::Progress::Step(step)) => display.set(step.step, step.total, || {
+            format!("bits {:.1} %, PSNR {:.1} dB", 100.0 * step.bit_accuracy, step.psnr_db)
+        }),
+        Progress::Embedding(_) => {}
+        Progress::Read(attack, accuracy) => display.say(&format!("  {attack}: {:.2} %", 100.0 * accuracy)),
+    })
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings> {
+    let settings = arguments.preset.settings();
+    match &arguments.settings {
+        None => Ok(settings),
+        Some(path) => settings.overridden(&std::fs::read_to_string(path).map_err(Error::io(path))?),
+    }
+}
+
+/// The engine for a length and a seed, with a key that is kept in `folder`, and the seconds that making it took.
+fn engine(
+    arguments: &Arguments,
+    folder: &Path,
+    compute: Compute,
+    bits: usize,
+    seed: u64,
+) -> Result<(Engine, Key, Option<f64>)> {
+    let clip = arguments.clip.as_deref();
+    let start = Instant::now();
+    let path = folder.join(format!("{}-{bits}-{seed}.key", clip.unwrap_or(load::SHIPPED)));
+    let known = path.is_file().then(|| Key::read(&path)).transpose()?;
+    let (_, identity) = load::clip(clip, &compute, guardsplat_worker::clip::Parts::Image)?;
+    // A key of another CLIP of that name is one of an earlier version.
+    let (key, seconds) = match known.filter(|key| key.clip.hash == identity.hash) {
+        Some(key) => (key, None),
+        None => {
+            let options = KeyOptions {
+                bits,
+                bits_per_token: None,
+                seed: Some(seed),
+                training: TrainingOptions::default(),
+            };
+            let stop = Stop::default();
+            let key = keys::create(&options, keys::Kept::default(), clip, &compute, &stop, |_| {})?;
+            key.write(&path)?;
+            (key, Some(start.elapsed().as_secs_f64()))
+        }
+    };
+    let engine = load::engine(&path, &key, clip, compute, true, arguments.budget.bytes())?;
+    Ok((engine, key, seconds))
+}
+
+fn write_reports(arguments: &Arguments, store: &Store) -> Result<()> {
+    let Some(selection) = Selection::newest(store.records()) else {
+        print_line("nothing was measured yet");
+        return Ok(());
+    };
+    let options = ReportOptions {
+        per_scene: true,
+        ..ReportOptions::default()
+    };
+    let folder = &arguments.folder;
+    let write = || -> guardsplat_evaluation::Result<()> {
+        let reports = arguments
+            .experiments
+            .iter()
+            .map(|kind| report(*kind, &selection, &options))
+            .collect::<guardsplat_evaluation::Result<Vec<_>>>()?;
+        output::write_json(&reports, &folder.join("report.json"))?;
+        output::write_csv(&selection, &folder.join("readings.csv"))?;
+        output::write_html(&reports, folder, &folder.join("report.html"))?;
+        if let Some(document) = &arguments.document {
+            for report in &reports {
+                output::write_markdown(report, document)?;
+            }
+        }
+        Ok(())
+    };
+    write().map_err(Error::Evaluation)?;
+    print_line(&format!("written to {}", folder.join("report.html").display()));
+    Ok(())
+}
