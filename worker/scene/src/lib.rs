@@ -1,7 +1,10 @@
 //! Scenes: Gaussians in memory, and the files of every common format that they come from.
 //!
-//! A written file differs from the one read in nothing but its colours, and is of the same format. Only the bands of
-//! spherical harmonics that hold something are in memory, whatever the file has room for.
+//! A scene that is written differs from the file that was read in nothing but its colours, and is of the same format.
+//! Only the bands of spherical harmonics that hold something are in memory, whatever the file has room for.
+//!
+//! [`convert`] writes any Gaussians in any format, [`alter`] makes the changes that people make to scenes, and
+//! [`quantise`] says what formats keep of colours: what a hidden mark has to stand.
 pub mod alter;
 mod container;
 pub mod convert;

@@ -11,19 +11,18 @@ const FEW: usize = 256;
 pub(crate) fn morton(positions: &[[f32; 3]]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..positions.len()).collect();
     // A stack instead of a recursion: its depth would be up to the positions.
-    let mut boxes = vec![0..order.len()];
-    while let Some(cell) = boxes.pop() {
-        let rows = &mut order[cell.clone()];
+    let mut boxes = Vec::from([(0, order.len())]);
+    while let Some((mut start, end)) = boxes.pop() {
+        let rows = &mut order[start..end];
         let Some(code) = coder(positions, rows) else { continue };
         let mut coded: Vec<(u32, usize)> = rows.iter().map(|row| (code(*row), *row)).collect();
         coded.sort_unstable();
         rows.iter_mut()
             .zip(&coded)
             .for_each(|(row, (_, sorted))| *row = *sorted);
-        let mut start = cell.start;
         for same in coded.chunk_by(|a, b| a.0 == b.0) {
             if same.len() > FEW {
-                boxes.push(start..start + same.len());
+                boxes.push((start, start + same.len()));
             }
             start += same.len();
         }

@@ -101,11 +101,9 @@ fn real_scenes_too() {
         let constants = |place| place < 3;
         let rests = |place| place >= 3;
         let shares = [share(&stand_in, &constants), share(&file, &constants)];
-        eprintln!("{name}: constants {shares:?}, apart {}", apart(&stand_in, &file));
         assert!((shares[0] - shares[1]).abs() < 0.05, "{name}: {shares:?}");
         if scene.sh.degree > 0 {
             let shares = [share(&stand_in, &rests), share(&file, &rests)];
-            eprintln!("{name}: rests {shares:?}");
             assert!((shares[0] - shares[1]).abs() < 0.1, "{name}: {shares:?}");
         }
     }

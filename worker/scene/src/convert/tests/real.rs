@@ -33,7 +33,7 @@ fn a_real_scene_of_three_bands() {
 fn a_real_scene_of_three_bands_as_a_sog() {
     let Some(scene) = scene("pod.ply") else { return };
     let file = checked(&scene, Format::Sog);
-    // A palette of 65,536 leaves a fifth of the harmonics' variance at most.
+    // A palette of 65,536 loses 0.4 % of the harmonics' power.
     let given = reordered(&scene, &file.written.order, 3);
     let read = &file.scene.gaussians;
     let (mut error, mut power) = (0.0, 0.0);
@@ -43,8 +43,7 @@ fn a_real_scene_of_three_bands_as_a_sog() {
             power += f64::from(*given).powi(2);
         }
     }
-    eprintln!("{} of the power is lost", error / power);
-    assert!(error < 0.2 * power, "{error} of {power}");
+    assert!(error < 0.006 * power, "{error} of {power}");
 }
 
 /// `pod.ply` was made of `pod.spz`, whose writer had the same steps of all but rotations.
@@ -65,7 +64,7 @@ fn an_spz_of_an_spz_has_its_numbers() {
     assert_eq!(same, spz.sh.coefficients.len());
 }
 
-/// Time and size; prints and never fails.
+/// Time on a core, whatever else the machine does, and size; prints and never fails.
 #[test]
 #[ignore = "a measurement"]
 fn measure() {
@@ -73,10 +72,17 @@ fn measure() {
         let Some(scene) = scene(name) else { return };
         for format in Format::ALL {
             let mut bytes = Vec::new();
-            let start = std::time::Instant::now();
+            let start = cpu_seconds();
             convert(&scene, format, Path::new(name), &mut bytes).unwrap();
-            let seconds = start.elapsed().as_secs_f64();
+            let seconds = cpu_seconds() - start;
             eprintln!("{name} as {}: {seconds:.2} s, {} bytes", format.name(), bytes.len());
         }
     }
+}
+
+/// Time that this thread has had on a core, where the system says so.
+fn cpu_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split(' ').next().and_then(|word| word.parse::<f64>().ok());
+    nanoseconds.map_or(f64::NAN, |ns| ns * 1e-9)
 }
