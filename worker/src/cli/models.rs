@@ -66,6 +66,9 @@ pub struct Train {
     /// Sides of the squares that are averaged into one pixel of a scale
     #[arg(long, hide_short_help = true, value_delimiter = ',', default_values_t = TrainOptions::default().scales)]
     scales: Vec<usize>,
+    /// Side of the square whose mean is subtracted from a pixel, odd
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().surround)]
+    surround: usize,
     /// Least norm of a filter, for pictures of unit deviation
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().norm[0])]
     least_norm: f32,
@@ -107,6 +110,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         batch: arguments.batch,
         filters: arguments.filters,
         scales: arguments.scales.clone(),
+        surround: arguments.surround,
         norm: [arguments.least_norm, arguments.largest_norm],
         dims: arguments.dims,
         text_width: arguments.text_width,

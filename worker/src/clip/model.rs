@@ -65,9 +65,13 @@ impl ImageTower {
             VisionTower::ResNet { layers, heads } => {
                 Self::ResNet(ResNet::new(vision, *layers, *heads, embed_dim, device))
             }
-            VisionTower::Statistics { scales, kernel } => {
-                Self::Statistics(StatisticsTower::new(vision, scales, *kernel, embed_dim, device))
-            }
+            VisionTower::Statistics {
+                scales,
+                kernel,
+                surround,
+            } => Self::Statistics(StatisticsTower::new(
+                vision, scales, *kernel, *surround, embed_dim, device,
+            )),
         }
     }
 

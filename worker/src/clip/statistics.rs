@@ -34,16 +34,26 @@ struct Scale {
     bias: Param<Tensor<1>>,
     /// Side of the square that is averaged into one pixel of this scale.
     size: usize,
+    /// Side of the square whose mean is subtracted from a pixel.
+    surround: usize,
 }
 
 impl StatisticsTower {
     /// Lays out the tower; `embed_dim` is the width of its features.
-    pub fn new(vision: &VisionConfig, scales: &[usize], kernel: usize, embed_dim: usize, device: &Device) -> Self {
+    pub fn new(
+        vision: &VisionConfig,
+        scales: &[usize],
+        kernel: usize,
+        surround: usize,
+        embed_dim: usize,
+        device: &Device,
+    ) -> Self {
         let filters = vision.width;
         let scale = |&size: &usize| Scale {
             weight: param([filters, 3, kernel, kernel], device),
             bias: param([filters], device),
             size,
+            surround,
         };
         Self {
             scales: scales.iter().map(scale).collect(),
@@ -71,6 +81,7 @@ impl StatisticsTower {
             weight: set(scale.weight, weights.to_vec()),
             bias: set(scale.bias, phases.to_vec()),
             size: scale.size,
+            surround: scale.surround,
         };
         self.scales = self.scales.into_iter().zip(weights.zip(phases)).map(fill).collect();
         self
@@ -89,6 +100,16 @@ impl Scale {
         let x = match self.size {
             1 => pictures,
             n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
+        };
+        let x = match self.surround {
+            1 => x,
+            n => {
+                let inside = AvgPoolOptions::new([n; 2])
+                    .with_stride([1; 2])
+                    .with_padding([n / 2; 2])
+                    .with_count_include_pad(false);
+                x.clone() - avg_pool2d(x, inside)
+            }
         };
         let filters = self.weight.val().reshape([-1, 3]); // the kernel is one pixel
         mean_sines(x, filters, self.bias.val())

@@ -134,7 +134,11 @@ impl<'a> Run<'a> {
         let (rows, columns) = (learnable.rows().len(), learnable.columns());
         let optimiser = match settings.descent {
             Some(options) => {
-                let energies: Vec<f32> = learnable.rows().iter().map(|r| coverage.energies[*r as usize]).collect();
+                let energies: Vec<f32> = learnable
+                    .rows()
+                    .iter()
+                    .map(|r| coverage.energies[*r as usize])
+                    .collect();
                 Optimiser::Descent(Descent::new(options, columns, &energies))
             }
             None => Optimiser::Adam(Adam::new(settings.adam, rows, columns, scene.gaussians.len())),

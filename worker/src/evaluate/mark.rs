@@ -29,7 +29,9 @@ pub(super) struct Making<'a> {
 
 /// Where the marked scene of an embedding lies, in the store's folder.
 pub(super) fn path(folder: &Path, id: &str, scene: &Scene) -> PathBuf {
-    folder.join("marks").join(format!("{id}.{}", scene.format().extension()))
+    folder
+        .join("marks")
+        .join(format!("{id}.{}", scene.format().extension()))
 }
 
 impl Making<'_> {
@@ -57,7 +59,8 @@ impl Making<'_> {
         let id = embedding.id().to_string();
         let path = path(self.folder, &id, self.scene);
         make_folder(&path)?;
-        self.scene.write(&path, &optimised.learned.colours(&self.scene.gaussians.sh))?;
+        self.scene
+            .write(&path, &optimised.learned.colours(&self.scene.gaussians.sh))?;
         let marked = Scene::read(&path)?.into_gaussians();
 
         let seen = Views::render(self.engine, &marked, &unmarked.cameras)?;

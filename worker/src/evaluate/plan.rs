@@ -177,9 +177,19 @@ mod tests {
             let again = |other: &Wanted| (other.bits, &other.variant) == (one.bits, &one.variant);
             assert!(!plan.wanted[i + 1..].iter().any(again), "{} {}", one.bits, one.variant);
         }
-        let standard = plan.wanted.iter().find(|w| w.bits == 32 && w.variant == "standard").unwrap();
+        let standard = plan
+            .wanted
+            .iter()
+            .find(|w| w.bits == 32 && w.variant == "standard")
+            .unwrap();
         let names: Vec<String> = standard.trials.iter().map(ToString::to_string).collect();
-        for name in ["none", "prune-random:0.25", "format:spz", "sh-degree:0", "occlusion:0.2"] {
+        for name in [
+            "none",
+            "prune-random:0.25",
+            "format:spz",
+            "sh-degree:0",
+            "occlusion:0.2",
+        ] {
             assert_eq!(names.iter().filter(|n| *n == name).count(), 1, "{name}");
         }
     }

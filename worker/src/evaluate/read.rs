@@ -29,8 +29,11 @@ pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64)
     let (up, centre) = (sampler.extent().up, sampler.extent().centre);
     let place = |index: usize| {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let eye: [f32; 3] =
-            std::array::from_fn(|k| -(0..3).map(|r| camera.rotation[r][k] * camera.translation[r]).sum::<f32>());
+        let eye: [f32; 3] = std::array::from_fn(|k| {
+            -(0..3)
+                .map(|r| camera.rotation[r][k] * camera.translation[r])
+                .sum::<f32>()
+        });
         let from: [f32; 3] = std::array::from_fn(|k| eye[k] - centre[k]);
         let length = from.iter().map(|v| v * v).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
         let height: f32 = from.iter().zip(up).map(|(f, u)| f * u).sum::<f32>() / length;
@@ -87,7 +90,14 @@ impl Views {
     }
 
     /// What is read of these views, which were `before` until something was done to them.
-    pub fn record(&self, engine: &Engine, message: &Message, mark: &Id, attack: &str, before: &Views) -> Result<Record> {
+    pub fn record(
+        &self,
+        engine: &Engine,
+        message: &Message,
+        mark: &Id,
+        attack: &str,
+        before: &Views,
+    ) -> Result<Record> {
         let reading = self.read(engine)?;
         let right = reading
             .views
@@ -128,7 +138,12 @@ fn to_image(picture: &Picture) -> Result<RgbImage> {
     let bytes = picture.pixels.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8);
     RgbImage::from_raw(picture.width, picture.height, bytes.collect()).ok_or_else(|| Error::BadOption {
         field: "picture",
-        reason: format!("{} numbers are not {} x {} pixels", picture.pixels.len(), picture.width, picture.height),
+        reason: format!(
+            "{} numbers are not {} x {} pixels",
+            picture.pixels.len(),
+            picture.width,
+            picture.height
+        ),
     })
 }
 

@@ -91,7 +91,8 @@ pub fn run(
 
 /// What a scene is called.
 fn name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    path.file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 /// The message of a seed: none that a decoder was trained on, but for lengths of few messages.

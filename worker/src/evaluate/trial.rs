@@ -128,14 +128,20 @@ const FORMATS: [(&str, Format); 5] = [
 ];
 
 fn format_name(format: Format) -> &'static str {
-    FORMATS.iter().find(|(_, f)| *f == format).map_or("ply", |(name, _)| name)
+    FORMATS
+        .iter()
+        .find(|(_, f)| *f == format)
+        .map_or("ply", |(name, _)| name)
 }
 
 fn format_of(name: &str) -> Result<Format> {
     let found = FORMATS.iter().find(|(known, _)| *known == name);
     found.map(|(_, format)| *format).ok_or_else(|| Error::BadOption {
         field: "attack",
-        reason: format!("{name:?} is no format of scenes; known are {}", FORMATS.map(|(name, _)| name).join(", ")),
+        reason: format!(
+            "{name:?} is no format of scenes; known are {}",
+            FORMATS.map(|(name, _)| name).join(", ")
+        ),
     })
 }
 
@@ -147,7 +153,13 @@ mod tests {
     #[test]
     fn names_are_those_of_the_reports() {
         let all = names::PAPER_ATTACKS.iter().filter(|name| !name.starts_with("vae"));
-        let scene = ["prune-lowest:0.25", "prune-random:0.5", "sh-noise:0.02", "sh-degree:0", "occlusion:0.1"];
+        let scene = [
+            "prune-lowest:0.25",
+            "prune-random:0.5",
+            "sh-noise:0.02",
+            "sh-degree:0",
+            "occlusion:0.1",
+        ];
         for name in all.chain(&scene) {
             assert_eq!(name.parse::<Trial>().unwrap().to_string(), *name);
         }

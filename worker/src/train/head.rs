@@ -26,6 +26,8 @@ const STEERED: usize = 3;
 const STEERED_VIEWS: usize = 5;
 /// Weight of the squared means of scenes beside the variation between views of one.
 const BETWEEN: f64 = 0.3;
+/// Noise on constant coefficients of the scenes whose gradients are measured, where filters see contrasts.
+const GRAIN: f32 = 0.15;
 /// Scenes on which the head is measured, not those it is fitted to.
 const MEASURED: u64 = 60;
 /// Smallest natural variance that is believed, against the largest.
@@ -94,7 +96,7 @@ fn natural(
     let count = (scenes.end - scenes.start) as usize;
     let mut sum = Vec::new();
     for (done, index) in scenes.enumerate() {
-        let scene = ViewedScene::new(options.seed, index, views)?;
+        let scene = ViewedScene::new(options.seed, index, views, 0.0)?;
         let pictures: Vec<Picture> = scene
             .views
             .iter()
@@ -149,9 +151,11 @@ fn steering(
 ) -> Result<Vec<f64>> {
     let rasterizer = rasterizer(compute)?;
     let mut sum = vec![0.0; n * n];
+    // Contrasts of what is alike all around have no gradient: a mark begins with grain.
+    let grain = if options.surround > 1 { GRAIN } else { 0.0 };
     for index in 0..STEERED {
         // Other scenes than those of the natural variation.
-        let scene = ViewedScene::new(options.seed, (options.scenes + index) as u64, STEERED_VIEWS)?;
+        let scene = ViewedScene::new(options.seed, (options.scenes + index) as u64, STEERED_VIEWS, grain)?;
         let found = across_views(&scene, tower, config, rasterizer.as_ref(), compute, n)?;
         sum.iter_mut().zip(found).for_each(|(s, f)| *s += f / STEERED as f64);
         progress(TrainProgress::Steering(index + 1, STEERED));

@@ -42,6 +42,8 @@ pub struct TrainOptions {
     pub filters: usize,
     /// Sides of the squares that are averaged into one pixel of a scale.
     pub scales: Vec<usize>,
+    /// Side of the square whose mean is subtracted from a pixel, odd.
+    pub surround: usize,
     /// Least and largest norm of a filter; see [`filters`].
     pub norm: [f32; 2],
     /// Width of the features.
@@ -59,6 +61,7 @@ impl Default for TrainOptions {
             batch: 64,
             filters: 128,
             scales: vec![1, 2, 4],
+            surround: 1,
             norm: filters::NORM,
             dims: 96,
             text_width: 128,
@@ -112,6 +115,7 @@ pub fn config(options: &TrainOptions) -> ClipConfig {
             tower: VisionTower::Statistics {
                 scales: options.scales.clone(),
                 kernel: filters::KERNEL,
+                surround: options.surround,
             },
         },
         text: TextConfig {
@@ -137,7 +141,11 @@ pub fn train_clip(
     check(options)?;
     let config = config(options);
     let model = ClipModel::init(&config, Parts::Both, &compute.device, options.seed);
-    let (filters, phases) = filters::filters(options.filters * options.scales.len(), options.norm, options.seed);
+    let (filters, mut phases) = filters::filters(options.filters * options.scales.len(), options.norm, options.seed);
+    if options.surround > 1 {
+        // What is alike all around is 0 already.
+        phases.fill(0.0);
+    }
     let tower = tower(&model)?.with_filters(&filters, &phases);
     let head = head::fit(&tower, &config, options, compute, &mut progress)?;
     let tower = tower.with_head(head.matrix, head.bias);

@@ -23,6 +23,9 @@ const FIRST_SEED: u64 = 0x7363_656e_6573;
 /// Draws for contrast are none of the scene's own.
 const CONTRAST_STREAM: u64 = 77;
 
+/// Nor are those for grain.
+const GRAIN_STREAM: u64 = 78;
+
 /// A scene and views of it.
 pub(super) struct ViewedScene {
     pub gaussians: Gaussians,
@@ -30,13 +33,23 @@ pub(super) struct ViewedScene {
 }
 
 impl ViewedScene {
-    /// Scene `index` of the stream of `seed`, from so many views.
-    pub fn new(seed: u64, index: u64, views: usize) -> Result<Self> {
+    /// Scene `index` of the stream of `seed`, from so many views, with uniform noise of up to `grain` on its constant
+    /// coefficients.
+    pub fn new(seed: u64, index: u64, views: usize, grain: f32) -> Result<Self> {
         let seed = FIRST_SEED.wrapping_add(seed.wrapping_mul(1 << 20)).wrapping_add(index);
         let mut gaussians = sample(GAUSSIANS, (index % 4) as usize, seed)?.gaussians;
         if !index.is_multiple_of(3) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ CONTRAST_STREAM);
             fade(&mut gaussians, &mut rng);
+        }
+        if grain > 0.0 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed ^ GRAIN_STREAM);
+            let stride = gaussians.sh.per_gaussian();
+            for row in gaussians.sh.coefficients.chunks_exact_mut(stride) {
+                row[..3]
+                    .iter_mut()
+                    .for_each(|v| *v += grain * rng.random_range(-1.0..1.0_f32));
+            }
         }
         let sampler = ViewSampler::new(&gaussians, seed)?;
         let views = (0..views as u64)

@@ -173,7 +173,10 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
             "model other",
         ),
         ("key create --bits 0 -o new.key --device cpu", "0 is outside 1 to 150"),
-        ("key create --bits 151 -o new.key --device cpu", "151 is outside 1 to 150"),
+        (
+            "key create --bits 151 -o new.key --device cpu",
+            "151 is outside 1 to 150",
+        ),
         ("verify none.png --key k.key --device cpu", "none.png"),
         ("verify in.ply --key k.key --message 5c5c --device cpu", "longer"),
         ("render text.ply views --views 1 --device cpu", "text.ply"),

@@ -59,6 +59,8 @@ pub enum VisionTower {
         scales: Vec<usize>,
         /// Side of a filter; 1.
         kernel: usize,
+        /// Side of the square whose mean is subtracted from a pixel before the filters, odd; 1 subtracts nothing.
+        surround: usize,
     },
 }
 
@@ -215,10 +217,18 @@ impl ClipConfig {
                 within("vision heads", *heads, 4096)?;
                 divides("vision feature width", vision.width * 32, "heads", *heads)?;
             }
-            VisionTower::Statistics { scales, kernel } => {
+            VisionTower::Statistics {
+                scales,
+                kernel,
+                surround,
+            } => {
                 within("vision scales", scales.len(), 16)?;
                 // Sines are taken of single pixels.
                 within("vision kernel", *kernel, 1)?;
+                within("vision surround", *surround, 15)?;
+                if surround.is_multiple_of(2) {
+                    return Err(format!("vision surround is {surround}, must be odd"));
+                }
                 for scale in scales {
                     within("vision scale", *scale, vision.image_size)?;
                 }

@@ -46,6 +46,8 @@ enum Layers {
     Statistics {
         scales: Vec<usize>,
         kernel: usize,
+        #[serde(default = "nothing_around")]
+        surround: usize,
     },
 }
 
@@ -69,6 +71,10 @@ struct Preprocess {
     std: Option<[f32; 3]>,
 }
 
+/// The pixel alone.
+fn nothing_around() -> usize {
+    1
+}
 fn default_image_size() -> usize {
     224
 }
@@ -122,7 +128,15 @@ pub(super) fn parse(mut value: Value) -> Result<ClipConfig, String> {
             layers,
             heads: heads(vision.width.saturating_mul(32))?,
         },
-        Layers::Statistics { scales, kernel } => VisionTower::Statistics { scales, kernel },
+        Layers::Statistics {
+            scales,
+            kernel,
+            surround,
+        } => VisionTower::Statistics {
+            scales,
+            kernel,
+            surround,
+        },
     };
     let text = model.text_cfg;
     Ok(ClipConfig {
@@ -160,9 +174,17 @@ pub(super) fn write(config: &ClipConfig) -> Result<String, String> {
             )
         }
         VisionTower::ResNet { layers, heads } => (Layers::ResNet(*layers), None, vision.width * 32 / heads, None),
-        VisionTower::Statistics { scales, kernel } => {
-            let (scales, kernel) = (scales.clone(), *kernel);
-            (Layers::Statistics { scales, kernel }, None, default_head_width(), None)
+        VisionTower::Statistics {
+            scales,
+            kernel,
+            surround,
+        } => {
+            let layers = Layers::Statistics {
+                scales: scales.clone(),
+                kernel: *kernel,
+                surround: *surround,
+            };
+            (layers, None, default_head_width(), None)
         }
     };
     let activation = text.blocks.activation;
