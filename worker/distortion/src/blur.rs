@@ -51,6 +51,6 @@ mod tests {
         // The second pixel is mirrored at the border.
         assert!((lines.weights[1] - 2.0 * expected[0]).abs() < 1e-6);
         assert_eq!(window(7, 0.0), Lines::identity(7));
-        assert_eq!(window(1, 2.0), Lines::identity(1));
+        assert!((window(1, 2.0).weights[0] - 1.0).abs() < 1e-6);
     }
 }

@@ -48,7 +48,7 @@ impl Layer {
     }
 
     /// Distorts pictures `[b, 3, h, w]` in [0, 1], each in its own way; differentiable in them. The result has their
-    /// shape and their order, and is in [0, 1] again. Rotated pictures show `background` in the corners.
+    /// shape and their order, and is in [0, 1] again, up to rounding. Rotated pictures show `background` in the corners.
     pub fn apply(&self, pictures: Tensor<4>, background: [f32; 3], rng: &mut ChaCha8Rng) -> Tensor<4> {
         let draws = self.draw(pictures.dims()[0], rng);
         distort(&draws, pictures, background)

@@ -6,7 +6,7 @@ use crate::matrices::{Lines, resample};
 /// Resizes pictures `[b, 3, h, w]` by one factor each (bilinear, antialiased) and back.
 ///
 /// A reader resizes what it gets to one size anyway, so that scaling is a loss of resolution to it, and not a zoom.
-/// Factors below 1 lose it; factors above 1 lose next to nothing. Both ways are one matrix along each axis.
+/// Factors below 1 lose much of it; factors above 1 blur a little, of the finest pattern a quarter is left at 2. Both ways are one matrix along each axis.
 pub(crate) fn scaling(pictures: Tensor<4>, factors: &[f32]) -> Tensor<4> {
     let [_, _, h, w] = pictures.dims();
     let lines = |side| -> Vec<_> { factors.iter().map(|&factor| there_and_back(side, factor)).collect() };
@@ -38,9 +38,10 @@ mod tests {
     }
 
     #[test]
-    fn shrinking_loses_fine_patterns_and_enlarging_keeps_them() {
+    fn shrinking_loses_fine_patterns_and_enlarging_keeps_some() {
         assert!(kept(0.5) < 0.05 && kept(0.75) < 0.4, "{} {}", kept(0.5), kept(0.75));
-        assert!(kept(1.25) > 0.4 && kept(2.0) > 0.4, "{} {}", kept(1.25), kept(2.0));
+        // By hand 1/4 inside and 4/7 at both ends.
+        assert!((kept(2.0) - 0.266).abs() < 0.002, "{}", kept(2.0));
         assert_eq!(kept(1.0), 1.0);
         assert_eq!(there_and_back(5, 0.01).to, 5);
     }

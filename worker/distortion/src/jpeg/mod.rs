@@ -2,7 +2,7 @@
 //!
 //! Colours are turned to YCbCr as JFIF has them, chroma is halved if asked for, blocks of 8 x 8 are transformed and
 //! divided by the table, rounded with the gradient of the identity, and all of it is undone. What is left out is that
-//! codecs hold values between the steps in 8 bits and approximate the transform.
+//! codecs hold halved chroma and decoded values in 8 bits and approximate the transform.
 mod blocks;
 mod tables;
 #[cfg(test)]
@@ -75,7 +75,11 @@ fn compress(pictures: Tensor<4>, each: &[&Jpeg], chroma: Chroma) -> Tensor<4> {
         x = x.pad([(0, height - h), (0, width - w)], PadMode::Edge);
     }
     let flat = x.reshape([b, 3, height * width]);
-    let x = to_ycbcr(&device).matmul(flat).reshape([b, 3, height, width]);
+    let mut x = to_ycbcr(&device).matmul(flat).reshape([b, 3, height, width]);
+    if each.iter().all(|one| one.noise.is_none()) {
+        // Encoders hold these in 8 bits; at coarse steps it decides to which side much is rounded.
+        x = round_straight_through(x);
+    }
     // Chroma is around 0 already, because the 128 of JFIF and the level shift of the transform cancel.
     let luma = x.clone().slice([0..b, 0..1]) - 128.0;
     let mut colour = x.slice([0..b, 1..3]);

@@ -61,7 +61,7 @@ fn any_size_keeps_its_shape_and_range_and_gradients_are_finite() {
             for draw in strong() {
                 let found = apply(std::slice::from_ref(&draw), input.clone(), GREY);
                 assert_eq!(found.dims(), [1, 3, h, w], "{draw:?}");
-                let inside = |v: &f32| (-1e-6..=1.0 + 1e-6).contains(v);
+                let inside = |v: &f32| (-1e-5..=1.0 + 1e-5).contains(v);
                 assert!(host(found).iter().all(inside), "{draw:?} {h} x {w}");
                 let weights = random(n, -1.0, 1.0, 2);
                 let slopes = gradient(|x| apply(std::slice::from_ref(&draw), x, GREY), &input, &weights);
@@ -157,9 +157,8 @@ fn constant_pictures_stay_constant_and_keep_their_colour_where_it_is_not_what_ch
         let limit = match draw {
             Draw::Crop(_) | Draw::Scaling(_) | Draw::Rotation(_) | Draw::Blur(_) => 1e-5,
             Draw::EightBit => 0.5 / 255.0 + 1e-6,
-            // The steps of the means at quality 10 are 80 and 85, an eighth of which is at most 10.6: half of it
-            // times 1.772 is off.
-            Draw::Jpeg(_) => 10.0 / 255.0,
+            // Means are off by at most a sixteenth of their steps, 80 and 85; blue adds 1.772 times the second.
+            Draw::Jpeg(_) => 14.5 / 255.0,
             _ => continue,
         };
         let found = host(apply(std::slice::from_ref(&draw), input.clone(), colour));
