@@ -3,6 +3,8 @@
 //! Ranges and codebooks of some formats come from the scene, and so [`Kept`] is fitted once to the scene as it is
 //! before its colours change. With the colours changed it gives what [`convert`](crate::convert) and reading would give
 //! then: bit by bit, but for SOG, whose codebooks and groups stay those of the scene that it was fitted to.
+//! Groups of a changed scene follow its changes a little: of independent noise of 0.02 on the harmonics of a captured
+//! scene (101,407 Gaussians, degree 3) files keep 73 % and the stand-in 62 %.
 use crate::convert::{check_arrays, morton, packed, sog, splat, spz};
 use crate::packed::{CHUNK, rest};
 use crate::range::Range;
