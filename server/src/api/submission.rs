@@ -146,7 +146,7 @@ fn create_key(spec: &KeySpec, problems: &mut Problems) {
     problems.check(
         (1..=MAX_BITS).contains(&spec.bits),
         "job.create_key.bits",
-        "must be 1 to 75",
+        "must be 1 to 150",
     );
 }
 

@@ -7,7 +7,7 @@ use guardsplat_worker::Result;
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::NewKey;
 use guardsplat_worker::message::training::Progress;
-use guardsplat_worker::message::{KeyOptions, TrainingOptions};
+use guardsplat_worker::message::{DecoderKind, KeyOptions, TrainingOptions};
 use guardsplat_worker::stop::Stop;
 use serde::Serialize;
 
@@ -47,6 +47,12 @@ pub struct Create {
     /// Dimensions to keep of the rest; all unless given
     #[arg(long, hide_short_help = true)]
     keep: Option<usize>,
+    /// perceptron, as in the GuardSplat paper, or linear
+    #[arg(long, default_value = "perceptron")]
+    decoder: DecoderKind,
+    /// Messages kept apart, on whose texts the decoder is measured
+    #[arg(long, default_value_t = TrainingOptions::default().unseen)]
+    unseen: usize,
     /// Noise in the decoder's training, times the natural variation
     #[arg(long, hide_short_help = true, default_value_t = TrainingOptions::default().noise)]
     noise: f32,
@@ -79,6 +85,8 @@ pub fn run(command: Command) -> Result<Exit> {
         bits_per_token: arguments.bits_per_token,
         seed: arguments.seed,
         training: TrainingOptions {
+            kind: arguments.decoder,
+            unseen: arguments.unseen,
             noise: arguments.noise,
             ..TrainingOptions::default()
         },

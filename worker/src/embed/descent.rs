@@ -62,6 +62,9 @@ pub struct Descent {
     /// Of each slot: one over the mean over views of `sum_p w c`, a colour's squared change in a picture's squares.
     inverse: Vec<f32>,
     velocity: Vec<f32>,
+    /// Running mean of the squared length of steps before they are scaled, and the largest that it was.
+    running: f32,
+    largest: f32,
 }
 
 impl Descent {
@@ -75,6 +78,8 @@ impl Descent {
             stride,
             inverse: energies.iter().map(|e| e.max(floor).recip()).collect(),
             velocity: vec![0.0; stride * energies.len()],
+            running: 0.0,
+            largest: 0.0,
         }
     }
 
@@ -108,7 +113,13 @@ impl Descent {
             .collect();
         let energy = energies.iter().sum::<f64>() as f32 * MEAN_SQUARE / pixels;
         if energy > 0.0 {
-            let scale = rate * o.length / energy.sqrt();
+            self.running = if self.largest == 0.0 {
+                energy
+            } else {
+                0.9 * self.running + 0.1 * energy
+            };
+            self.largest = self.largest.max(self.running);
+            let scale = rate * o.length / self.largest.max(energy).sqrt();
             let pairs = offsets.par_chunks_mut(size).zip(self.velocity.par_chunks(size));
             pairs.for_each(|(offsets, velocity)| offsets.iter_mut().zip(velocity).for_each(|(o, v)| *o -= scale * v));
         }

@@ -1,4 +1,4 @@
-//! The message decoder: an MLP from projected CLIP features to one logit a bit, and its loss.
+//! The message decoder, from projected CLIP features to one logit a bit: a perceptron or a linear map; and its loss.
 use burn::module::{Module, Param, ParamId};
 use burn::nn::Linear;
 use burn::tensor::activation::{gelu, softplus};
@@ -27,8 +27,8 @@ pub struct LayerWeights {
 /// Weights of a decoder as plain data: what a key file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecoderWeights {
-    /// The layers in order, each one's outputs the next one's inputs.
-    pub layers: [LayerWeights; 3],
+    /// The layers in order, each one's outputs the next one's inputs: three, or one of a linear decoder.
+    pub layers: Vec<LayerWeights>,
 }
 
 impl DecoderWeights {
@@ -46,18 +46,18 @@ impl DecoderWeights {
             }
         };
         Self {
-            layers: [layer(inputs, HIDDEN), layer(HIDDEN, HIDDEN), layer(HIDDEN, bits)],
+            layers: vec![layer(inputs, HIDDEN), layer(HIDDEN, HIDDEN), layer(HIDDEN, bits)],
         }
     }
 
     /// Width of the features it reads.
     pub fn inputs(&self) -> usize {
-        self.layers[0].inputs
+        self.layers.first().map_or(0, |layer| layer.inputs)
     }
 
     /// Bits it reads.
     pub fn bits(&self) -> usize {
-        self.layers[2].outputs
+        self.layers.last().map_or(0, |layer| layer.outputs)
     }
 
     /// Checks that sizes fit together and that every number is finite.
@@ -85,29 +85,31 @@ pub(super) fn unit(rng: &mut impl Rng) -> f32 {
 /// The decoder on a device. GELU (exact) between the layers, none after the last.
 #[derive(Module, Debug)]
 pub struct Decoder {
-    first: Linear,
-    second: Linear,
-    third: Linear,
+    layers: Vec<Linear>,
 }
 
 impl Decoder {
     /// Puts weights on a device; with an autodiff device they can be trained.
     pub fn new(weights: &DecoderWeights, device: &Device) -> Self {
-        let [first, second, third] = weights.layers.each_ref().map(|layer| to_linear(layer, device));
-        Self { first, second, third }
+        Self {
+            layers: weights.layers.iter().map(|layer| to_linear(layer, device)).collect(),
+        }
     }
 
     /// Copies the weights back to the host.
     pub fn weights(&self) -> Result<DecoderWeights> {
-        let layers = [&self.first, &self.second, &self.third];
-        let [a, b, c] = layers.map(from_linear);
-        Ok(DecoderWeights { layers: [a?, b?, c?] })
+        Ok(DecoderWeights {
+            layers: self.layers.iter().map(from_linear).collect::<Result<_>>()?,
+        })
     }
 
     /// Logits `[b, bits]` of projected features `[b, inputs]`.
     pub fn forward(&self, features: Tensor<2>) -> Tensor<2> {
-        let hidden = gelu(self.first.forward(features));
-        self.third.forward(gelu(self.second.forward(hidden)))
+        let mut x = features;
+        for (i, layer) in self.layers.iter().enumerate() {
+            x = layer.forward(if i == 0 { x } else { gelu(x) });
+        }
+        x
     }
 }
 

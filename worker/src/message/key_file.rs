@@ -29,6 +29,8 @@ struct Header {
     bits: usize,
     #[serde(default = "one")]
     bits_per_token: usize,
+    #[serde(default = "three")]
+    layers: usize,
     secret: String,
     seed: Option<u64>,
     clip: ClipIdentity,
@@ -39,6 +41,11 @@ struct Header {
 /// Keys of more than one bit a token came later.
 fn one() -> usize {
     1
+}
+
+/// Keys with linear decoders came later, too.
+fn three() -> usize {
+    3
 }
 
 /// One tensor of a key.
@@ -106,6 +113,7 @@ pub(super) fn serialize(key: &Key) -> Result<Vec<u8>, String> {
         id: key.id(),
         bits: key.bits(),
         bits_per_token: key.bits_per_token,
+        layers: key.decoder.layers.len(),
         secret: hex::encode(key.secret.expose()),
         seed: key.seed,
         clip: key.clip.clone(),
@@ -199,11 +207,15 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
             bias,
         })
     };
-    let layers = [
-        layer(0, rank, HIDDEN)?,
-        layer(1, HIDDEN, HIDDEN)?,
-        layer(2, HIDDEN, header.bits)?,
-    ];
+    let layers = match header.layers {
+        1 => vec![layer(0, rank, header.bits)?],
+        3 => vec![
+            layer(0, rank, HIDDEN)?,
+            layer(1, HIDDEN, HIDDEN)?,
+            layer(2, HIDDEN, header.bits)?,
+        ],
+        other => return Err(format!("its decoder has {other} layers, not 1 or 3")),
+    };
     let decoder = DecoderWeights { layers };
     decoder.check()?;
     let key = Key {

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha20Rng;
 
 use super::bits::Message;
 use super::decoder::{Decoder, DecoderWeights, bce_from_logits};
+use super::linear;
 use super::projection::Projection;
 use super::samples::{Samples, distinct_messages, noise_pool, shuffle};
 use super::tokens::{CONTEXT, TokenTable};
@@ -16,9 +17,21 @@ use crate::stop::Stop;
 /// Sequences given to the text tower at once.
 const ENCODE_BATCH: usize = 64;
 
+/// What kind of decoder reads messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DecoderKind {
+    /// The perceptron of the published method, trained by gradient descent.
+    #[default]
+    Perceptron,
+    /// A linear map in closed form.
+    Linear,
+}
+
 /// How to train a decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingOptions {
+    /// Its kind; a linear one has no use for batches, epochs, rate and noise.
+    pub kind: DecoderKind,
     /// Distinct messages to train on (fewer where the length has fewer).
     pub messages: usize,
     /// Messages kept apart to measure on, at most a quarter of all that the length has.
@@ -35,9 +48,25 @@ pub struct TrainingOptions {
     pub seed: u64,
 }
 
+impl std::str::FromStr for DecoderKind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "linear" => Ok(Self::Linear),
+            "perceptron" => Ok(Self::Perceptron),
+            other => Err(Error::BadOption {
+                field: "decoder",
+                reason: format!("{other:?} is not a decoder, must be linear or perceptron"),
+            }),
+        }
+    }
+}
+
 impl Default for TrainingOptions {
     fn default() -> Self {
         Self {
+            kind: DecoderKind::default(),
             messages: 2048,
             unseen: 256,
             batch: 64,
@@ -116,11 +145,49 @@ pub fn train(
     let (seen, unseen) = (sample(&seen)?, sample(&unseen)?);
     let noise = noise_pool(projection, options.noise, &mut rng, device)?;
 
+    let (decoder, steps) = match options.kind {
+        DecoderKind::Linear => (linear_decoder(&seen, device)?, 0),
+        DecoderKind::Perceptron => perceptron(&seen, &noise, options, &mut rng, device, stop, &mut progress)?,
+    };
+    let weights = decoder.weights()?;
+    if weights.check().is_err() {
+        return Err(Error::NotFinite {
+            step: steps,
+            term: "decoder",
+            value: f32::NAN,
+        });
+    }
+    let device = device.clone().without_autodiff();
+    Ok(Trained {
+        accuracy_seen: seen.accuracy(&decoder, None, &device)?.unwrap_or(0.0),
+        accuracy_unseen: unseen.accuracy(&decoder, None, &device)?,
+        accuracy_unseen_noisy: unseen.accuracy(&decoder, Some((&noise, &mut rng)), &device)?,
+        weights,
+        steps,
+    })
+}
+
+fn linear_decoder(seen: &Samples, device: &Device) -> Result<Decoder> {
+    let weights = linear::fit(seen).ok_or_else(|| Error::BadModel {
+        name: "text tower".into(),
+        reason: "its features do not tell messages apart".into(),
+    })?;
+    Ok(Decoder::new(&weights, &device.clone().without_autodiff()))
+}
+
+/// Trains the perceptron; also says in how many steps.
+fn perceptron(
+    seen: &Samples,
+    noise: &Vec<f32>,
+    options: &TrainingOptions,
+    rng: &mut ChaCha20Rng,
+    device: &Device,
+    stop: &Stop,
+    progress: &mut impl FnMut(Progress),
+) -> Result<(Decoder, usize)> {
+    let bits = seen.bits;
     let tracking = device.clone().without_autodiff().autodiff();
-    let mut decoder = Decoder::new(
-        &DecoderWeights::seeded(projection.rank, bits, rng.next_u64()),
-        &tracking,
-    );
+    let mut decoder = Decoder::new(&DecoderWeights::seeded(seen.rank, bits, rng.next_u64()), &tracking);
     let mut optimizer = AdamConfig::new().with_epsilon(1e-8).init();
     let mut order: Vec<usize> = (0..seen.len()).collect();
     let epochs = options.epochs.unwrap_or(match bits {
@@ -131,10 +198,10 @@ pub fn train(
     let steps = epochs * seen.len().div_ceil(options.batch);
     let mut step = 0;
     for _ in 0..epochs {
-        shuffle(&mut order, &mut rng);
+        shuffle(&mut order, rng);
         for rows in order.chunks(options.batch) {
             stop.check()?;
-            let (features, targets) = seen.batch(rows, Some((&noise, &mut rng)), &tracking);
+            let (features, targets) = seen.batch(rows, Some((noise, &mut *rng)), &tracking);
             let loss = bce_from_logits(decoder.forward(features), targets);
             if step % 64 == 0 {
                 finite(step, loss.clone().into_scalar::<f32>())?;
@@ -148,23 +215,7 @@ pub fn train(
     }
     progress(Progress::Training(steps, steps));
 
-    let decoder = decoder.valid();
-    let weights = decoder.weights()?;
-    if weights.check().is_err() {
-        return Err(Error::NotFinite {
-            step,
-            term: "decoder",
-            value: f32::NAN,
-        });
-    }
-    let device = device.clone().without_autodiff();
-    Ok(Trained {
-        accuracy_seen: seen.accuracy(&decoder, None, &device)?.unwrap_or(0.0),
-        accuracy_unseen: unseen.accuracy(&decoder, None, &device)?,
-        accuracy_unseen_noisy: unseen.accuracy(&decoder, Some((&noise, &mut rng)), &device)?,
-        weights,
-        steps,
-    })
+    Ok((decoder.valid(), steps))
 }
 
 fn check(options: &TrainingOptions) -> Result<()> {
@@ -256,6 +307,7 @@ mod tests {
 
     fn options() -> TrainingOptions {
         TrainingOptions {
+            kind: DecoderKind::Perceptron,
             messages: 512,
             unseen: 64,
             epochs: Some(20),

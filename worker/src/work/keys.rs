@@ -3,7 +3,7 @@ use guardsplat_worker::Result;
 use guardsplat_worker::clip::Parts;
 use guardsplat_worker::device::Compute;
 use guardsplat_worker::embed::{NewKey, create_key, natural};
-use guardsplat_worker::message::{FitOptions, Key, KeyOptions};
+use guardsplat_worker::message::{DecoderKind, FitOptions, Key, KeyOptions};
 use guardsplat_worker::stop::Stop;
 
 use super::load;
@@ -28,7 +28,8 @@ pub fn create(
     progress: impl FnMut(NewKey),
 ) -> Result<Key> {
     let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
-    let ranked = clip.config.is_ranked();
+    // A perceptron needs more dimensions than bits to tell texts apart; a linear decoder reads the strongest ones best.
+    let ranked = clip.config.is_ranked() && options.training.kind == DecoderKind::Linear;
     let projection = FitOptions {
         remove: kept.remove.unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
         keep: kept

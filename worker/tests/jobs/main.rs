@@ -241,10 +241,10 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
         ),
         (verify(&[&poisoned], ""), InvalidInput, false, " is NaN"),
         (
-            Spec::CreateKey(KeySpec { bits: 76, seed: None }),
+            Spec::CreateKey(KeySpec { bits: 151, seed: None }),
             InvalidInput,
             false,
-            "76 is outside 1 to 75",
+            "151 is outside 1 to 150",
         ),
         (Spec::Embed(embed(&damaged)), Internal, true, "was announced"),
         (Spec::Embed(embed("artifacts/none")), Internal, true, "no such artifact"),

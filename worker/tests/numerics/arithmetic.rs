@@ -1,6 +1,7 @@
 //! Arithmetic at the ends of its range: losses, metrics, the optimiser, half precision.
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Device, Tensor, TensorData};
+use guardsplat_distortion::{Chroma, Draw, Jpeg, Layer, Ranges, RobustTo};
 use guardsplat_worker::clip::{Clip, ClipConfig, ClipModel, Parts, Precision, normalize};
 use guardsplat_worker::embed::{Adam, AdamOptions, Penalty, Preset};
 use guardsplat_worker::message::{DecoderWeights, Projection, Reader, bce_from_logits};
@@ -8,6 +9,8 @@ use guardsplat_worker::picture::Picture;
 use guardsplat_worker::quality::{Psnr, Ssim, measure, psnr};
 use guardsplat_worker::splat::{Rasterizer, WeightCache, prepare, sh};
 use guardsplat_worker::stop::Stop;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use super::machine::Machine;
 use super::marking::TINY;
@@ -19,6 +22,44 @@ fn host<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 
 fn row(values: &[f32], device: &Device) -> Tensor<2> {
     Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), device)
+}
+
+/// The stand-in for JPEG at both ends of its quality.
+pub fn jpeg(machine: &Machine) {
+    let device = machine.compute.device.clone().autodiff();
+    let layer = Layer {
+        robust_to: RobustTo::none(),
+        ranges: Ranges::default(),
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let noise: Vec<f32> = (0..3 * 24 * 24).map(|_| random.random()).collect();
+    let flat = [0.0, 0.5, 1.0].map(|level| vec![level; 3 * 24 * 24]);
+    for (quality, chroma) in [
+        (1, Chroma::Half),
+        (100, Chroma::Half),
+        (1, Chroma::Full),
+        (100, Chroma::Full),
+    ] {
+        for values in flat.iter().chain([&noise]) {
+            let pictures =
+                Tensor::<4>::from_data(TensorData::new(values.clone(), [1, 3, 24, 24]), &device).require_grad();
+            let draw = Draw::Jpeg(Jpeg {
+                quality,
+                chroma,
+                noise: None,
+            });
+            let out = layer.apply_with(&[draw], pictures.clone(), [1.0; 3]).unwrap();
+            let gradient = host(pictures.grad(&out.clone().square().sum().backward()).unwrap());
+            let out = host(out.inner());
+            assert!(out.iter().all(|v| (0.0..=1.0).contains(v)), "quality {quality}");
+            assert!(gradient.iter().all(|g| g.is_finite()), "quality {quality}");
+            let mean = |of: &mut dyn Iterator<Item = f32>| of.sum::<f32>() / values.len() as f32;
+            let change = mean(&mut out.iter().zip(values).map(|(a, b)| (a - b).abs()));
+            if quality == 100 && chroma == Chroma::Full {
+                assert!(change < 0.01, "quality {quality}: {change}");
+            }
+        }
+    }
 }
 
 /// `max(x, 0) - x y + ln(1 + e^-|x|)` and its slope `sigmoid(x) - y`, in double precision.

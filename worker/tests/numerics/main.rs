@@ -125,6 +125,9 @@ lines! {
     "PSNR of identical images":
         "told as identical, `null` and a flag in JSON; a difference in the last bit has a number",
         arithmetic_identical_pictures = None(arithmetic::identical_pictures);
+    "JPEG stand-in at quality 1 and 100":
+        "finite values within 0 and 1 and finite gradients, of flat pictures and of noise; noise hardly changes at 100",
+        arithmetic_jpeg = Both(arithmetic::jpeg);
     "white and black backgrounds (clamp kills gradients)":
         "brighter than white over white, or darker than black: nothing is learned; over black the edges still teach",
         arithmetic_backgrounds = Both(marking::backgrounds);

@@ -75,7 +75,7 @@ async fn every_wrong_field_is_named() {
             "job.create_key.bits",
         ),
         (
-            of(Spec::CreateKey(KeySpec { bits: 76, seed: None })),
+            of(Spec::CreateKey(KeySpec { bits: 151, seed: None })),
             "job.create_key.bits",
         ),
         (job(|j| j.spec = None), "job.spec"),

@@ -145,7 +145,10 @@ mod tests {
     fn figures_are_found_where_they_belong() {
         let accuracy = |source, bits, variant, attack| figure(source, bits, variant, attack)?.accuracy;
         assert_eq!(accuracy(Source::Robustness, 16, STANDARD, "jpeg:10"), Some(94.70));
-        assert_eq!(accuracy(Source::Robustness, 16, STANDARD, "crop:0.4+brightness:0.5..1.5+jpeg:10"), Some(93.38));
+        assert_eq!(
+            accuracy(Source::Robustness, 16, STANDARD, "crop:0.4+brightness:0.5..1.5+jpeg:10"),
+            Some(93.38)
+        );
         assert_eq!(accuracy(Source::Robustness, 32, STANDARD, "jpeg:10"), None);
         assert_eq!(accuracy(Source::Trained, 32, DC, NONE), Some(74.59));
         assert_eq!(accuracy(Source::Losses, 32, DC, NONE), None);
