@@ -3,7 +3,7 @@ use burn::module::{Module, Param};
 use burn::nn::{GroupNorm, GroupNormConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::module::{avg_pool2d, conv2d};
-use burn::tensor::ops::ConvOptions;
+use burn::tensor::ops::{AvgPoolOptions, ConvOptions};
 use burn::tensor::{Device, Tensor};
 
 use crate::error::{Result, host};
@@ -98,8 +98,14 @@ impl Decoder {
 /// What pictures have beyond the mean of their surroundings, amplified and limited to +-1. Edges of what is shown are
 /// far stronger than a mark; limited, they cannot drown it.
 fn details(pictures: Tensor<4>) -> Tensor<4> {
-    let rows = avg_pool2d(pictures.clone(), [BOX, 1], [1, 1], [BOX / 2, 0], false, false);
-    let mean = avg_pool2d(rows, [1, BOX], [1, 1], [0, BOX / 2], false, false);
+    let along = |kernel_size: [usize; 2]| AvgPoolOptions {
+        padding: kernel_size.map(|side| (side / 2, side / 2)),
+        stride: [1, 1],
+        count_include_pad: false,
+        ..AvgPoolOptions::new(kernel_size)
+    };
+    let rows = avg_pool2d(pictures.clone(), along([BOX, 1]));
+    let mean = avg_pool2d(rows, along([1, BOX]));
     let x = (pictures - mean) * GAIN;
     x.clone() / (x.square() + 1.0).sqrt()
 }

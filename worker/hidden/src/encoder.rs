@@ -2,7 +2,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::activation::relu;
 use burn::tensor::module::{avg_pool2d, conv2d};
-use burn::tensor::ops::ConvOptions;
+use burn::tensor::ops::{AvgPoolOptions, ConvOptions};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
@@ -36,9 +36,17 @@ impl Encoder {
         let inputs = PATTERN + 3;
         let bound = |fan_in: usize| (6.0 / fan_in as f32).sqrt();
         Self {
-            tiles: parameter(&draw(rng, bits * area, (3.0 / bits as f32).sqrt()), [bits, area], device),
+            tiles: parameter(
+                &draw(rng, bits * area, (3.0 / bits as f32).sqrt()),
+                [bits, area],
+                device,
+            ),
             pilot: parameter(&draw(rng, area, 1.0), [1, area], device),
-            first: parameter(&draw(rng, HIDDEN * inputs * 9, bound(inputs * 9)), [HIDDEN, inputs, 3, 3], device),
+            first: parameter(
+                &draw(rng, HIDDEN * inputs * 9, bound(inputs * 9)),
+                [HIDDEN, inputs, 3, 3],
+                device,
+            ),
             first_bias: parameter(&[0.0; HIDDEN], [HIDDEN], device),
             second: parameter(&draw(rng, 3 * HIDDEN * 9, bound(HIDDEN * 9)), [3, HIDDEN, 3, 3], device),
         }
@@ -55,7 +63,7 @@ impl Encoder {
     }
 
     fn residual(&self, pictures: Tensor<4>, messages: Tensor<2>) -> Tensor<4> {
-        let half = avg_pool2d(pictures, [2, 2], [2, 2], [0, 0], false, false);
+        let half = avg_pool2d(pictures, AvgPoolOptions::new([2, 2]));
         let [b, _, h, w] = half.dims();
         let signs = messages * 2.0 - 1.0;
         let tile = (signs.matmul(self.tiles.val()) + self.pilot.val()).reshape([b, PATTERN, TILE, TILE]);
@@ -67,6 +75,11 @@ impl Encoder {
         let x = conv2d(x, self.second.val(), None, options());
         let x: Tensor<6> = x.reshape([b, 3, h, 1, w, 1]);
         let x: Tensor<4> = x.repeat(&[1, 1, 1, 2, 1, 2]).reshape([b, 3, 2 * h, 2 * w]);
-        avg_pool2d(x, [3, 3], [1, 1], [1, 1], false, false)
+        let smooth = AvgPoolOptions {
+            padding: [(1, 1), (1, 1)],
+            stride: [1, 1],
+            ..AvgPoolOptions::new([3, 3])
+        };
+        avg_pool2d(x, smooth)
     }
 }

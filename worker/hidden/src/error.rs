@@ -81,5 +81,7 @@ pub(crate) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Re
 
 /// The values of a tensor, on the host.
 pub(crate) fn host<const D: usize>(tensor: burn::tensor::Tensor<D>) -> Result<Vec<f32>> {
-    tensor.try_into_vec_as::<f32>().map_err(|e| Error::Device { reason: e.to_string() })
+    tensor
+        .try_into_vec_as::<f32>()
+        .map_err(|e| Error::Device { reason: e.to_string() })
 }

@@ -61,14 +61,16 @@ impl Weights {
     /// [`Error::BadWeights`] for other files, more than [`MAX_BYTES`], tensors that are missing, of another type or
     /// shape or not finite, and content that does not match the id.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
-        parse(bytes).map_err(|reason| bad(name, reason)).and_then(|(weights, id)| {
-            weights.check(name)?;
-            if weights.id() == id {
-                return Ok(weights);
-            }
-            let reason = format!("its content does not match its id {id}: the file is damaged");
-            Err(bad(name, reason))
-        })
+        parse(bytes)
+            .map_err(|reason| bad(name, reason))
+            .and_then(|(weights, id)| {
+                weights.check(name)?;
+                if weights.id() == id {
+                    return Ok(weights);
+                }
+                let reason = format!("its content does not match its id {id}: the file is damaged");
+                Err(bad(name, reason))
+            })
     }
 }
 
@@ -95,7 +97,9 @@ fn parse(bytes: &[u8]) -> Result<(Weights, String), String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(unreadable)?;
     let text = metadata.metadata().as_ref().and_then(|all| all.get(KEY));
     let text = text.ok_or("a safetensors file, but not weights of this decoder")?;
-    let rest = text.strip_prefix(FORMAT).ok_or_else(|| format!("it is not of the format {FORMAT:?}"))?;
+    let rest = text
+        .strip_prefix(FORMAT)
+        .ok_or_else(|| format!("it is not of the format {FORMAT:?}"))?;
     let words: Vec<&str> = rest.split_whitespace().collect();
     let &["bits", bits, "seed", seed, "id", id] = words.as_slice() else {
         return Err("its metadata does not tell bits, seed and id".into());

@@ -6,6 +6,7 @@
 //! a message. It is the second way to mark scenes, to compare the engine's own with.
 //!
 //! Pictures are tensors `[b, 3, h, w]` in [0, 1]. Random numbers have explicit seeds.
+mod adam;
 mod decoder;
 mod encoder;
 mod error;

@@ -40,14 +40,19 @@ impl Trained {
         let decoder = Decoder::new(&self.weights, &self.device);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let batches = count.div_ceil(BATCH);
-        let mut sum = Measured { accuracy: 0.0, psnr: 0.0 };
+        let mut sum = Measured {
+            accuracy: 0.0,
+            psnr: 0.0,
+        };
         for _ in 0..batches {
             let clean = next(&mut pictures, BATCH, &self.device)?;
             let messages = messages(BATCH, self.weights.bits(), &mut rng, &self.device);
             let marked = self.encoder.forward(clean.clone(), messages.clone(), strength(psnr));
             let [b, c, h, w] = clean.dims();
             let errors: Tensor<2> = (marked.clone() - clean).square().reshape([b, c * h * w]).mean_dim(1);
-            let decibels = host(errors)?.into_iter().map(|e| -10.0 * f64::from(e.max(1e-12)).log10());
+            let decibels = host(errors)?
+                .into_iter()
+                .map(|e| -10.0 * f64::from(e.max(1e-12)).log10());
             sum.psnr += decibels.sum::<f64>() / BATCH as f64;
             sum.accuracy += accuracy(decoder.forward(geometry.apply(marked, &mut rng)), messages)?;
         }

@@ -94,7 +94,12 @@ mod tests {
     fn any_size_is_read_and_other_shapes_are_refused() {
         let network = network();
         for [h, w] in [[32, 57], [96, 96], [101, 64]] {
-            let values = host(network.logits(Tensor::ones([2, 3, h, w], &Device::flex()) * 0.5).unwrap()).unwrap();
+            let values = host(
+                network
+                    .logits(Tensor::ones([2, 3, h, w], &Device::flex()) * 0.5)
+                    .unwrap(),
+            )
+            .unwrap();
             assert!(values.len() == 12 && values.iter().all(|v| v.is_finite()));
         }
         for shape in [[0, 3, 64, 64], [1, 4, 64, 64], [1, 3, 31, 64], [1, 3, 64, 8193]] {
@@ -108,7 +113,12 @@ mod tests {
         let network = network();
         let x = pictures(1, 32);
         let tracked = x.clone().autodiff().require_grad();
-        let gradients = network.logits(tracked.clone()).unwrap().slice([0..1, 2..3]).sum().backward();
+        let gradients = network
+            .logits(tracked.clone())
+            .unwrap()
+            .slice([0..1, 2..3])
+            .sum()
+            .backward();
         let gradient = tracked.grad(&gradients).unwrap();
         // Along the gradient itself: single pixels change the logit by less than its rounding.
         let length = host(gradient.clone().square().sum().sqrt()).unwrap()[0];

@@ -21,6 +21,10 @@ pub(crate) fn draw(rng: &mut impl Rng, count: usize, bound: f32) -> Vec<f32> {
 /// A parameter of `shape` (its product is the number of values) on `device`.
 pub(crate) fn parameter<const D: usize>(values: &[f32], shape: [usize; D], device: &Device) -> Param<Tensor<D>> {
     let tensor = Tensor::from_data(TensorData::new(values.to_vec(), shape), device);
-    let tensor = if tensor.is_autodiff() { tensor.require_grad() } else { tensor };
+    let tensor = if tensor.is_autodiff() {
+        tensor.require_grad()
+    } else {
+        tensor
+    };
     Param::initialized(ParamId::new(), tensor)
 }

@@ -1,13 +1,13 @@
 //! Joint training of encoder and decoder, as in HiDDeN (Zhu et al. 2018, arXiv 1807.09937), with a residual of fixed
 //! strength in place of a loss for it.
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::activation::softplus;
 use burn::tensor::{Device, Tensor, TensorData};
 use guardsplat_distortion::Layer;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::adam::Adam;
 use crate::decoder::Decoder;
 use crate::encoder::Encoder;
 use crate::error::{Error, Result, host, within};
@@ -126,8 +126,7 @@ pub fn train(
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut decoder = Decoder::new(&Weights::seeded(options.bits, rng.next_u64())?, &tracking);
     let mut encoder = Encoder::new(options.bits, &mut rng, &tracking);
-    let mut decoder_optimizer = AdamConfig::new().with_epsilon(1e-8).init();
-    let mut encoder_optimizer = AdamConfig::new().with_epsilon(1e-8).init();
+    let (mut of_decoder, mut of_encoder) = (Adam::default(), Adam::default());
     for step in 0..options.steps {
         if stop() {
             return Err(Error::Stopped);
@@ -152,11 +151,9 @@ pub fn train(
                 psnr,
             });
         }
-        let mut gradients = loss.backward();
-        let of_decoder = GradientsParams::from_module(&mut gradients, &decoder);
-        let of_encoder = GradientsParams::from_module(&mut gradients, &encoder);
-        decoder = decoder_optimizer.step(options.rate(step), decoder, of_decoder);
-        encoder = encoder_optimizer.step(options.rate(step), encoder, of_encoder);
+        let gradients = loss.backward();
+        decoder = of_decoder.step(options.rate(step), decoder, &gradients);
+        encoder = of_encoder.step(options.rate(step), encoder, &gradients);
     }
     Ok(Trained {
         weights: decoder.valid().weights(options.seed)?,
