@@ -149,3 +149,49 @@ fn neighbours(from: f32, side: usize) -> (usize, usize, f32) {
     let low = from.floor();
     ((low as usize).min(last), (low as usize + 1).min(last), from - low)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::host;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn ramp() -> Tensor<4> {
+        let values = (0..3 * 64).map(|i| (i % 8) as f32 / 10.0).collect();
+        Tensor::from_data(TensorData::new::<f32, _>(values, [1, 3, 8, 8]), &Device::flex())
+    }
+
+    #[test]
+    fn no_change_is_exact_and_a_shift_moves() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let values = host(ramp()).unwrap();
+        assert_eq!(host(Geometry::NONE.apply(ramp(), &mut rng)).unwrap(), values);
+        let shift = Geometry {
+            shift: 0.25,
+            ..Geometry::NONE
+        };
+        let moved = host(shift.apply(ramp(), &mut rng)).unwrap();
+        // The middle of a ramp rises or falls by the same everywhere.
+        let by = moved[8 * 4 + 4] - values[8 * 4 + 4];
+        assert!(by.abs() > 1e-3 && by.abs() <= 0.2 + 1e-6, "{by}");
+        assert!((moved[8 * 2 + 3] - values[8 * 2 + 3] - by).abs() < 1e-5);
+    }
+
+    #[test]
+    fn neighbours_stay_inside() {
+        assert_eq!(neighbours(-3.0, 5), (0, 1, 0.0));
+        assert_eq!(neighbours(1.25, 5), (1, 2, 0.25));
+        assert_eq!(neighbours(9.0, 5), (4, 4, 0.0));
+    }
+
+    #[test]
+    fn ranges_are_checked() {
+        Geometry::default().check().unwrap();
+        let tiny = Geometry {
+            zoom: 0.5,
+            ..Geometry::NONE
+        };
+        assert!(tiny.check().unwrap_err().to_string().starts_with("zoom is 0.5"));
+    }
+}

@@ -200,3 +200,73 @@ pub(crate) fn accuracy(logits: Tensor<2>, targets: Tensor<2>) -> Result<f64> {
     let right = logits.iter().zip(&targets).filter(|(l, t)| (**l > 0.0) == (**t > 0.5));
     Ok(right.count() as f64 / targets.len().max(1) as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthetic::Synthetic;
+
+    fn options() -> Options {
+        Options {
+            bits: 2,
+            steps: 4,
+            batch: 2,
+            ..Options::default()
+        }
+    }
+
+    fn run(options: &Options, side: usize, stop: bool) -> Result<Trained> {
+        let device = Device::flex();
+        let mut pictures = Synthetic::new(side, 5)?;
+        train(options, &device, |n| Ok(pictures.next(n, &device)), |_| {}, || stop)
+    }
+
+    #[test]
+    fn the_seed_decides_the_weights() {
+        let first = run(&options(), 32, false).unwrap().weights;
+        assert_eq!(run(&options(), 32, false).unwrap().weights, first);
+        assert_ne!(first, Weights::seeded(2, 0).unwrap());
+        let other = Options { seed: 1, ..options() };
+        assert_ne!(run(&other, 32, false).unwrap().weights.head, first.head);
+    }
+
+    #[test]
+    fn what_cannot_work_is_refused() {
+        assert!(matches!(run(&options(), 32, true), Err(Error::Stopped)));
+        assert!(matches!(run(&options(), 33, false), Err(Error::BadShape { .. })));
+        let none = Options { bits: 0, ..options() };
+        assert!(matches!(
+            run(&none, 32, false),
+            Err(Error::OutOfRange { field: "bits", .. })
+        ));
+        let faint = Options {
+            end_psnr: f32::NAN,
+            ..options()
+        };
+        assert!(
+            run(&faint, 32, false)
+                .unwrap_err()
+                .to_string()
+                .starts_with("end psnr is NaN")
+        );
+    }
+
+    #[test]
+    fn the_residual_has_the_strength_that_was_asked_for() {
+        let device = Device::flex();
+        let encoder = Encoder::new(3, &mut ChaCha8Rng::seed_from_u64(1), &device);
+        let grey = Tensor::<4>::ones([1, 3, 40, 48], &device) * 0.5;
+        let messages = Tensor::ones([1, 3], &device);
+        let residual = encoder.forward(grey.clone(), messages, strength(34.0)) - grey;
+        let square = host(residual.square().mean()).unwrap()[0];
+        assert!((-10.0 * square.log10() - 34.0).abs() < 0.01, "{square}");
+    }
+
+    #[test]
+    fn the_schedule_ends_at_what_was_asked_for() {
+        let options = Options::default();
+        assert_eq!(options.stage(0), (30.0, 0.1));
+        assert_eq!(options.stage(options.steps - 1), (37.0, 1.0));
+        assert!(options.rate(0) < 1e-4 && options.rate(options.steps - 1) < 1e-6);
+    }
+}
