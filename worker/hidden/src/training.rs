@@ -67,12 +67,13 @@ impl Options {
         Ok(self.distortions.check()?)
     }
 
-    /// Strength (dB) and part of the geometry at `step`: strong and little changed for a quarter of the steps, then
-    /// linearly to what is wanted at the end, which the last third has.
+    /// Strength (dB) and part of the geometry at `step`: pictures change little and the mark is strong at first, then
+    /// the geometry widens, then the mark weakens; the last steps have what is wanted at the end. Both at once, or
+    /// before messages are read at all, undo what was learned.
     fn stage(&self, step: usize) -> (f32, f32) {
         let done = step as f32 / self.steps as f32;
-        let part = ((done - 0.2) / 0.45).clamp(0.0, 1.0);
-        let geometry = ((done - 0.05) / 0.3).clamp(0.1, 1.0);
+        let part = ((done - 0.6) / 0.25).clamp(0.0, 1.0);
+        let geometry = ((done - 0.1) / 0.5).clamp(0.1, 1.0);
         (self.start_psnr + (self.end_psnr - self.start_psnr) * part, geometry)
     }
 
