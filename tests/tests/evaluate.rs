@@ -73,6 +73,8 @@ fn what_cannot_be_evaluated_is_refused() {
         "evaluate results --experiments magic --scenes one.ply",
         &["magic", "capacity"],
     );
+    bench.refuses("evaluate results --report-only", &["results", "no folder"]);
+    std::fs::create_dir(bench.path("results")).unwrap();
     bench.write("results/results.jsonl", "nonsense\n");
     bench.refuses("evaluate results --report-only", &["results.jsonl", "line 1"]);
 }

@@ -51,7 +51,7 @@ fn wrong_usage_exits_with_1_and_help_with_0() {
         "embed",
         "verify --key K",
         "nonsense",
-        "key create --bits 99",
+        "key create --bits 199",
         "jobs get 7",
         "",
     ] {

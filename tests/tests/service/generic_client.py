@@ -53,7 +53,7 @@ assert call("JobService/GetJob", {"name": job["name"]})["state"] == "STATE_SUCCE
 assert [j["name"] for j in call("JobService/ListJobs", {"states": ["STATE_SUCCEEDED"]})["jobs"]] == [job["name"]]
 assert "jobs" not in call("JobService/ListJobs", {"states": ["STATE_FAILED"]})
 
-assert refused("JobService/CreateJob", {"job": {"createKey": {"bits": 76}}}) == grpc.StatusCode.INVALID_ARGUMENT
+assert refused("JobService/CreateJob", {"job": {"createKey": {"bits": 151}}}) == grpc.StatusCode.INVALID_ARGUMENT
 assert refused("JobService/GetJob", {"name": "jobs/../keys"}) == grpc.StatusCode.INVALID_ARGUMENT
 assert refused("KeyService/GetKey", {"name": job["name"].replace("jobs", "keys")}) == grpc.StatusCode.NOT_FOUND
 assert refused("JobService/CancelJob", {"name": job["name"]}) == grpc.StatusCode.FAILED_PRECONDITION

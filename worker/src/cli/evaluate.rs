@@ -66,6 +66,15 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    // What is refused leaves no folder behind.
+    if !arguments.report_only {
+        check(arguments)?;
+    } else if !arguments.folder.is_dir() {
+        return Err(Error::BadOption {
+            field: "DIR",
+            reason: format!("{} is no folder of results", arguments.folder.display()),
+        });
+    }
     let mut store = Store::open(&arguments.folder).map_err(Error::Evaluation)?;
     if !arguments.report_only {
         measure(arguments, &mut store)?;
@@ -74,13 +83,23 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
+/// Whether there are settings that can be used, and scenes that can be opened: a run of hours should not end at its
+/// last scene.
+fn check(arguments: &Arguments) -> Result<()> {
+    settings(arguments)?;
     if arguments.scenes.is_empty() {
         return Err(Error::BadOption {
             field: "scenes",
             reason: "name at least one, or ask for --report-only".into(),
         });
     }
+    for scene in &arguments.scenes {
+        std::fs::File::open(scene).map_err(Error::io(scene))?;
+    }
+    Ok(())
+}
+
+fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
     let plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits)?;
     let options = Options {
         scenes: arguments.scenes.clone(),

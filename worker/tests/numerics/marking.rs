@@ -213,8 +213,8 @@ pub fn poison(machine: &Machine) {
 /// It is refused before the first step, and before the output is touched.
 pub fn too_much_for_the_adapter(machine: &Machine) {
     let mut settings = short(Preset::Standard);
-    (settings.size, settings.enlarged) = (160, 3.0);
-    let tiles = u64::from((160 * 3 / TILE).pow(2));
+    (settings.size, settings.enlarged) = (480, 1.0);
+    let tiles = u64::from((480 / TILE).pow(2));
     let limit = machine.compute.max_buffer.unwrap();
     // Twelve bytes of gradient a (Gaussian, tile) pair.
     let count = limit / (12 * tiles) + 1;
