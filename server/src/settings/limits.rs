@@ -39,6 +39,14 @@ impl Settings {
                 not_empty(field, path)?;
             }
         }
+        // Filters on fields of spans are regular expressions that the library compiles without limits: 70 bytes of one
+        // took gigabytes.
+        if self.log_filter.contains(['[', '{']) {
+            return Err(SettingsError::Invalid {
+                field: "log_filter",
+                reason: "filters on spans and fields are not supported; name targets and levels".into(),
+            });
+        }
         EnvFilter::try_new(&self.log_filter).map_err(|error| SettingsError::Invalid {
             field: "log_filter",
             reason: error.to_string(),

@@ -53,6 +53,12 @@ pub fn put_all() {
         "filter",
         "log_filter = \"info,a[b{c=d}]=trace,/.*/=x\"",
     );
+    // Found by the fuzzer: the expression took gigabytes.
+    put(
+        "server_settings",
+        "span-filter",
+        "log_filter = \"info,a[b{BBBBeconBBBBBBBbBBBBBBBBBBB.......log_format = .......................BBBBBBBBBB..............................BBBBBBBBBBBBBBBBBBBBds }c=x\"",
+    );
     put("server_settings", "table", "[listen]\nport = 3\n[[listen]]");
     put(
         "server_settings",
