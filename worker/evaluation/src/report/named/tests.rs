@@ -96,7 +96,7 @@ fn ablations_and_families() {
     assert_eq!(formats[1], row("format:ply", "not measured"));
     assert_eq!(formats[3], row("format:spz", "96.88"));
     let longer = rows(&made(Kind::Longer, &records));
-    assert_eq!(longer, [row("75", "not measured")]);
+    assert_eq!(longer, [row("128", "not measured")]);
 }
 
 #[test]
