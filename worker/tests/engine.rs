@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
+use guardsplat_distortion::RobustTo;
 use guardsplat_worker::clip::{Clip, ClipConfig, ClipModel, Parts};
 use guardsplat_worker::device::{Compute, DeviceChoice, open};
 use guardsplat_worker::embed::{
@@ -43,6 +44,7 @@ fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut
         bits: BITS,
         bits_per_token: None,
         seed: Some(seed),
+        robust_to: RobustTo::none(),
         training: TrainingOptions {
             noise: 0.2,
             ..TrainingOptions::default()

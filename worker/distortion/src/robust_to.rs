@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 
-/// A set of distortions, sorted and without duplicates. In files it is a list of names.
+/// A set of distortions. In files it is a sorted list of names.
 ///
 /// As text it is a list with commas, `all` or `none`. It is shown as a list even if it has all, so that what was written
 /// down keeps its meaning when more distortions become known.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "Vec<Kind>", into = "Vec<Kind>")]
-pub struct RobustTo(Vec<Kind>);
+pub struct RobustTo(u32); // a bit for each kind
 
 impl RobustTo {
     /// Nothing: marks are trained on clean pictures.
@@ -23,56 +23,63 @@ impl RobustTo {
 
     /// All that are known, those that act on the scene included.
     pub fn all() -> Self {
-        Self(Kind::ALL.to_vec())
+        Kind::ALL.into_iter().collect()
     }
 
     /// What it contains, sorted.
-    pub fn kinds(&self) -> &[Kind] {
-        &self.0
+    pub fn kinds(self) -> impl Iterator<Item = Kind> {
+        Kind::ALL.into_iter().filter(move |kind| self.contains(*kind))
+    }
+
+    /// Whether it contains nothing.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
     }
 
     /// Whether it contains `kind`.
-    pub fn contains(&self, kind: Kind) -> bool {
-        self.0.contains(&kind)
+    pub fn contains(self, kind: Kind) -> bool {
+        self.0 & bit(kind) != 0
     }
 
     /// Those that act on pictures, sorted.
-    pub fn of_pictures(&self) -> impl Iterator<Item = Kind> + '_ {
-        self.0.iter().copied().filter(|kind| !kind.acts_on_scene())
+    pub fn of_pictures(self) -> impl Iterator<Item = Kind> {
+        self.kinds().filter(|kind| !kind.acts_on_scene())
     }
 
     /// Those that act on the scene, sorted.
-    pub fn of_scenes(&self) -> impl Iterator<Item = Kind> + '_ {
-        self.0.iter().copied().filter(|kind| kind.acts_on_scene())
+    pub fn of_scenes(self) -> impl Iterator<Item = Kind> {
+        self.kinds().filter(|kind| kind.acts_on_scene())
     }
 }
 
+fn bit(kind: Kind) -> u32 {
+    1 << kind as u32
+}
+
 impl From<Vec<Kind>> for RobustTo {
-    fn from(mut kinds: Vec<Kind>) -> Self {
-        kinds.sort();
-        kinds.dedup();
-        Self(kinds)
+    fn from(kinds: Vec<Kind>) -> Self {
+        kinds.into_iter().collect()
     }
 }
 
 impl From<RobustTo> for Vec<Kind> {
     fn from(robust_to: RobustTo) -> Self {
-        robust_to.0
+        robust_to.kinds().collect()
     }
 }
 
 impl FromIterator<Kind> for RobustTo {
     fn from_iter<I: IntoIterator<Item = Kind>>(kinds: I) -> Self {
-        kinds.into_iter().collect::<Vec<_>>().into()
+        Self(kinds.into_iter().fold(0, |bits, kind| bits | bit(kind)))
     }
 }
 
 impl fmt::Display for RobustTo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
+        if self.is_empty() {
             return f.pad("none");
         }
-        let names: Vec<_> = self.0.iter().map(|kind| kind.name()).collect();
+        let names: Vec<_> = self.kinds().map(Kind::name).collect();
         f.pad(&names.join(","))
     }
 }
@@ -108,13 +115,13 @@ mod tests {
     #[test]
     fn lists_are_sorted_and_without_duplicates() {
         let some = parse("noise, jpeg,crop,jpeg ");
-        assert_eq!(some.kinds(), [Kind::Crop, Kind::Jpeg, Kind::Noise]);
+        assert_eq!(Vec::from(some), [Kind::Crop, Kind::Jpeg, Kind::Noise]);
         assert_eq!(some.to_string(), "crop,jpeg,noise");
         assert_eq!(parse(&some.to_string()), some);
         assert!(some.contains(Kind::Jpeg) && !some.contains(Kind::Blur));
         assert_eq!(parse("none"), RobustTo::default());
         assert_eq!(parse("none").to_string(), "none");
-        assert_eq!(parse("all").kinds(), Kind::ALL);
+        assert_eq!(Vec::from(parse("all")), Kind::ALL);
         assert_eq!(parse(&parse("all").to_string()), parse("all"));
         assert_eq!(format!("{:>6}|", parse("none")), "  none|");
         let mixed = parse("spz,8bit");

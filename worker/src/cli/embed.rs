@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use guardsplat_distortion::RobustTo;
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verification, embed};
 use guardsplat_worker::memory::Memory;
@@ -42,6 +43,11 @@ pub struct Arguments {
     device: DeviceChoice,
     #[command(flatten)]
     budget: Budget,
+    /// What the mark is trained to stand, names with commas, all or none: crop, scaling, rotation, brightness, contrast,
+    /// jpeg, noise, blur, mask, 8bit, combined; sh-noise, sh-truncation, spz, sog, pruning. The key should be made for
+    /// the same
+    #[arg(long, value_name = "LIST")]
+    robust_to: Option<RobustTo>,
     /// Side of training views and of those of the verification, in pixels
     #[arg(long, value_name = "PX")]
     size: Option<u32>,
@@ -141,6 +147,9 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
     if let Some(path) = &arguments.settings {
         let json = std::fs::read_to_string(path).map_err(Error::io(path))?;
         settings = settings.overridden(&json)?;
+    }
+    if let Some(robust_to) = arguments.robust_to {
+        settings.robust_to = robust_to;
     }
     chosen(settings, arguments.seed, arguments.size)
 }

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use guardsplat_distortion::RobustTo;
 use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
 use guardsplat_evaluation::report::output;
 use guardsplat_evaluation::report::selection::Selection;
@@ -150,6 +151,7 @@ fn engine(
                 bits,
                 bits_per_token: None,
                 seed: Some(seed),
+                robust_to: RobustTo::none(),
                 training: TrainingOptions::default(),
             };
             let stop = Stop::default();

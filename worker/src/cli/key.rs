@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, Subcommand};
+use guardsplat_distortion::RobustTo;
 use guardsplat_worker::Result;
 use guardsplat_worker::device::{DeviceChoice, open};
 use guardsplat_worker::embed::NewKey;
@@ -47,9 +48,12 @@ pub struct Create {
     /// Dimensions to keep of the rest; all unless given
     #[arg(long, hide_short_help = true)]
     keep: Option<usize>,
-    /// perceptron, as in the GuardSplat paper, or linear
-    #[arg(long, default_value = "perceptron")]
-    decoder: DecoderKind,
+    /// linear, or perceptron as in the GuardSplat paper; unless given what suits the CLIP, linear for the shipped one
+    #[arg(long)]
+    decoder: Option<DecoderKind>,
+    /// Distortions of pictures that the key is to stand, as for `embed`: names with commas, all or none
+    #[arg(long, value_name = "LIST", default_value = "none")]
+    robust_to: RobustTo,
     /// Messages kept apart, on whose texts the decoder is measured
     #[arg(long, default_value_t = TrainingOptions::default().unseen)]
     unseen: usize,
@@ -79,13 +83,14 @@ pub fn run(command: Command) -> Result<Exit> {
     let kept = keys::Kept {
         remove: arguments.remove,
         keep: arguments.keep,
+        decoder: arguments.decoder,
     };
     let options = KeyOptions {
         bits: arguments.bits,
         bits_per_token: arguments.bits_per_token,
         seed: arguments.seed,
+        robust_to: arguments.robust_to,
         training: TrainingOptions {
-            kind: arguments.decoder,
             unseen: arguments.unseen,
             noise: arguments.noise,
             ..TrainingOptions::default()

@@ -75,6 +75,9 @@ pub struct Train {
     /// Largest norm of a filter
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().norm[1])]
     largest_norm: f32,
+    /// Share of lightness in the direction of a filter, against what a random direction has
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().luma)]
+    luma: f32,
     /// Width of the features
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().dims)]
     dims: usize,
@@ -112,6 +115,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         scales: arguments.scales.clone(),
         surround: arguments.surround,
         norm: [arguments.least_norm, arguments.largest_norm],
+        luma: arguments.luma,
         dims: arguments.dims,
         text_width: arguments.text_width,
     };

@@ -151,7 +151,7 @@ mod tests {
 
     /// A tower with filters as the shipped model has them.
     fn shipped_filters() -> StatisticsTower {
-        let (filters, phases) = crate::train::filters(8 * 3, crate::train::NORM, 1);
+        let (filters, phases) = crate::train::filters(8 * 3, crate::train::NORM, crate::train::LUMA, 1);
         tower().with_filters(&filters, &phases)
     }
 

@@ -3,6 +3,7 @@
 //! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
 //! of a step.
 use burn::tensor::{Tensor, TensorData};
+use guardsplat_distortion::Layer;
 use rand_chacha::ChaCha8Rng;
 
 use super::progress::Terms;
@@ -13,10 +14,14 @@ use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
 use crate::quality::{Ssim, batch, unbatch};
 
+/// What rotated pictures show in their corners.
+const CORNERS: [f32; 3] = [1.0; 3];
+
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {
     engine: &'a Engine,
     settings: Settings,
+    distortions: Layer,
     targets: Vec<f32>,
     ssim: Ssim,
 }
@@ -37,6 +42,7 @@ impl<'a> Loss<'a> {
         Self {
             engine,
             settings: *settings,
+            distortions: settings.layer(),
             targets: message.targets().collect(),
             ssim: Ssim::new(side, side, &engine.compute.device),
         }
@@ -78,6 +84,11 @@ impl<'a> Loss<'a> {
             None => None,
         };
         let seen = self.settings.augmentation.apply(marked, rng);
+        let seen = if self.settings.robust_to.of_pictures().next().is_some() {
+            self.distortions.apply(seen, CORNERS, rng)
+        } else {
+            seen
+        };
         let logits = self.engine.logits(seen);
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);

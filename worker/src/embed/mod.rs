@@ -2,6 +2,7 @@
 //!
 //! Geometry and opacity are frozen. [`optimise`] is the loop, [`embed`] goes from file to verified file.
 mod adam;
+mod alteration;
 mod augment;
 mod balance;
 mod check;

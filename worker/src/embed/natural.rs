@@ -1,4 +1,9 @@
 //! Pictures that show how CLIP features vary by themselves: what a key's projection must ignore.
+use burn::tensor::Tensor;
+use guardsplat_distortion::{Layer, RobustTo};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
@@ -17,6 +22,8 @@ const SCENES: u64 = 16;
 const VIEWS: u64 = 8;
 /// Gaussians of a scene; enough for views without holes.
 const GAUSSIANS: usize = 20_000;
+/// What rotated pictures show in their corners.
+const GROUND: [f32; 3] = [1.0; 3];
 /// The seed of the first scene; users begin at 0, and their own sample scene should not be among these.
 const FIRST_SEED: u64 = 0x6e61_7475_7265;
 
@@ -49,7 +56,8 @@ pub fn count() -> usize {
     (SCENES * VIEWS) as usize
 }
 
-/// CLIP features of pictures of one size, `[n][dim]` row-major. `done` hears how many are.
+/// CLIP features of pictures of one size, `[n][dim]` row-major; after those of some pictures come those of the same ones
+/// distorted in the ways of `robust_to`, if there are any. `done` hears of how many pictures there are features.
 ///
 /// # Errors
 /// The first of the pictures', a failing device, or [`Error::Stopped`].
@@ -57,23 +65,39 @@ pub fn features(
     clip: &Clip,
     compute: &Compute,
     pictures: impl Iterator<Item = Result<Picture>>,
+    robust_to: RobustTo,
     stop: &Stop,
     mut done: impl FnMut(usize),
 ) -> Result<Vec<f32>> {
+    let layer = Layer {
+        robust_to,
+        ..Layer::default()
+    };
+    let distorted = robust_to.of_pictures().next().is_some();
+    let mut rng = ChaCha8Rng::seed_from_u64(FIRST_SEED);
     let mut features = Vec::new();
+    let mut read_pictures = 0;
     let mut waiting: Vec<Picture> = Vec::with_capacity(BATCH);
     let mut read = |waiting: &mut Vec<Picture>| -> Result<()> {
         if waiting.is_empty() {
             return Ok(());
         }
         let pictures = batch(&waiting.iter().collect::<Vec<_>>(), &compute.device)?;
-        let rows = clip.image_features(pictures).try_into_vec_as::<f32>();
-        features.extend(rows.map_err(|e| Error::Device {
-            device: compute.name.clone(),
-            reason: e.to_string(),
-        })?);
+        let mut extend = |pictures: Tensor<4>| -> Result<()> {
+            let rows = clip.image_features(pictures).try_into_vec_as::<f32>();
+            features.extend(rows.map_err(|e| Error::Device {
+                device: compute.name.clone(),
+                reason: e.to_string(),
+            })?);
+            Ok(())
+        };
+        extend(pictures.clone())?;
+        if distorted {
+            extend(layer.apply(pictures, GROUND, &mut rng))?;
+        }
+        read_pictures += waiting.len();
         waiting.clear();
-        done(features.len() / clip.dim());
+        done(read_pictures);
         Ok(())
     };
     for picture in pictures {

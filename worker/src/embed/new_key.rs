@@ -61,7 +61,7 @@ pub fn create_key(
         text_features(clip, compute, length, sequences)
     };
 
-    let images = natural::features(clip, compute, pictures, stop, |done| {
+    let images = natural::features(clip, compute, pictures, options.robust_to, stop, |done| {
         progress(NewKey::Pictures(done, natural::count()));
     })?;
     let projection = fit_projection(&secret, &table, &images, clip.dim(), projection, &mut encode)?;

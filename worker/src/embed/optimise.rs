@@ -192,7 +192,7 @@ impl<'a> Run<'a> {
     fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut Timing) -> Result<Step> {
         let (engine, scene) = (self.engine, &self.scene.gaussians);
         let changes = self.learned.changes();
-        let colours = engine.each(views, |v| Ok(sh::colours(&scene.sh, Some(changes), &v.view)))?;
+        let colours = engine.each(views, |v| Ok(v.colours(&scene.sh, Some(changes))))?;
         timing.lap(Stage::Colours);
         let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
         let pictures = engine.each(&drawn, |(v, colours)| v.draw(engine, colours))?;

@@ -9,12 +9,13 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::alteration::Alteration;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::picture::Picture;
-use crate::scene::Gaussians;
-use crate::splat::{PreparedView, prepare_averaged, sh};
+use crate::scene::{Gaussians, Sh};
+use crate::splat::{Changes, PreparedView, prepare_averaged, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
@@ -26,6 +27,8 @@ const MOST_COVERING: usize = 128;
 pub(super) struct PooledView {
     pub view: PreparedView,
     background: [f32; 3],
+    /// Added to the colours of the visible Gaussians; empty for nothing.
+    noise: Vec<f32>,
     /// The unmarked picture.
     pub reference: Picture,
 }
@@ -41,14 +44,47 @@ impl PooledView {
         half: bool,
         background: [f32; 3],
     ) -> Result<Self> {
-        let view = prepare_averaged(gaussians, camera, times, engine.weight_cache(camera.width, half))?;
-        let colours = sh::colours(&gaussians.sh, None, &view);
-        let reference = engine.rasterizer()?.render(&view, &colours, background)?;
-        Ok(Self {
-            view,
+        let how = Drawn {
+            times,
+            half,
             background,
-            reference,
-        })
+            alteration: Alteration::Nothing,
+        };
+        Self::altered(engine, gaussians, camera, how)
+    }
+
+    /// As [`PooledView::new`], of a scene to which something happened.
+    fn altered(engine: &Engine, gaussians: &Gaussians, camera: &Camera, how: Drawn) -> Result<Self> {
+        let pruned = how.alteration.pruned(gaussians);
+        let shown = pruned.as_ref().unwrap_or(gaussians);
+        let mut view = prepare_averaged(shown, camera, how.times, engine.weight_cache(camera.width, how.half))?;
+        if let Alteration::Degree(degree) = how.alteration {
+            view.degree = view.degree.min(degree);
+        }
+        let noise = how.alteration.noise(&view, gaussians.sh.degree);
+        let empty = Picture {
+            width: 0,
+            height: 0,
+            pixels: Vec::new(),
+        };
+        let mut pooled = Self {
+            view,
+            background: how.background,
+            noise,
+            reference: empty,
+        };
+        let colours = pooled.colours(&gaussians.sh, None);
+        pooled.reference = pooled.draw(engine, &colours)?;
+        Ok(pooled)
+    }
+
+    /// Colours of the visible Gaussians, with changes to the scene's.
+    pub fn colours(&self, sh: &Sh, changes: Option<Changes<'_>>) -> Vec<f32> {
+        let mut colours = sh::colours(sh, changes, &self.view);
+        for (colour, noise) in colours.iter_mut().zip(&self.noise) {
+            *colour = (*colour + noise).max(0.0);
+        }
+        colours
     }
 
     /// The picture with these colours of the visible Gaussians.
@@ -70,8 +106,16 @@ impl PooledView {
     }
 
     fn bytes(&self) -> usize {
-        self.view.bytes() + size_of_val(&self.reference.pixels[..])
+        self.view.bytes() + size_of_val(&self.reference.pixels[..]) + size_of_val(&self.noise[..])
     }
+}
+
+/// How a training view is drawn.
+struct Drawn {
+    times: f32,
+    half: bool,
+    background: [f32; 3],
+    alteration: Alteration,
 }
 
 /// Training views, kept within a number and a budget of bytes.
@@ -170,16 +214,8 @@ impl Pool {
         let wanted: Vec<u64> = (self.next..self.next + count as u64).map(|i| i % all).collect();
         let made = engine.each(&wanted, |&index| {
             let camera = self.sampler.camera(Split::Training, index, self.settings.size);
-            let (background, times) = self.chosen(index);
-            let view = PooledView::new(
-                engine,
-                gaussians,
-                &camera,
-                times,
-                self.settings.half_weights,
-                background,
-            )?;
-            Ok(Arc::new(view))
+            let how = self.chosen(index, gaussians.sh.degree);
+            Ok(Arc::new(PooledView::altered(engine, gaussians, &camera, how)?))
         })?;
         self.next += count as u64;
         Ok(made)
@@ -199,13 +235,19 @@ impl Pool {
         }
     }
 
-    /// Background and enlargement of a training view, seeded: white, or black for a share of the views; drawn at up to
-    /// [`Settings::enlarged`] times its size.
-    fn chosen(&self, index: u64) -> ([f32; 3], f32) {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed.wrapping_add(1));
+    /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
+    /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand.
+    fn chosen(&self, index: u64, degree: usize) -> Drawn {
+        let s = &self.settings;
+        let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(1));
         rng.set_stream(index);
-        let black = rng.random::<f32>() < self.settings.black_backgrounds;
-        let times = 1.0 + (self.settings.enlarged - 1.0) * rng.random::<f32>();
-        (if black { [0.0; 3] } else { [1.0; 3] }, times)
+        let black = rng.random::<f32>() < s.black_backgrounds;
+        let times = 1.0 + (s.enlarged - 1.0) * rng.random::<f32>();
+        Drawn {
+            times,
+            half: s.half_weights,
+            background: if black { [0.0; 3] } else { [1.0; 3] },
+            alteration: Alteration::draw(s.robust_to, degree, s.seed, index),
+        }
     }
 }

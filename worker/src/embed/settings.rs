@@ -1,4 +1,5 @@
 //! Every number of an embedding, and the presets that choose them.
+use guardsplat_distortion::{Layer, Ranges, RobustTo};
 use serde::{Deserialize, Serialize};
 
 use super::adam::AdamOptions;
@@ -118,6 +119,11 @@ pub struct Settings {
     pub balance: Option<Balance>,
     /// What CLIP sees of a training view besides the view itself.
     pub augmentation: Augmentation,
+    /// What is done to training views, and to the scene that they show, so that the mark stands it: each view gets one
+    /// of these or nothing, all equally likely.
+    pub robust_to: RobustTo,
+    /// How strong the distortions of pictures are.
+    pub distortions: Ranges,
     /// When to stop before the last step.
     pub early_stop: Option<EarlyStop>,
     /// How the result is verified.
@@ -168,7 +174,7 @@ impl Preset {
     pub fn settings(self) -> Settings {
         let standard = Settings {
             seed: 0,
-            steps: 400,
+            steps: 240,
             views_per_step: 8,
             fresh_per_step: 4,
             views: None,
@@ -180,9 +186,9 @@ impl Preset {
             black_backgrounds: 0.1,
             lambda: Lambdas {
                 reconstruction: 1.0,
-                l1: 0.8,
-                l2: 0.0,
-                ssim: 0.2,
+                l1: 0.0,
+                l2: 33.0,
+                ssim: 0.0,
                 lpips: 0.0,
                 message: 0.05,
                 temperature: 8.0,
@@ -197,19 +203,21 @@ impl Preset {
                 sparse: true,
                 ..AdamOptions::default()
             },
-            descent: None,
+            descent: Some(DescentOptions::default()),
             balance: Some(Balance {
-                target_psnr_db: 36.8,
+                target_psnr_db: 40.4,
                 ..Balance::default()
             }),
             augmentation: Augmentation::default(),
+            robust_to: RobustTo::none(),
+            distortions: Ranges::default(),
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
                 min_steps: 100,
-                bit_accuracy: 0.995,
-                margin: 4.0,
-                psnr_db: 36.3,
+                bit_accuracy: 0.998,
+                margin: 8.0,
+                psnr_db: 40.1,
                 patience: 2,
             }),
             verify: Verify {
@@ -218,30 +226,30 @@ impl Preset {
                 message_views: 5,
             },
             target: Target {
-                bit_accuracy: 0.97,
-                psnr_db: 36.0,
+                bit_accuracy: 0.98,
+                psnr_db: 39.0,
                 message: true,
             },
         };
         match self {
             Self::Standard => standard,
             Self::Draft => Settings {
-                steps: 120,
+                steps: 80,
                 pool_views: 100,
                 balance: Some(Balance {
-                    target_psnr_db: 35.6,
+                    target_psnr_db: 39.4,
                     ..Balance::default()
                 }),
                 early_stop: standard.early_stop.map(|stop| EarlyStop {
                     min_steps: 50,
-                    bit_accuracy: 0.96,
-                    margin: 1.0,
-                    psnr_db: 34.3,
+                    bit_accuracy: 0.99,
+                    margin: 4.0,
+                    psnr_db: 38.5,
                     ..stop
                 }),
                 target: Target {
-                    bit_accuracy: 0.9,
-                    psnr_db: 34.0,
+                    bit_accuracy: 0.95,
+                    psnr_db: 37.0,
                     message: true,
                 },
                 ..standard
@@ -254,6 +262,9 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 lambda: Lambdas {
+                    l1: 0.8,
+                    l2: 0.0,
+                    ssim: 0.2,
                     lpips: 1.0,
                     message: 0.03,
                     temperature: 1.0,
@@ -262,6 +273,7 @@ impl Preset {
                     ..standard.lambda
                 },
                 adam: AdamOptions::default(),
+                descent: None,
                 balance: None,
                 augmentation: Augmentation {
                     brightness: 0.0,
@@ -291,6 +303,14 @@ impl Settings {
         let settings: Settings = serde_json::from_value(all).map_err(bad)?;
         settings.check()?;
         Ok(settings)
+    }
+
+    /// What training views go through.
+    pub(super) fn layer(&self) -> Layer {
+        Layer {
+            robust_to: self.robust_to,
+            ranges: self.distortions,
+        }
     }
 
     /// Checks every number that could make a run fail, hang or lose its meaning.
@@ -330,6 +350,10 @@ impl Settings {
         within("lambda.temperature", f64::from(l.temperature), 1e-3, 1e6)?;
         self.adam.check()?;
         self.augmentation.check()?;
+        self.layer().check().map_err(|e| Error::BadOption {
+            field: "distortions",
+            reason: e.to_string(),
+        })?;
         if let Some(descent) = &self.descent {
             descent.check()?;
         }

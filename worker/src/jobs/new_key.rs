@@ -1,6 +1,7 @@
 //! `create_key` jobs: the key file goes to the server as a secret, and is never on this machine's disk.
 use std::time::{Duration, Instant};
 
+use guardsplat_distortion::RobustTo;
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{KeyOutput, KeyResult, KeySpec};
 use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
@@ -25,6 +26,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done
         bits: spec.bits as usize,
         bits_per_token: None,
         seed: spec.seed,
+        robust_to: RobustTo::none(),
         training: TrainingOptions::default(),
     };
     let work = attempt.compute(move |bench, stop, reporter| {

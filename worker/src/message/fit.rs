@@ -20,7 +20,8 @@ pub struct FitOptions {
     /// Dimensions to keep: those of the rest along which texts vary most. `None` keeps all.
     pub keep: Option<usize>,
     /// Features are ranked: a mark moves the first dimensions most, against how much they vary by themselves, and so on
-    /// down. Then nothing is removed, the first `keep` are kept, and natural variation is made alike in all of them.
+    /// down, and they vary alike. Then nothing is removed and the first `keep` are kept as they are: a covariance of a few
+    /// pictures to whiten by would do more harm than good.
     pub ranked: bool,
 }
 
@@ -66,10 +67,7 @@ pub fn fit(images: &[f32], texts: &[f32], width: usize, options: FitOptions) -> 
         false => strongest_texts(&image, &text, width, remove, rank)?,
     };
     let (image, text) = (congruence(&basis, &image, width), congruence(&basis, &text, width));
-    let to_image = match options.ranked {
-        true => whitener("image", &image, rank)?,
-        false => scaled_identity(unit_spread("image", &image, rank)?, rank),
-    };
+    let to_image = scaled_identity(unit_spread("image", &image, rank)?, rank);
     let to_text = whitener("text", &text, rank)?;
     Ok(Projection {
         width,

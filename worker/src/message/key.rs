@@ -1,4 +1,5 @@
 //! A key: the secret, the decoder trained for it, and the CLIP that both belong to.
+use guardsplat_distortion::RobustTo;
 use std::fmt;
 use std::path::Path;
 
@@ -35,6 +36,9 @@ pub struct KeyOptions {
     pub bits_per_token: Option<usize>,
     /// Makes the key reproducible, and only as secret as the seed; `None` asks the operating system for a secret.
     pub seed: Option<u64>,
+    /// Distortions of natural pictures that the projection is to stand: what they do to features is variation like
+    /// any other.
+    pub robust_to: RobustTo,
     /// How to train the decoder; its own seed is replaced.
     pub training: TrainingOptions,
 }
@@ -255,6 +259,7 @@ mod tests {
             bits: 8,
             bits_per_token: None,
             seed,
+            robust_to: RobustTo::none(),
             training,
         };
         Key::create(

@@ -66,6 +66,8 @@ pub struct PreparedView {
     pub directions: Vec<[f32; 3]>,
     /// Splats of each tile.
     pub tiles: TileLists,
+    /// Bands of spherical harmonics above this degree are not shown.
+    pub degree: usize,
     pub(crate) weights: Option<SparseWeights>,
     pub(crate) id: ViewId,
 }
@@ -209,6 +211,7 @@ fn prepare_with(
         splats,
         directions,
         tiles,
+        degree: gaussians.sh.degree,
         weights,
         id: ViewId::next(),
     };

@@ -80,13 +80,13 @@ pub fn basis(degree: usize, dir: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
 
 /// Colours of the visible Gaussians of `view`, `[visible][3]`: `max(0, SH(direction) + 0.5)`.
 ///
-/// `changes` are added to the coefficients first. `view` must have been prepared from a scene of as many Gaussians as
+/// `changes` are added to the coefficients first; bands above the view's degree are left out. `view` must have been prepared from a scene of as many Gaussians as
 /// `sh` has.
 pub fn colours(sh: &Sh, changes: Option<Changes<'_>>, view: &PreparedView) -> Vec<f32> {
     let stride = sh.per_gaussian();
     let mut out = vec![0.0; view.visible.len() * 3];
     let work = |((out, &row), &dir): ((&mut [f32], &u32), &[f32; 3])| {
-        let b = basis(sh.degree, dir);
+        let b = basis(sh.degree.min(view.degree), dir);
         let at = row as usize * stride;
         let mut c = [0.5f32; 3];
         let coefficients = &sh.coefficients[at..at + stride];
@@ -119,6 +119,7 @@ pub fn colours(sh: &Sh, changes: Option<Changes<'_>>, view: &PreparedView) -> Ve
 pub fn backward(learnable: &Learnable, view: &PreparedView, colours: &[f32], colour_gradient: &[f32], out: &mut [f32]) {
     let part = Part {
         learnable,
+        degree: learnable.degree().min(view.degree),
         visible: &view.visible,
         directions: &view.directions,
         colours,
@@ -131,6 +132,7 @@ pub fn backward(learnable: &Learnable, view: &PreparedView, colours: &[f32], col
 #[derive(Clone, Copy)]
 struct Part<'a> {
     learnable: &'a Learnable,
+    degree: usize,
     visible: &'a [u32],
     directions: &'a [[f32; 3]],
     colours: &'a [f32],
@@ -179,7 +181,7 @@ impl Part<'_> {
             let Some(slot) = self.learnable.slot(self.visible[i]) else {
                 continue;
             };
-            let b = basis(self.learnable.degree(), self.directions[i]);
+            let b = basis(self.degree, self.directions[i]);
             let at = (slot - first) * columns;
             for (k, out) in out[at..at + columns].chunks_exact_mut(3).enumerate() {
                 for j in 0..3 {

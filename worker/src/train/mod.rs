@@ -19,7 +19,7 @@ mod steering;
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
 #[cfg(test)]
-pub(crate) use filters::{NORM, filters};
+pub(crate) use filters::{LUMA, NORM, filters};
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
@@ -46,6 +46,8 @@ pub struct TrainOptions {
     pub surround: usize,
     /// Least and largest norm of a filter; see [`filters`].
     pub norm: [f32; 2],
+    /// Share of lightness in the direction of a filter, against what a random direction has.
+    pub luma: f32,
     /// Width of the features.
     pub dims: usize,
     /// Width of the text tower.
@@ -63,7 +65,8 @@ impl Default for TrainOptions {
             scales: vec![1, 2, 4],
             surround: 1,
             norm: filters::NORM,
-            dims: 96,
+            luma: filters::LUMA,
+            dims: 152,
             text_width: 128,
         }
     }
@@ -141,7 +144,12 @@ pub fn train_clip(
     check(options)?;
     let config = config(options);
     let model = ClipModel::init(&config, Parts::Both, &compute.device, options.seed);
-    let (filters, mut phases) = filters::filters(options.filters * options.scales.len(), options.norm, options.seed);
+    let (filters, mut phases) = filters::filters(
+        options.filters * options.scales.len(),
+        options.norm,
+        options.luma,
+        options.seed,
+    );
     if options.surround > 1 {
         // What is alike all around is 0 already.
         phases.fill(0.0);

@@ -11,6 +11,9 @@ use super::load;
 /// What the projection ignores and keeps of CLIP's features, where experiments ask for something else than usual.
 #[derive(Clone, Copy, Default)]
 pub struct Kept {
+    /// What kind of decoder reads the message; unless given a linear one of a CLIP with ranked features, else a
+    /// perceptron.
+    pub decoder: Option<DecoderKind>,
     /// Directions of strongest natural variation to drop; 64 unless given, at most an eighth of all. None of a CLIP with
     /// ranked features.
     pub remove: Option<usize>,
@@ -28,8 +31,15 @@ pub fn create(
     progress: impl FnMut(NewKey),
 ) -> Result<Key> {
     let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
+    let ranked = clip.config.is_ranked();
+    let kind = kept.decoder.unwrap_or(match ranked {
+        true => DecoderKind::Linear,
+        false => DecoderKind::Perceptron,
+    });
+    let mut options = options.clone();
+    options.training.kind = kind;
     // A perceptron needs more dimensions than bits to tell texts apart; a linear decoder reads the strongest ones best.
-    let ranked = clip.config.is_ranked() && options.training.kind == DecoderKind::Linear;
+    let ranked = ranked && kind == DecoderKind::Linear;
     let projection = FitOptions {
         remove: kept.remove.unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
         keep: kept
@@ -39,7 +49,7 @@ pub fn create(
     };
     stop.check()?;
     let pictures = natural::pictures(compute, clip.config.vision.image_size as u32)?;
-    create_key(options, projection, &clip, identity, compute, pictures, stop, progress)
+    create_key(&options, projection, &clip, identity, compute, pictures, stop, progress)
 }
 
 /// Dimensions of ranked features that a message of so many bits is read from: every further one is weaker than those
