@@ -294,6 +294,8 @@ mod tests {
         let message = Message::parse("6", 4).unwrap();
         let mut settings = Preset::Draft.settings();
         (settings.views_per_step, settings.size) = (2, 40);
+        let l = &mut settings.lambda;
+        (l.l1, l.l2, l.ssim) = (0.8, 0.0, 0.2);
         settings.augmentation = Augmentation {
             brightness: 0.0,
             ..settings.augmentation
