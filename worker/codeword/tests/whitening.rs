@@ -104,7 +104,10 @@ proptest! {
         let pad = Whitening { secret: &[0; 32], asset: &asset, nonce: &nonce }.pad(length(bits));
         match pad {
             Ok(pad) => prop_assert_eq!(pad.length().bits() as usize, bits),
-            Err(error) => prop_assert!(matches!(error, Error::TooShort { .. })),
+            Err(error) => {
+                let short = matches!(error, Error::TooShort { .. });
+                prop_assert!(short, "{}", error);
+            }
         }
     }
 }
