@@ -5,7 +5,7 @@
 //! measurement information, IEEE Transactions on Information Theory 18 (1972).
 use super::Code;
 
-/// Bits that are flipped in all combinations: half the minimum distance, rounded up for the smaller codes.
+/// Bits that are flipped in all combinations: half the minimum distance of (63, 30), and more for the others.
 const FLIPPED: usize = 7;
 
 /// The codeword found that contradicts `logits` least, for `value` decided from them; the first found where several do.
