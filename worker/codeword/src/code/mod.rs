@@ -29,8 +29,7 @@ pub use scheme::{PAPER_LENGTHS, Scheme};
 /// | (63, 30) | 3.8e-6 | 2.9e-4 | 3.0e-3 | 4.0e-2 | below 2e-3 | 7e-4 |
 ///
 /// The default is (63, 36): a thousand keys of sixteen million payloads each, and at 5 % one payload of 500 lost, where
-/// (63, 45) loses one of 30. (63, 30) gains little over it until more bits are wrong than a match leaves room for, and
-/// has room for 256 keys of a million payloads.
+/// (63, 45) loses one of 30. (63, 30) loses still fewer, but has room for 256 keys of a million payloads only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Code {
@@ -110,7 +109,10 @@ impl Code {
     ///
     /// A logit above 0 speaks for a 1, by its size; 0 and NaN say nothing. Corrects what [`Code::decode`] corrects when
     /// all logits are of one size, and more when wrong bits are the unsure ones: measured on Gaussian logits with up to 5 %
-    /// of wrong bits, a tenth of the payloads are lost or fewer, in 0.2 ms a word. Random words are nearly always decoded to something.
+    /// of wrong bits, a tenth as many payloads are lost, or fewer; 0.2 ms a word.
+    ///
+    /// Where this fails it mostly finds another codeword instead of none, so that what was read must be compared with
+    /// the registry before it is believed.
     ///
     /// # Errors
     /// [`Error::OtherLength`] unless there are 64 logits.
