@@ -24,7 +24,7 @@ impl Reading {
         let (mut word, mut decided) = (Word::zeros(length), Word::zeros(length));
         for (position, &logit) in logits.iter().enumerate() {
             word.set(position as u32, logit > 0.0);
-            decided.set(position as u32, logit > 0.0 || logit < 0.0);
+            decided.set(position as u32, logit.abs() > 0.0); // false for NaN
         }
         Ok(Self { word, decided })
     }

@@ -134,7 +134,7 @@ fn undecided_bits_are_filled_in() {
             let (information, word) = random(code, &mut rng);
             let mut read = logits(word, 1.0);
             for place in sample(&mut rng, 64, erased) {
-                read[place] = if place % 2 == 0 { f32::NAN } else { 0.0 };
+                read[place] = if place.is_multiple_of(2) { f32::NAN } else { 0.0 };
             }
             let decoded = code.decode_logits(&read).unwrap().unwrap();
             assert_eq!((decoded.information, decoded.corrected_bits), (information, 0));
