@@ -1,0 +1,371 @@
+//! Verdicts at their limits, and p-values whose calibration can be enumerated.
+use super::*;
+use crate::code::Code;
+use crate::payload::Payload;
+use crate::whiten::{Whitening, mark};
+use crate::word::WordLength;
+use proptest::prelude::*;
+
+fn raw(bits: usize) -> Scheme {
+    Scheme::Raw {
+        bits: WordLength::new(bits).unwrap(),
+    }
+}
+
+fn framing(name: &str, logits: Vec<f32>) -> Framing {
+    Framing {
+        name: name.into(),
+        views: 4,
+        logits,
+    }
+}
+
+/// Logits of a word, the first `wrong` of them on the wrong side and unsure.
+fn logits(word: &Word, wrong: usize) -> Vec<f32> {
+    let side =
+        |(i, bit): (usize, bool)| if bit == (i < wrong) { -1.0 } else { 1.0 } * if i < wrong { 0.5 } else { 3.0 };
+    word.bits().enumerate().map(side).collect()
+}
+
+fn target(id: &str, word: Word) -> Target {
+    Target {
+        id: id.into(),
+        word,
+        pad: None,
+    }
+}
+
+fn claim<'a>(scheme: Scheme, framings: &'a [Framing], targets: &'a [Target]) -> Claim<'a> {
+    Claim {
+        scheme,
+        framings,
+        targets,
+        targets_tried: None,
+        other_tries: 1,
+        rate: 1e-6,
+    }
+}
+
+#[test]
+fn matches_decide_at_the_thresholds_of_the_table() {
+    for (bits, needed) in [(32, 30), (48, 41), (64, 51), (72, 57)] {
+        let word = Word::zeros(WordLength::new(bits).unwrap());
+        let targets = [target("ours", word)];
+        for (matched, verdict) in [(needed, Verdict::Match), (needed - 1, Verdict::NoMatch)] {
+            let framings = [framing("as given", logits(&word, bits - matched))];
+            let answer = claim(raw(bits), &framings, &targets).test().unwrap().answer;
+            let best = answer.best.unwrap();
+            assert_eq!(
+                (answer.verdict, answer.needed_bits),
+                (verdict, Some(needed as u32)),
+                "{bits}"
+            );
+            assert_eq!((best.matched_bits, best.views), (matched as u32, 4));
+            assert_eq!(best.p_alone, chance::tail(bits as u32, matched as u32).unwrap());
+            assert_eq!((answer.payload, answer.reason), (None, None));
+        }
+    }
+}
+
+#[test]
+fn a_short_key_is_inconclusive_and_says_what_it_can_reach() {
+    let word = Word::zeros(WordLength::new(16).unwrap());
+    let framings = [framing("as given", logits(&word, 0))];
+    let targets = [target("ours", word)];
+    let question = claim(raw(16), &framings, &targets);
+    let answer = question.test().unwrap().answer;
+    assert_eq!((answer.verdict, answer.needed_bits), (Verdict::Inconclusive, None));
+    let expected = "16 bits with 1 hypotheses can never reach a rate of 1e-6: all of them match by chance at a rate of up \
+                    to 1.5e-5";
+    assert_eq!(answer.reason.as_deref(), Some(expected));
+    // What it can reach is enough for who asks for no more.
+    assert_eq!(
+        Claim { rate: 2e-5, ..question }.test().unwrap().answer.verdict,
+        Verdict::Match
+    );
+}
+
+#[test]
+fn all_hypotheses_count() {
+    let word = Word::from_u64(0x0123_4567_89ab_cdef);
+    let framings = [
+        framing("as given", vec![-1.0; 64]),
+        framing("mirrored", logits(&word, 13)),
+    ];
+    let targets = [
+        target("theirs", Word::from_u64(!0)),
+        target("ours", word),
+        target("again", word),
+    ];
+    let question = Claim {
+        other_tries: 5,
+        ..claim(raw(64), &framings, &targets)
+    };
+    let answer = question.test().unwrap().answer;
+    let best = answer.best.clone().unwrap();
+    assert_eq!((answer.hypotheses, answer.verdict), (2 * 3 * 5, Verdict::NoMatch)); // alone, 51 would do
+    assert_eq!(
+        (best.framing.as_str(), best.target.as_str(), best.matched_bits),
+        ("mirrored", "ours", 51)
+    );
+    assert!(best.p_alone <= 1e-6 && best.p_value == 30.0 * best.p_alone);
+    let searched = Claim {
+        targets_tried: Some(1_000_000),
+        rate: 1e-3,
+        ..question
+    };
+    let answer = searched.test().unwrap().answer;
+    assert_eq!(answer.hypotheses, 10_000_000);
+    assert_eq!(answer.needed_bits, chance::least_matches(64, 1e-10, 1).unwrap());
+    // Whatever was tried, the p-value is a probability.
+    let often = Claim {
+        other_tries: 1 << 60,
+        ..question
+    };
+    assert_eq!(often.test().unwrap().answer.best.unwrap().p_value, 1.0);
+}
+
+#[test]
+fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() {
+    let framings = [framing("as given", vec![1.0; 64])];
+    let tested = claim(raw(64), &framings, &[]).test().unwrap();
+    assert_eq!((tested.answer.verdict, tested.confidences), (Verdict::UnknownKey, None));
+    assert!(tested.answer.best.is_none() && tested.answer.reason.is_some());
+
+    let targets = [target("ours", Word::from_u64(!0))];
+    let answer = claim(raw(64), &[], &targets).test().unwrap().answer;
+    assert_eq!(
+        (answer.verdict, answer.reason.as_deref()),
+        (Verdict::Inconclusive, Some("no picture was read"))
+    );
+
+    let mut unsure = vec![1.0; 64];
+    unsure[..14].fill(f32::NAN);
+    let framings = [framing("as given", unsure.clone())];
+    let answer = claim(raw(64), &framings, &targets).test().unwrap().answer;
+    let reason = "at most 50 of 64 bits could be decided, and a match needs 51";
+    assert_eq!(
+        (answer.verdict, answer.reason.as_deref()),
+        (Verdict::Inconclusive, Some(reason))
+    );
+    // One bit more decides, and undecided bits count as not matching.
+    unsure[0] = 1.0;
+    let framings = [framing("as given", unsure)];
+    let tested = claim(raw(64), &framings, &targets).test().unwrap();
+    let best = tested.answer.best.unwrap();
+    assert_eq!(
+        (tested.answer.verdict, best.matched_bits, best.undecided_bits),
+        (Verdict::Match, 51, 13)
+    );
+    let confidences = tested.confidences.unwrap();
+    assert_eq!((confidences.bits[1], confidences.bits[63]), (0.0, 0.5_f32.tanh()));
+}
+
+#[test]
+fn a_match_of_a_coded_scheme_says_what_was_embedded() {
+    let whitening = Whitening {
+        secret: &[5; 32],
+        asset: b"lego",
+        nonce: &[6; 16],
+    };
+    for code in Code::ALL {
+        let payload = Payload {
+            key: 77,
+            number: 123_456,
+        };
+        let mark = mark(code, payload, &whitening).unwrap();
+        let targets = [Target {
+            pad: Some(mark.pad),
+            ..target("ours", mark.word)
+        }];
+        for wrong in [0, 1, code.corrects() as usize] {
+            let framings = [framing("as given", logits(&mark.word, wrong))];
+            let answer = claim(Scheme::Coded { code }, &framings, &targets)
+                .test()
+                .unwrap()
+                .answer;
+            let read = ReadPayload::Read {
+                payload,
+                corrected_bits: wrong as u32,
+                filled_bits: 0,
+                as_registered: true,
+            };
+            assert_eq!((answer.verdict, answer.payload), (Verdict::Match, Some(read)));
+        }
+        // Without the pad, and for another word, nothing is read.
+        let bare = [target("ours", mark.word)];
+        let framings = [framing("as given", logits(&mark.word, 0))];
+        let answer = claim(Scheme::Coded { code }, &framings, &bare).test().unwrap().answer;
+        assert_eq!((answer.verdict, answer.payload), (Verdict::Match, None));
+        let other = [framing("as given", logits(&mark.pad, 0))];
+        let answer = claim(Scheme::Coded { code }, &other, &targets).test().unwrap().answer;
+        assert_eq!((answer.verdict, answer.payload), (Verdict::NoMatch, None));
+    }
+}
+
+#[test]
+fn error_correction_never_decides() {
+    // A word that decodes to the very payload isn't a match when its matches do not make one: the code of 30 bits reads
+    // through 6 wrong bits, and at a rate of 1e-18 no more than 1 may be wrong.
+    let whitening = Whitening {
+        secret: &[5; 32],
+        asset: b"lego",
+        nonce: &[6; 16],
+    };
+    let mark = mark(Code::Bch30, Payload { key: 1, number: 2 }, &whitening).unwrap();
+    let targets = [Target {
+        pad: Some(mark.pad),
+        ..target("ours", mark.word)
+    }];
+    let framings = [framing("as given", logits(&mark.word, 6))];
+    let strict = Claim {
+        rate: 1e-18,
+        ..claim(Scheme::Coded { code: Code::Bch30 }, &framings, &targets)
+    };
+    let answer = strict.test().unwrap().answer;
+    assert_eq!((answer.verdict, answer.payload), (Verdict::NoMatch, None));
+    // And a match whose payload is lost stays a match, whatever is made of the payload.
+    let framings = [framing(
+        "as given",
+        logits(&mark.word, 13).iter().map(|l| l.signum()).collect(),
+    )];
+    let answer = claim(Scheme::Coded { code: Code::Bch30 }, &framings, &targets)
+        .test()
+        .unwrap()
+        .answer;
+    assert_eq!(answer.verdict, Verdict::Match);
+    assert!(!matches!(
+        answer.payload,
+        Some(ReadPayload::Read {
+            as_registered: true,
+            ..
+        })
+    ));
+}
+
+#[test]
+fn p_values_are_calibrated_for_every_word_that_could_be_read() {
+    // All 1024 equally likely targets of 10 bits: for any reading, with undecided bits or not, p <= x for a share of at
+    // most x of them; exactly x where x is attained and all bits are decided.
+    let constant = vec![1.0; 10];
+    let mixed: Vec<f32> = (0..10).map(|i| (i % 3) as f32 - 1.0).collect();
+    for (logits, decided) in [(constant, true), (mixed, false)] {
+        let framings = [framing("as given", logits)];
+        let p_value = |value: u32| {
+            let bits: Vec<bool> = (0..10).map(|i| value >> i & 1 == 1).collect();
+            let targets = [target("wrong", Word::from_bits(&bits).unwrap())];
+            claim(raw(10), &framings, &targets)
+                .test()
+                .unwrap()
+                .answer
+                .best
+                .unwrap()
+                .p_value
+        };
+        let all: Vec<f64> = (0..1024).map(p_value).collect();
+        for &x in &all {
+            let share = all.iter().filter(|&&p| p <= x).count() as f64 / 1024.0;
+            assert!(if decided { share == x } else { share <= x }, "{share} for {x}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_together_is_an_error() {
+    let framings = [framing("as given", vec![1.0; 64])];
+    let targets = [target("ours", Word::from_u64(0))];
+    let good = claim(raw(64), &framings, &targets);
+    let text = |claim: Claim<'_>| claim.test().unwrap_err().to_string();
+    assert_eq!(
+        text(Claim {
+            scheme: raw(63),
+            ..good
+        }),
+        r#"framing "as given" has 64 bits, not 63"#
+    );
+    let short = [target("ours", Word::from_bits(&[true]).unwrap())];
+    assert_eq!(
+        text(Claim {
+            targets: &short,
+            ..good
+        }),
+        r#"target "ours" has 1 bits, not 64"#
+    );
+    let padded = [Target {
+        pad: Some(short[0].word),
+        ..targets[0].clone()
+    }];
+    assert_eq!(
+        text(Claim {
+            targets: &padded,
+            ..good
+        }),
+        r#"the pad of target "ours" has 1 bits, not 64"#
+    );
+    assert_eq!(
+        text(Claim { rate: f64::NAN, ..good }),
+        "rate: NaN is not above 0 and below 1"
+    );
+    assert_eq!(
+        text(Claim { other_tries: 0, ..good }),
+        "other tries: 0 is below 1: this claim counts"
+    );
+    let fewer = Claim {
+        targets_tried: Some(0),
+        ..good
+    };
+    assert_eq!(text(fewer), "targets tried: 0 are fewer than the 1 targets given");
+    let many = Claim {
+        targets_tried: Some(u64::MAX),
+        other_tries: 2,
+        ..good
+    };
+    assert_eq!(text(many), "hypotheses: more than 2^64 - 1 were tried");
+}
+
+#[test]
+fn answers_come_back_from_json_without_confidences() {
+    let targets = [target("ours", Word::from_u64(0))];
+    let framings = [framing("as given", vec![-1.0; 64])];
+    let answer = claim(raw(64), &framings, &targets).test().unwrap().answer;
+    let json = serde_json::to_string(&answer).unwrap();
+    assert_eq!(serde_json::from_str::<Answer>(&json).unwrap(), answer);
+    assert!(
+        json.contains(r#""verdict":"match""#) && !json.contains("confidence") && !json.contains("logit"),
+        "{json}"
+    );
+}
+
+proptest! {
+    #[test]
+    fn no_input_panics_and_matches_are_at_or_below_the_rate(
+        framings in prop::collection::vec(prop::collection::vec(prop::num::f32::ANY, 0..70), 0..3),
+        targets in prop::collection::vec((any::<u64>(), any::<Option<u64>>()), 0..4),
+        tried: Option<u64>,
+        other_tries: u64,
+        rate in prop_oneof![prop::num::f64::ANY, 1e-3..0.9],
+    ) {
+        let full = |mut logits: Vec<f32>| { if logits.len() > 3 { logits.resize(64, 0.5) }; logits };
+        let framings: Vec<Framing> = framings.into_iter().map(|logits| framing("any", full(logits))).collect();
+        let targets: Vec<Target> = targets
+            .into_iter()
+            .map(|(word, pad)| Target { pad: pad.map(Word::from_u64), ..target("any", Word::from_u64(word)) })
+            .collect();
+        let claim = Claim {
+            scheme: Scheme::default(),
+            framings: &framings,
+            targets: &targets,
+            targets_tried: tried,
+            other_tries: other_tries >> 40,
+            rate,
+        };
+        if let Ok(Tested { answer, .. }) = claim.test() {
+            let p = answer.best.as_ref().map(|best| best.p_value);
+            match answer.verdict {
+                Verdict::Match => prop_assert!(p.unwrap() <= rate),
+                Verdict::NoMatch => prop_assert!(p.unwrap() > rate),
+                Verdict::Inconclusive | Verdict::UnknownKey => prop_assert!(answer.reason.is_some()),
+            }
+        }
+    }
+}
