@@ -2,7 +2,7 @@
 use crate::evidence::Evidence;
 use crate::picture::{Picture, View};
 use crate::tail;
-use crate::verification::{Decision, Reason, Verdict, Verification};
+use crate::verification::{Decision, Reason, Verification};
 use std::fmt::Debug;
 
 /// One thing that was computed again.

@@ -53,13 +53,13 @@ pub fn sign(evidence: &Evidence, key: &SigningKey) -> Result<Signed> {
     let signature = Signature {
         algorithm: ALGORITHM.into(),
         public_key: hex::encode(key.verifying_key().as_bytes()),
-        value: signature(key, Part::Json, evidence.to_json()?.as_bytes()),
+        value: signed_value(key, Part::Json, evidence.to_json()?.as_bytes()),
     };
     let evidence = evidence.clone();
     let file = SignedFile { evidence, signature };
     let json = canonical(&file)?;
     let mut html = html::page(&file.evidence, &json, Some(&file.signature));
-    let value = signature(key, Part::Page, html.as_bytes());
+    let value = signed_value(key, Part::Page, html.as_bytes());
     html += &format!("{PAGE_START}{value}{PAGE_END}\n");
     Ok(Signed { json, html })
 }
@@ -94,7 +94,7 @@ pub(crate) fn is_signed_page(html: &str, signer: &VerifyingKey) -> bool {
     parts.is_some_and(|(page, value)| is_signed(value, Part::Page, page.as_bytes(), signer))
 }
 
-fn signature(key: &SigningKey, part: Part, document: &[u8]) -> String {
+fn signed_value(key: &SigningKey, part: Part, document: &[u8]) -> String {
     hex::encode(key.sign(statement(part, document).as_bytes()).to_bytes())
 }
 

@@ -17,7 +17,11 @@ fn all<'a>(page: &'a Html, selector: &str) -> Vec<ElementRef<'a>> {
 
 fn text(page: &Html, selector: &str) -> String {
     let texts = all(page, selector).into_iter().flat_map(|e| e.text());
-    texts.collect::<String>().split_whitespace().collect::<Vec<_>>().join(" ")
+    texts
+        .collect::<String>()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[test]
@@ -35,7 +39,10 @@ fn every_page_is_well_formed_and_accessible() {
             level = next;
         }
         for table in all(&page, "table") {
-            assert!(table.select(&Selector::parse("caption").unwrap()).next().is_some(), "{name}");
+            assert!(
+                table.select(&Selector::parse("caption").unwrap()).next().is_some(),
+                "{name}"
+            );
         }
         for cell in all(&page, "th") {
             assert!(cell.value().attr("scope").is_some(), "{name}");
@@ -61,18 +68,33 @@ fn nothing_comes_from_outside_and_nothing_runs() {
         let (_, page) = page(&evidence);
         for element in page.tree.values().filter_map(|node| node.as_element()) {
             let tag = element.name();
-            assert!(!["iframe", "object", "embed", "link", "form", "base", "a"].contains(&tag), "{name}: {tag}");
+            assert!(
+                !["iframe", "object", "embed", "link", "form", "base", "a"].contains(&tag),
+                "{name}: {tag}"
+            );
             for (attribute, value) in element.attrs() {
-                assert!(!attribute.starts_with("on") && attribute != "style", "{name}: {tag} {attribute}");
+                assert!(
+                    !attribute.starts_with("on") && attribute != "style",
+                    "{name}: {tag} {attribute}"
+                );
                 let address = ["src", "href", "srcset", "action", "data"].contains(&attribute);
-                assert!(!address || value.starts_with("data:image/png;base64,"), "{name}: {tag} {attribute}");
+                assert!(
+                    !address || value.starts_with("data:image/png;base64,"),
+                    "{name}: {tag} {attribute}"
+                );
             }
         }
         let scripts = all(&page, "script");
         assert_eq!(scripts.len(), 1, "{name}");
         assert_eq!(scripts[0].value().attr("type"), Some("application/json"), "{name}");
-        let policy = all(&page, "meta[http-equiv='Content-Security-Policy']")[0].value().attr("content").unwrap();
-        assert!(policy.starts_with("default-src 'none'; img-src data:; style-src 'sha256-"), "{policy}");
+        let policy = all(&page, "meta[http-equiv='Content-Security-Policy']")[0]
+            .value()
+            .attr("content")
+            .unwrap();
+        assert!(
+            policy.starts_with("default-src 'none'; img-src data:; style-src 'sha256-"),
+            "{policy}"
+        );
         assert!(!policy.contains("unsafe"), "{policy}");
         let style = text(&page, "style");
         assert!(!style.contains("url(") && !style.contains("@import"));
@@ -84,10 +106,19 @@ fn texts_that_mean_harm_stay_texts() {
     let evidence = samples::hostile();
     let (html, page) = page(&evidence);
     assert!(!html.contains("<script>alert"));
-    assert!(!html.contains('\u{202e}') || html.split("<script").next().is_some_and(|shown| !shown.contains('\u{202e}')));
+    assert!(
+        !html.contains('\u{202e}')
+            || html
+                .split("<script")
+                .next()
+                .is_some_and(|shown| !shown.contains('\u{202e}'))
+    );
     let names = text(&page, ".files th bdi");
     assert!(names.contains("</script><script>alert(1)</script>"), "{names}");
-    assert!(names.contains("\u{27e8}U+202E\u{27e9}ylp.eman\u{27e8}U+202C\u{27e9} \" onload=\"x\" '&lt;"), "{names}");
+    assert!(
+        names.contains("\u{27e8}U+202E\u{27e9}ylp.eman\u{27e8}U+202C\u{27e9} \" onload=\"x\" '&lt;"),
+        "{names}"
+    );
     assert!(text(&page, "figcaption, h3").contains("\u{27e8}U+200F\u{27e9}"));
     assert!(text(&page, "h1 ~ p").contains("קובץ <b>\u{27e8}U+2066\u{27e9}"));
     // The JSON inside is what programs get, to the letter.
@@ -101,17 +132,35 @@ fn the_verdict_comes_first_and_says_how_sure_it_is() {
     let (_, found) = page(&samples::matching());
     assert_eq!(text(&found, "h1"), "Match: the message is there");
     let verdict = text(&found, ".verdict");
-    assert!(verdict.contains("Owner Atelier Morgenrot, asset Garden statue, payload c0ffee42c0ffee42."), "{verdict}");
+    assert!(
+        verdict.contains("Owner Atelier Morgenrot, asset Garden statue, payload c0ffee42c0ffee42."),
+        "{verdict}"
+    );
     // P(Bin(64, 1/2) ≥ 62) = 2081/2⁶⁴ = 1.128e-16, 5 readings times 10 assets: 5.64e-15.
-    assert!(verdict.contains("62 of 64 bits agree, read from 20 views."), "{verdict}");
-    assert!(verdict.contains("less than one in a hundred trillion would agree"), "{verdict}");
+    assert!(
+        verdict.contains("62 of 64 bits agree, read from 20 views."),
+        "{verdict}"
+    );
+    assert!(
+        verdict.contains("less than one in a hundred trillion would agree"),
+        "{verdict}"
+    );
     let readings = text(&found, ".reading");
-    assert!(readings.contains("less than one in a hundred trillion cases, with all 50 attempts"), "{readings}");
+    assert!(
+        readings.contains("less than one in a hundred trillion cases, with all 50 attempts"),
+        "{readings}"
+    );
     assert!(readings.contains("X ~ Binomial(64, ½)"), "{readings}");
     assert!(readings.contains("pad is secret and uniform"), "{readings}");
-    assert!(readings.contains("p = 5.64 · 10−14") || readings.contains("p = 5.64 · 10−15"), "{readings}");
+    assert!(
+        readings.contains("p = 5.64 · 10−14") || readings.contains("p = 5.64 · 10−15"),
+        "{readings}"
+    );
     let numbers = text(&found, "table.facts");
-    assert!(numbers.contains("Threshold in bits 54 of 64") || numbers.contains("Threshold in bits53 of 64"), "{numbers}");
+    assert!(
+        numbers.contains("Threshold in bits 54 of 64") || numbers.contains("Threshold in bits53 of 64"),
+        "{numbers}"
+    );
     assert!(text(&found, "section p").contains("5 × 10 = 50 hypotheses"));
     assert_eq!(all(&found, "rect.cell").len(), 64);
     assert_eq!(all(&found, "rect.differs").len(), 2);
@@ -138,7 +187,11 @@ fn each_verdict_says_what_it_is_and_what_it_is_not() {
         assert!(body.contains(wanted.1), "{name}: {body}");
         assert!(body.contains("What this report does not prove"), "{name}");
         let helps = body.contains("Why, and what would help");
-        assert_eq!(helps, name.starts_with("inconclusive") || name == "unknown-key", "{name}");
+        assert_eq!(
+            helps,
+            name.starts_with("inconclusive") || name == "unknown-key",
+            "{name}"
+        );
     }
     let mut evidence = samples::verify(samples::decided(38, guardsplat_evidence::Tried::once()));
     let verification = evidence.verification.as_mut().unwrap();

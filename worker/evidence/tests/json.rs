@@ -23,9 +23,23 @@ fn reports_round_trip_but_for_the_bytes_of_pictures() {
 #[test]
 fn the_order_of_fields_is_fixed() {
     let json = samples::matching().to_json().unwrap();
-    assert!(json.starts_with("{\"schema\":\"guardsplat.evidence\",\"version\":1,\"audience\":\"owner\",\"kind\":\"verify\""));
+    assert!(
+        json.starts_with(
+            "{\"schema\":\"guardsplat.evidence\",\"version\":1,\"audience\":\"owner\",\"kind\":\"verify\""
+        )
+    );
     let place = |field: &str| json.find(&format!("\"{field}\":")).unwrap();
-    let order = ["job", "started", "engine", "model", "key", "inputs", "verification", "embedding", "views"];
+    let order = [
+        "job",
+        "started",
+        "engine",
+        "model",
+        "key",
+        "inputs",
+        "verification",
+        "embedding",
+        "views",
+    ];
     assert!(order.is_sorted_by_key(|field| place(field)));
     assert!(json.contains("\"started\":\"2026-03-14T09:26:53Z\",\"finished\":\"2026-03-14T09:27:31.5Z\""));
 }
@@ -82,7 +96,10 @@ fn another_version_is_named_before_its_fields_are_looked_at() {
     let error = Evidence::from_json(newer.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 2, known: 1 }), "{error}");
     assert!(error.to_string().contains("version 2"), "{error}");
-    let signed = sign(&samples::matching(), &samples::key()).unwrap().json.replace("\"version\":1", "\"version\":7");
+    let signed = sign(&samples::matching(), &samples::key())
+        .unwrap()
+        .json
+        .replace("\"version\":1", "\"version\":7");
     let error = Evidence::from_json(signed.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 7, .. }), "{error}");
 }
@@ -108,13 +125,21 @@ fn values_out_of_range_are_refused_by_name() {
         ("inputs", |e| e.inputs = vec![e.inputs[0].clone(); limits::INPUTS + 1]),
         ("views", |e| e.views = vec![e.views[0].clone(); limits::VIEWS + 1]),
         ("embedding.ssim", |e| e.embedding.as_mut().unwrap().ssim = f64::NAN),
-        ("embedding.psnr_db", |e| e.embedding.as_mut().unwrap().psnr_db = Some(f64::INFINITY)),
-        ("embedding.payload", |e| e.embedding.as_mut().unwrap().payload = Some("C0FFEE".into())),
+        ("embedding.psnr_db", |e| {
+            e.embedding.as_mut().unwrap().psnr_db = Some(f64::INFINITY)
+        }),
+        ("embedding.payload", |e| {
+            e.embedding.as_mut().unwrap().payload = Some("C0FFEE".into())
+        }),
         ("verification.decision.matched", |e| decision(e).matched = 65),
         ("verification.decision.p_value", |e| decision(e).p_value = -1e-9),
         ("verification.decision.hypotheses", |e| decision(e).hypotheses = 0),
-        ("verification.strip[3].confidence", |e| e.verification.as_mut().unwrap().strip[3].confidence = Some(1.5)),
-        ("verification.strip", |e| e.verification.as_mut().unwrap().strip.truncate(5)),
+        ("verification.strip[3].confidence", |e| {
+            e.verification.as_mut().unwrap().strip[3].confidence = Some(1.5)
+        }),
+        ("verification.strip", |e| {
+            e.verification.as_mut().unwrap().strip.truncate(5)
+        }),
     ];
     for (field, change) in changes {
         let mut evidence = samples::embed(true);

@@ -15,13 +15,21 @@ fn what_was_signed_is_genuine_and_its_numbers_follow() {
         let signed = sign(&evidence, &samples::key()).unwrap();
         for document in [&signed.json, &signed.html] {
             let checked = check(document.as_bytes(), &samples::key().verifying_key());
-            assert!(matches!(checked.answer, Answer::Genuine), "{name}: {:?}", checked.answer);
+            assert!(
+                matches!(checked.answer, Answer::Genuine),
+                "{name}: {:?}",
+                checked.answer
+            );
             assert!(checked.holds(), "{name}: {:#?}", checked.findings);
         }
         // A page gives all of it back, pictures included.
         let checked = check(signed.html.as_bytes(), &samples::key().verifying_key());
         assert_eq!(checked.evidence.as_ref(), Some(&evidence), "{name}");
-        assert_eq!(signed, sign(&evidence, &samples::key()).unwrap(), "{name}: the same bytes again");
+        assert_eq!(
+            signed,
+            sign(&evidence, &samples::key()).unwrap(),
+            "{name}: the same bytes again"
+        );
     }
 }
 
@@ -41,7 +49,9 @@ fn every_value_of_the_json_is_covered() {
             match answer(&text) {
                 Answer::Altered(_) => {}
                 // What says that it is no report of this version is none.
-                Answer::NotAReport(_) => assert!(["/evidence/schema", "/evidence/version"].contains(&&*place), "{place}"),
+                Answer::NotAReport(_) => {
+                    assert!(["/evidence/schema", "/evidence/version"].contains(&&*place), "{place}")
+                }
                 other => panic!("{place}: {other:?}"),
             }
         }
@@ -51,8 +61,12 @@ fn every_value_of_the_json_is_covered() {
 /// Paths of everything that is neither a list nor an object.
 fn leaves(value: &Value, path: String, places: &mut Vec<String>) {
     match value {
-        Value::Object(fields) => fields.iter().for_each(|(name, v)| leaves(v, format!("{path}/{name}"), places)),
-        Value::Array(items) => (0..).zip(items).for_each(|(i, v): (usize, _)| leaves(v, format!("{path}/{i}"), places)),
+        Value::Object(fields) => fields
+            .iter()
+            .for_each(|(name, v)| leaves(v, format!("{path}/{name}"), places)),
+        Value::Array(items) => (0..)
+            .zip(items)
+            .for_each(|(i, v): (usize, _)| leaves(v, format!("{path}/{i}"), places)),
         _ => places.push(path),
     }
 }
@@ -93,7 +107,10 @@ fn parts_that_are_left_out_or_added_are_found() {
     }
     let mut changed = document.clone();
     changed["evidence"]["remark"] = "also".into();
-    assert!(matches!(answer(&changed.to_string()), Answer::Altered(Altered::Impossible(_))));
+    assert!(matches!(
+        answer(&changed.to_string()),
+        Answer::Altered(Altered::Impossible(_))
+    ));
     let twice = json.replacen("\"job\":", "\"job\":\"other\",\"job\":", 1);
     assert!(matches!(answer(&twice), Answer::Altered(_)));
     // Spaces between them change nothing of what the fields say.
@@ -104,7 +121,10 @@ fn parts_that_are_left_out_or_added_are_found() {
 #[test]
 fn every_part_of_the_page_is_covered() {
     let html = sign(&samples::matching(), &samples::key()).unwrap().html;
-    assert!(matches!(answer(&format!("{html}\r\n\n")), Answer::Genuine), "white space at the end");
+    assert!(
+        matches!(answer(&format!("{html}\r\n\n")), Answer::Genuine),
+        "white space at the end"
+    );
     let changes = [
         ("<h1>Match", "<h1>No match"),
         ("Atelier Morgenrot</bdi>", "Atelier Abendrot</bdi>"),
@@ -119,7 +139,11 @@ fn every_part_of_the_page_is_covered() {
     for (from, to) in changes {
         assert!(html.contains(from), "{from}");
         let changed = html.replacen(from, to, 1);
-        assert!(matches!(answer(&changed), Answer::Altered(Altered::Page)), "{from}: {:?}", answer(&changed));
+        assert!(
+            matches!(answer(&changed), Answer::Altered(Altered::Page)),
+            "{from}: {:?}",
+            answer(&changed)
+        );
     }
     let (_, signature) = html.rsplit_once("<!-- page signature").unwrap();
     let unsigned = html.replace(&format!("<!-- page signature{signature}"), "");
@@ -127,7 +151,10 @@ fn every_part_of_the_page_is_covered() {
     // A page of another report of the same service does not lend its signature.
     let other = sign(&samples::embed(true), &samples::key()).unwrap().html;
     let (_, foreign) = other.rsplit_once("<!-- page signature").unwrap();
-    assert!(matches!(answer(&html.replace(signature, foreign)), Answer::Altered(Altered::Page)));
+    assert!(matches!(
+        answer(&html.replace(signature, foreign)),
+        Answer::Altered(Altered::Page)
+    ));
 }
 
 #[test]
@@ -135,10 +162,22 @@ fn pictures_that_were_exchanged_are_found_by_their_hashes_too() {
     let evidence = samples::matching();
     let html = sign(&evidence, &samples::key()).unwrap().html;
     let other = sign(&samples::embed(true), &samples::key()).unwrap().html;
-    let data = |page: &str, i: usize| page.split("src=\"").nth(i).unwrap().split('"').next().unwrap().to_owned();
+    let data = |page: &str, i: usize| {
+        page.split("src=\"")
+            .nth(i)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap()
+            .to_owned()
+    };
     let changed = html.replace(&data(&html, 1), &data(&other, 9));
     let checked = check(changed.as_bytes(), &samples::key().verifying_key());
-    let finding = checked.findings.iter().find(|f| f.what.contains("inside the page")).unwrap();
+    let finding = checked
+        .findings
+        .iter()
+        .find(|f| f.what.contains("inside the page"))
+        .unwrap();
     assert!(!finding.agrees, "{finding:?}");
 }
 
@@ -147,13 +186,21 @@ fn somebody_elses_signature_is_told_apart_from_a_change() {
     let other = SigningKey::from_bytes(&[8; 32]);
     let signed = sign(&samples::matching(), &other).unwrap();
     for document in [&signed.json, &signed.html] {
-        let Answer::WrongKey { signer } = answer(document) else { panic!("{:?}", answer(document)) };
+        let Answer::WrongKey { signer } = answer(document) else {
+            panic!("{:?}", answer(document))
+        };
         assert_eq!(signer, other.verifying_key());
     }
     // To claim the service's key is a change, of either document.
     let [ours, theirs] = [samples::key(), other].map(|key| hex::encode(key.verifying_key().as_bytes()));
-    assert!(matches!(answer(&signed.json.replace(&theirs, &ours)), Answer::Altered(_)));
-    assert!(matches!(answer(&signed.html.replace(&theirs, &ours)), Answer::Altered(_)));
+    assert!(matches!(
+        answer(&signed.json.replace(&theirs, &ours)),
+        Answer::Altered(_)
+    ));
+    assert!(matches!(
+        answer(&signed.html.replace(&theirs, &ours)),
+        Answer::Altered(_)
+    ));
 }
 
 #[test]
@@ -161,7 +208,15 @@ fn what_nobody_signed_or_is_no_report_is_called_that() {
     let evidence = samples::matching();
     assert!(matches!(answer(&evidence.to_json().unwrap()), Answer::Unsigned));
     assert!(matches!(answer(&evidence.to_html().unwrap()), Answer::Unsigned));
-    let documents = ["", "{}", "{", "[]", "<html></html>", "{\"schema\":\"other\",\"version\":1}", "\u{feff}{}"];
+    let documents = [
+        "",
+        "{}",
+        "{",
+        "[]",
+        "<html></html>",
+        "{\"schema\":\"other\",\"version\":1}",
+        "\u{feff}{}",
+    ];
     for document in documents {
         assert!(matches!(answer(document), Answer::NotAReport(_)), "{document}");
     }
@@ -184,7 +239,11 @@ fn numbers_that_do_not_follow_are_found_even_when_they_were_signed() {
         let signed = sign(&evidence, &samples::key()).unwrap();
         let checked = check(signed.json.as_bytes(), &samples::key().verifying_key());
         assert!(matches!(checked.answer, Answer::Genuine) && !checked.holds(), "{what}");
-        assert!(checked.findings.iter().any(|f| f.what == what && !f.agrees), "{what}: {:?}", checked.findings);
+        assert!(
+            checked.findings.iter().any(|f| f.what == what && !f.agrees),
+            "{what}: {:?}",
+            checked.findings
+        );
     }
     let mut evidence = samples::matching();
     evidence.verification.as_mut().unwrap().strip[0].read ^= true;

@@ -59,7 +59,10 @@ impl Browser {
     pub fn screenshot(&self, page: &Path, scheme: Scheme) -> (Vec<u8>, Vec<String>) {
         let folder = tempfile::tempdir().unwrap();
         let picture = folder.path().join("page.png");
-        let flags = [format!("--screenshot={}", picture.display()), "--window-size=1000,1400".into()];
+        let flags = [
+            format!("--screenshot={}", picture.display()),
+            "--window-size=1000,1400".into(),
+        ];
         let (_, heard) = self.run(page, scheme, &flags);
         (std::fs::read(&picture).expect("a screenshot"), heard)
     }
@@ -71,13 +74,31 @@ impl Browser {
         let proxy = format!("--proxy-server=http://{}", ear.local_addr().unwrap());
         let heard = listen(ear);
         let mut browser = Command::new(&self.program)
-            .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
-            .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
-            .args(["--disable-extensions", "--disable-default-apps", "--disable-dev-shm-usage", "--hide-scrollbars"])
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-quic",
+                "--no-first-run",
+            ])
+            .args([
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--disable-sync",
+            ])
+            .args([
+                "--disable-extensions",
+                "--disable-default-apps",
+                "--disable-dev-shm-usage",
+                "--hide-scrollbars",
+            ])
             // Whatever is asked for goes to the ear, that of this machine too.
             .args([&proxy, "--proxy-bypass-list=<-loopback>", "--virtual-time-budget=5000"])
             .arg(format!("--user-data-dir={}", profile.path().display()))
-            .arg(format!("--blink-settings=preferredColorScheme={}", matches!(scheme, Scheme::Light) as u8))
+            .arg(format!(
+                "--blink-settings=preferredColorScheme={}",
+                matches!(scheme, Scheme::Light) as u8
+            ))
             .args(flags)
             .arg(format!("file://{}", page.display()))
             .stdin(Stdio::null())

@@ -24,7 +24,9 @@ fn pages(folder: &Path) -> Vec<(&'static str, PathBuf)> {
 
 /// A page that shows the others in frames of one width, side by side with what they are called.
 fn wrapper(folder: &Path, pages: &[(&str, PathBuf)], width: u32, height: u32, script: &str) -> PathBuf {
-    let mut html = String::from("<!DOCTYPE html><meta charset=\"utf-8\"><style>body{margin:0}iframe{border:0;display:block}</style>");
+    let mut html = String::from(
+        "<!DOCTYPE html><meta charset=\"utf-8\"><style>body{margin:0}iframe{border:0;display:block}</style>",
+    );
     for (name, path) in pages {
         let page = std::fs::read_to_string(path).unwrap();
         let page = page.replace('&', "&amp;").replace('"', "&quot;");
@@ -49,7 +51,9 @@ fn pages_fit_a_phone_and_a_screen_and_texts_stand_out() {
         assert_eq!(lines.len(), pages.len(), "{lines:#?}");
         for line in lines {
             // The name, the scheme that the page was drawn in, and what is wrong with it.
-            let [name, drawn, problems] = line.splitn(3, '|').collect::<Vec<_>>()[..] else { panic!("{line}") };
+            let [name, drawn, problems] = line.splitn(3, '|').collect::<Vec<_>>()[..] else {
+                panic!("{line}")
+            };
             assert_eq!(drawn, scheme.name(), "{name}");
             assert_eq!(problems, "", "{name} at {width} pixels, {drawn}");
         }
@@ -64,7 +68,10 @@ fn the_measure_finds_what_is_wrong() {
     let html = "<!DOCTYPE html><title>bad</title><body style=\"background:#fff\"><p style=\"width:500px\">wide</p>\
                 <p style=\"color:#bbb\">faint</p><img src=\"http://outside.invalid/x.png\">";
     std::fs::write(&bad, html).unwrap();
-    let dom = browser.dom(&wrapper(folder.path(), &[("bad", bad)], 360, 800, MEASURE), Scheme::Light);
+    let dom = browser.dom(
+        &wrapper(folder.path(), &[("bad", bad)], 360, 800, MEASURE),
+        Scheme::Light,
+    );
     for problem in ["scrolls sideways", "p ends at", "contrast of", "was fetched"] {
         assert!(dom.contains(problem), "{problem}: {dom}");
     }
@@ -92,7 +99,10 @@ fn nothing_is_fetched_and_something_is_seen() {
             assert!(colours > 20, "{name}: {colours} colours only");
             means.push(mean);
         }
-        assert!(means[0] > 180.0 && means[1] < 80.0, "{name}: light, then dark: {means:?}");
+        assert!(
+            means[0] > 180.0 && means[1] < 80.0,
+            "{name}: light, then dark: {means:?}"
+        );
     }
 }
 
