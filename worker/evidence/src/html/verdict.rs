@@ -133,6 +133,6 @@ fn sign(class: &str) -> Markup {
         _ => "M12 20 H28",
     };
     html! {
-        svg.sign viewBox="0 0 40 40" aria-hidden="true" { circle cx="20" cy="20" r="17"; path d=(path); }
+        svg.sign viewBox="0 0 40 40" aria-hidden="true" { circle cx="20" cy="20" r="17" {} path d=(path) {} }
     }
 }

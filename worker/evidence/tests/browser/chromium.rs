@@ -119,9 +119,23 @@ impl Browser {
             std::thread::sleep(Duration::from_millis(20));
         };
         assert!(status.success(), "Chromium ended with {status}");
-        let heard = heard.lock().unwrap().clone();
+        let heard = heard.lock().unwrap();
+        let heard = heard.iter().filter(|line| !is_its_own(line)).cloned().collect();
         (std::fs::read(output.path()).unwrap(), heard)
     }
+}
+
+/// Whether the browser asks for itself: the time, updates and accounts of its maker, whatever it is told.
+fn is_its_own(line: &str) -> bool {
+    let address = line.split(' ').nth(1).unwrap_or_default();
+    let host = address
+        .trim_start_matches("http://")
+        .split(['/', ':'])
+        .next()
+        .unwrap_or_default();
+    [".google.com", ".googleapis.com", ".gvt1.com"]
+        .iter()
+        .any(|end| host.ends_with(end))
 }
 
 /// Notes the first line of whatever is asked, and hangs up.

@@ -31,6 +31,7 @@ const measure = frame => {
     if (contrast < 4.5) problems.push(`contrast of ${name} "${element.textContent.trim().slice(0, 20)}" is ${contrast.toFixed(2)}`);
     if (!inSvg && parseFloat(style.fontSize) < 10) problems.push(`${name} is ${style.fontSize} small`);
   }
+  if (page.querySelector('rect > *, path > *, circle > *')) problems.push('shapes within shapes are not drawn');
   for (const picture of page.images)
     if (!picture.naturalWidth && picture.src.startsWith('data:')) problems.push('a picture was not shown');
   for (const entry of view.performance.getEntriesByType('resource')) problems.push(`${entry.name} was fetched`);
