@@ -226,14 +226,15 @@ fn what_nobody_signed_or_is_no_report_is_called_that() {
 
 #[test]
 fn numbers_that_do_not_follow_are_found_even_when_they_were_signed() {
-    let change: [(&str, fn(&mut guardsplat_evidence::Decision)); 5] = [
+    type Change = fn(&mut guardsplat_evidence::Decision);
+    let changes: [(&str, Change); 5] = [
         ("p-value", |d| d.p_value *= 1.0 + 1e-6),
         ("p-value of one hypothesis", |d| d.p_single *= 2.0),
         ("hypotheses", |d| d.hypotheses = 1),
         ("needed bits", |d| d.needed = Some(50)),
         ("verdict", |d| d.threshold = 1e-20),
     ];
-    for (what, change) in change {
+    for (what, change) in changes {
         let mut evidence = samples::matching();
         change(evidence.verification.as_mut().unwrap().decision.as_mut().unwrap());
         let signed = sign(&evidence, &samples::key()).unwrap();

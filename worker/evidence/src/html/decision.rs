@@ -1,7 +1,7 @@
 //! How sure the verdict is: the p-value for a lawyer, for a statistician, and its numbers.
 use super::text::number;
 use crate::verification::{Decision, Verdict, Verification};
-use crate::words::{chance, counted};
+use crate::words::{chance, counted, grouped};
 use maud::{Markup, html};
 
 /// What the number means and where it comes from.
@@ -31,16 +31,19 @@ fn needed(decision: &Decision) -> Markup {
 
 /// One sentence that a lawyer understands.
 fn plain(decision: &Decision, verification: &Verification) -> Markup {
-    let attempts = counted(decision.hypotheses, "attempt", "attempts");
+    let attempts = match decision.hypotheses {
+        1 => "the one attempt".into(),
+        many => format!("all {} attempts", grouped(many)),
+    };
     let chance = chance(decision.p_value);
     let end = match verification.verdict {
-        Verdict::Match => "rare enough to count as a match by the rule fixed beforehand",
-        Verdict::NoMatch => "too often to count as a match by the rule fixed beforehand",
-        Verdict::Inconclusive | Verdict::UnknownKey => "and nothing is concluded from it, for the reason given above",
+        Verdict::Match => ": rare enough to count as a match by the rule fixed beforehand",
+        Verdict::NoMatch => ": too often to count as a match by the rule fixed beforehand",
+        Verdict::Inconclusive | Verdict::UnknownKey => "; nothing is concluded from it, for the reason given above",
     };
     html! {
-        "If the suspect had nothing to do with this mark, pure chance would make it agree at least this well in "
-        strong { (chance) } " cases, with all " (attempts) " of this search counted: " (end) "."
+        "If what was read had nothing to do with this mark, pure chance would make it agree at least this well in "
+        strong { (chance) } " cases, with " (attempts) " of this search counted" (end) "."
     }
 }
 
@@ -48,7 +51,7 @@ fn plain(decision: &Decision, verification: &Verification) -> Markup {
 fn statistics(decision: &Decision) -> Markup {
     let (n, k, m) = (decision.bits, decision.matched, decision.hypotheses);
     html! {
-        p { "Exact one-sided test of H" sub { "0" } ": the suspect is independent of the whitening pad of the message; the
+        p { "Exact one-sided test of H" sub { "0" } ": what was read is independent of the whitening pad of the message; the
             pad is secret and uniform, so the matches of an independent scene are X ~ Binomial(" (n) ", \u{bd}), whatever the
             decoder\u{2019}s bias and the dependence between bits; P(X \u{2265} " (k) ") = " (number(decision.p_single))
             ", and by the union bound over " (counted(m, "hypothesis", "hypotheses")) " p = " (number(decision.p_value)) "." }
@@ -66,7 +69,7 @@ fn table(decision: &Decision) -> Markup {
                     tr { th scope="row" { "Bits set right by the code" } td { (corrected) " (read after the decision, no part of it)" } }
                 }
                 tr { th scope="row" { "p-value before correction" } td { (number(decision.p_single)) " (" (chance(decision.p_single)) ")" } }
-                tr { th scope="row" { "Hypotheses tried" } td { (crate::words::grouped(decision.hypotheses)) } }
+                tr { th scope="row" { "Hypotheses tried" } td { (grouped(decision.hypotheses)) } }
                 tr { th scope="row" { "p-value after correction" } td { (number(decision.p_value)) " (" (chance(decision.p_value)) ")" } }
                 tr { th scope="row" { "Threshold as a rate" } td { (number(decision.threshold)) " (" (chance(decision.threshold)) ")" } }
                 tr { th scope="row" { "Threshold in bits" } td {

@@ -1,6 +1,6 @@
 //! What is inside a page for programs: the JSON, and the pictures.
 use crate::evidence::Evidence;
-use crate::picture::Picture;
+use crate::picture::View;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{Markup, PreEscaped, html};
 
@@ -42,8 +42,10 @@ pub(crate) fn fill(page: &str, evidence: &mut Evidence) -> usize {
         let data = rest.split_once('"').and_then(|(data, _)| STANDARD.decode(data).ok());
         let mut ours = false;
         if let Some(png) = data {
-            let pictures = evidence.views.iter_mut().flat_map(|v| v.pictures_mut());
-            ours = pictures.fold(false, |ours, picture: &mut Picture| picture.fill(&png) || ours);
+            // All of them, since two views may show the same.
+            for picture in evidence.views.iter_mut().flat_map(View::pictures_mut) {
+                ours |= picture.fill(&png);
+            }
         }
         others += usize::from(!ours);
     }

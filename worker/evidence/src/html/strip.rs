@@ -39,15 +39,15 @@ fn cell(i: usize, bit: &Bit) -> Markup {
     let middle = x + WIDTH / 2 - 1;
     let class = if differs(bit) { "cell differs" } else { "cell" };
     html! {
-        @if i % COLUMNS == 0 { text.place x="0" y=(y + 20) { (i + 1) } }
+        @if i.is_multiple_of(COLUMNS) { text.place x="0" y=(y + 20) { (i + 1) } }
         rect class=(class) x=(x) y=(y) width=(WIDTH - 2) height=(HEIGHT) rx="2" {}
         text x=(middle) y=(y + 12) { (bit.wanted.map_or("\u{b7}", digit)) }
         text x=(middle) y=(y + 25) { (digit(bit.read)) }
         @if differs(bit) {
-            path.cross d=(format!("M{} {} l6 6 m0 -6 l-6 6", middle - 3, y + 29)) {}
+            path.cross d=(format!("M{} {} l6 6 m0 -6 l-6 6", middle - 3, y + 28)) {}
         }
         @if let Some(confidence) = bit.confidence {
-            rect.sure x=(x + 2) y=(y + 39) width=(format!("{:.1}", confidence * BAR)) height="4" {}
+            rect.sure x=(x + 2) y=(y + 40) width=(format!("{:.1}", confidence * BAR)) height="4" {}
         }
     }
 }
