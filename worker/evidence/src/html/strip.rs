@@ -54,11 +54,11 @@ fn cell(i: usize, bit: &Bit) -> Markup {
 
 fn table(bits: &[Bit]) -> Markup {
     html! {
-        table {
+        table.bits {
             caption { "Bits, most significant first" }
             thead { tr {
                 th scope="col" { "Bit" } th scope="col" { "Wanted" } th scope="col" { "Read" } th scope="col" { "Agrees" }
-                th.number scope="col" { "Confidence" } th.number scope="col" { "Logit" }
+                th.number scope="col" { "Confi\u{ad}dence" } th.number scope="col" { "Logit" }
             } }
             tbody {
                 @for (i, bit) in bits.iter().enumerate() {
