@@ -1,0 +1,44 @@
+//! What was tried, and how it is paid for.
+use crate::tried::{Framing, FramingKind};
+use crate::verification::{Decision, Verification};
+use crate::words::{counted, grouped};
+use maud::{Markup, html};
+
+/// Every framing and claim, and the number of hypotheses that they make.
+pub(super) fn section(decision: &Decision, verification: &Verification) -> Markup {
+    let tried = &verification.tried;
+    html! {
+        section {
+            h2 { "What was tried, and how it is paid for" }
+            p { "Who looks often enough finds something by accident. So every reading that was decided on is compared with every
+                claim, each comparison is one hypothesis, and the p-value is multiplied by their number. What was pooled into a
+                reading costs nothing: it was decided once." }
+            table {
+                caption { "Framings of the suspect" }
+                thead { tr { th scope="col" { "Framing" } th.number scope="col" { "Variants" } th.number scope="col" { "Readings paid for" } } }
+                tbody { @for framing in &tried.framings { (row(framing)) } }
+                tfoot { tr { th scope="row" { "Readings" } td {} td.number { (grouped(tried.readings())) } } }
+            }
+            p { "Compared with the messages of " (counted(tried.assets, "asset", "assets")) " of "
+                (counted(tried.owners, "owner", "owners")) ": " (grouped(tried.readings())) " \u{d7} "
+                (grouped(tried.assets.max(1))) " = " strong { (counted(decision.hypotheses, "hypothesis", "hypotheses")) } "." }
+        }
+    }
+}
+
+fn row(framing: &Framing) -> Markup {
+    let name = match framing.kind {
+        FramingKind::AsGiven => "As given",
+        FramingKind::Crop => "Crops",
+        FramingKind::QuarterTurn => "Quarter turns",
+        FramingKind::Mirrored => "Mirrored",
+        FramingKind::Scaling => "Other scales",
+    };
+    html! {
+        tr {
+            th scope="row" { (name) }
+            td.number { (grouped(framing.variants.into())) }
+            td.number { @if framing.pooled { "pooled" } @else { (grouped(framing.variants.into())) } }
+        }
+    }
+}

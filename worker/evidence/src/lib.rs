@@ -1,0 +1,36 @@
+//! The evidence report that every job leaves: what was asked, what was tried, what was found, and how sure that is.
+//!
+//! One [`Evidence`] becomes two documents, both the same bytes for the same input: canonical JSON for programs and one
+//! HTML page for people, which holds that JSON and its pictures and needs nothing else. [`sign`] makes both, and
+//! [`check`] says of either whether it is genuine, and computes again what can be computed again. What only an owner
+//! may see is left out by [`Evidence::for_stranger`].
+mod check;
+mod embedding;
+mod error;
+mod evidence;
+mod hash;
+mod html;
+mod json;
+pub mod limits;
+mod picture;
+mod recompute;
+mod sign;
+mod stranger;
+mod tail;
+mod tried;
+mod validate;
+mod verification;
+mod words;
+
+pub use check::{Altered, Answer, Checked, check};
+pub use ed25519_dalek::{SigningKey, VerifyingKey};
+pub use embedding::{Embedding, Target};
+pub use error::{Error, Result};
+pub use evidence::{Audience, Evidence, Input, Key, Kind, Model, Role, SCHEMA, VERSION};
+pub use hash::Sha256;
+pub use jiff::Timestamp;
+pub use picture::{Picture, View};
+pub use recompute::Finding;
+pub use sign::{Signed, sign};
+pub use tried::{Framing, FramingKind, Tried};
+pub use verification::{Bit, Decision, Found, Reason, Verdict, Verification};

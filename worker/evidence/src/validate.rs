@@ -1,0 +1,220 @@
+//! What a report can't say: values out of range, texts and lists beyond the limits, parts that exclude each other.
+//!
+//! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
+use crate::embedding::Embedding;
+use crate::error::{Error, Result};
+use crate::evidence::{Evidence, Kind, SCHEMA, VERSION};
+use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
+use crate::verification::{Decision, Verdict, Verification};
+
+impl Evidence {
+    /// Whether everything is in range; see [`Evidence::to_json`].
+    pub(crate) fn validate(&self) -> Result<()> {
+        if self.schema != SCHEMA {
+            return Err(Error::field("schema", format!("it must be {SCHEMA}")));
+        }
+        if self.version != VERSION {
+            let (found, known) = (u64::from(self.version), VERSION);
+            return Err(Error::UnknownVersion { found, known });
+        }
+        let names = [
+            ("job", &self.job),
+            ("engine", &self.engine),
+            ("device", &self.device),
+            ("model.name", &self.model.name),
+            ("key.id", &self.key.id),
+        ];
+        names.iter().try_for_each(|(field, text)| name(field, text))?;
+        if self.finished < self.started {
+            return Err(Error::field("finished", "it is before the start"));
+        }
+        count("inputs", self.inputs.len(), INPUTS)?;
+        for (i, input) in self.inputs.iter().enumerate() {
+            let field = format!("inputs[{i}].name");
+            input.name.iter().try_for_each(|text| name(&field, text))?;
+        }
+        match (self.kind, &self.verification, &self.embedding) {
+            (Kind::Verify, None, _) => return Err(Error::field("verification", "a verify job has one")),
+            (Kind::Verify, _, Some(_)) => return Err(Error::field("embedding", "a verify job has none")),
+            (Kind::Embed, _, None) => return Err(Error::field("embedding", "an embed job has one")),
+            _ => {}
+        }
+        self.verification.iter().try_for_each(Verification::validate)?;
+        self.embedding.iter().try_for_each(Embedding::validate)?;
+        self.validate_views()
+    }
+
+    fn validate_views(&self) -> Result<()> {
+        count("views", self.views.len(), VIEWS)?;
+        let mut bytes = 0;
+        for (i, view) in self.views.iter().enumerate() {
+            name(&format!("views[{i}].name"), &view.name)?;
+            for (what, picture) in view.pictures() {
+                if ![picture.width, picture.height]
+                    .iter()
+                    .all(|n| (1..=PICTURE_SIDE).contains(n))
+                {
+                    let reason = format!("{what} has a side outside of 1 to {PICTURE_SIDE} pixels");
+                    return Err(Error::field(format!("views[{i}]"), reason));
+                }
+                bytes += picture.png().map_or(0, <[u8]>::len);
+            }
+        }
+        if bytes > PICTURES_BYTES {
+            return Err(Error::TooLarge {
+                what: "all pictures together".into(),
+                bytes: bytes as u64,
+                limit: PICTURES_BYTES as u64,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Verification {
+    fn validate(&self) -> Result<()> {
+        let field = |name: &str| format!("verification.{name}");
+        self.note.iter().try_for_each(|text| note(&field("note"), text))?;
+        if self.reason.is_some() != (self.verdict == Verdict::Inconclusive) {
+            let reason = "an inconclusive verdict, and no other, has one";
+            return Err(Error::field(field("reason"), reason));
+        }
+        if matches!(self.verdict, Verdict::Match | Verdict::NoMatch) && self.decision.is_none() {
+            return Err(Error::field(field("decision"), "such a verdict has one"));
+        }
+        if self.verdict == Verdict::UnknownKey && (self.decision.is_some() || !self.strip.is_empty()) {
+            let reason = "nothing can be read with an unknown key";
+            return Err(Error::field(field("decision"), reason));
+        }
+        if self.found.is_some() && self.verdict != Verdict::Match {
+            return Err(Error::field(field("found"), "only a match has one"));
+        }
+        count(&field("tried.framings"), self.tried.framings.len(), FRAMINGS)?;
+        if self.tried.framings.iter().any(|f| f.variants == 0) {
+            return Err(Error::field(
+                field("tried.framings"),
+                "a framing has at least one variant",
+            ));
+        }
+        if let Some(found) = &self.found {
+            name(&field("found.owner"), &found.owner)?;
+            name(&field("found.asset"), &found.asset)?;
+            payload(&field("found.payload"), found.payload.as_deref())?;
+        }
+        count(&field("strip"), self.strip.len(), BITS)?;
+        for (i, bit) in self.strip.iter().enumerate() {
+            let field = |name: &str| format!("verification.strip[{i}].{name}");
+            bit.confidence
+                .iter()
+                .try_for_each(|c| range(&field("confidence"), *c, 0.0, 1.0))?;
+            bit.logit
+                .iter()
+                .try_for_each(|l| range(&field("logit"), *l, f64::MIN, f64::MAX))?;
+        }
+        let Some(decision) = &self.decision else { return Ok(()) };
+        decision.validate()?;
+        if !self.strip.is_empty() && self.strip.len() != decision.bits as usize {
+            let reason = format!("it has {} bits, {} were compared", self.strip.len(), decision.bits);
+            return Err(Error::field(field("strip"), reason));
+        }
+        Ok(())
+    }
+}
+
+impl Decision {
+    fn validate(&self) -> Result<()> {
+        let field = |name: &str| format!("verification.decision.{name}");
+        if self.bits == 0 || self.bits as usize > BITS {
+            return Err(Error::field(field("bits"), format!("it must be 1 to {BITS}")));
+        }
+        let counts = [
+            ("matched", Some(self.matched)),
+            ("corrected", self.corrected),
+            ("needed", self.needed),
+        ];
+        for (name, number) in counts {
+            if number.is_some_and(|n| n > self.bits) {
+                return Err(Error::field(field(name), format!("there are {} bits only", self.bits)));
+            }
+        }
+        if self.hypotheses == 0 {
+            return Err(Error::field(field("hypotheses"), "it must be at least 1"));
+        }
+        range(&field("p_single"), self.p_single, 0.0, 1.0)?;
+        range(&field("p_value"), self.p_value, 0.0, 1.0)?;
+        range(&field("threshold"), self.threshold, 1e-30, 0.1)
+    }
+}
+
+impl Embedding {
+    fn validate(&self) -> Result<()> {
+        let field = |name: &str| format!("embedding.{name}");
+        payload(&field("payload"), self.payload.as_deref())?;
+        range(&field("bit_accuracy"), self.bit_accuracy, 0.0, 1.0)?;
+        let worst = self.bit_accuracy_worst_view;
+        range(&field("bit_accuracy_worst_view"), worst, 0.0, 1.0)?;
+        range(&field("ssim"), self.ssim, -1.0, 1.0)?;
+        let target = &self.target;
+        let optional = [
+            ("psnr_db", self.psnr_db, -200.0, 200.0),
+            ("lpips", self.lpips, 0.0, 100.0),
+            ("target.bit_accuracy", target.bit_accuracy, 0.0, 1.0),
+            ("target.psnr_db", target.psnr_db, -200.0, 200.0),
+            ("target.ssim", target.ssim, -1.0, 1.0),
+            ("target.lpips", target.lpips, 0.0, 100.0),
+        ];
+        for (name, value, low, high) in optional {
+            value.iter().try_for_each(|v| range(&field(name), *v, low, high))?;
+        }
+        if self.changed_gaussians > self.gaussians {
+            let reason = format!("there are {} Gaussians only", self.gaussians);
+            return Err(Error::field(field("changed_gaussians"), reason));
+        }
+        count(&field("missed"), self.missed.len(), NOTES)?;
+        self.missed.iter().try_for_each(|text| note(&field("missed"), text))
+    }
+}
+
+fn name(field: &str, text: &str) -> Result<()> {
+    text_of(field, text, NAME_BYTES)
+}
+
+fn note(field: &str, text: &str) -> Result<()> {
+    text_of(field, text, NOTE_BYTES)
+}
+
+fn text_of(field: &str, text: &str, limit: usize) -> Result<()> {
+    if text.is_empty() || text.len() > limit {
+        let reason = format!("it has {} bytes, it must have 1 to {limit}", text.len());
+        return Err(Error::field(field, reason));
+    }
+    Ok(())
+}
+
+fn payload(field: &str, text: Option<&str>) -> Result<()> {
+    let digits = BITS.div_ceil(4);
+    let fine = |t: &str| (1..=digits).contains(&t.len()) && t.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+    if text.is_some_and(|t| !fine(t)) {
+        let reason = format!("it must be 1 to {digits} digits of lower-case hexadecimal");
+        return Err(Error::field(field, reason));
+    }
+    Ok(())
+}
+
+fn count(field: &str, found: usize, limit: usize) -> Result<()> {
+    if found > limit {
+        return Err(Error::field(
+            field,
+            format!("it has {found} entries, at most {limit} are taken"),
+        ));
+    }
+    Ok(())
+}
+
+fn range(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    // NaN is outside of every range.
+    if !(low..=high).contains(&value) {
+        return Err(Error::field(field, format!("{value} is outside of {low} to {high}")));
+    }
+    Ok(())
+}

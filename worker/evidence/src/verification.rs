@@ -1,0 +1,131 @@
+//! What a reading found: the verdict, the numbers behind it, and whose message it is.
+use crate::tail;
+use crate::tried::Tried;
+use serde::{Deserialize, Serialize};
+
+/// The outcome of reading a suspect, or of reading back what was just marked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verification {
+    /// The outcome.
+    pub verdict: Verdict,
+    /// Why nothing could be decided; with [`Verdict::Inconclusive`] only, and then required.
+    pub reason: Option<Reason>,
+    /// What else the engine has to say, for people.
+    pub note: Option<String>,
+    /// What was tried.
+    pub tried: Tried,
+    /// Views or pictures that were read, pooled into one reading.
+    pub views: u32,
+    /// The numbers; absent where nothing was compared.
+    pub decision: Option<Decision>,
+    /// Whose it is; with [`Verdict::Match`] only.
+    pub found: Option<Found>,
+    /// The reading bit by bit, most significant first; empty, or one for each bit. For owners only.
+    pub strip: Vec<Bit>,
+}
+
+/// Whether the message is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The corrected p-value is at or below the threshold.
+    Match,
+    /// It is above.
+    NoMatch,
+    /// Nothing could be decided.
+    Inconclusive,
+    /// Nothing was read, since there is no such key.
+    UnknownKey,
+}
+
+/// Why nothing could be decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// No message was named to compare with.
+    NothingToCompare,
+    /// The key has so few bits that even a perfect reading stays above the threshold.
+    TooFewBits,
+    /// The bits would do for one hypothesis, and not for as many as were tried.
+    TooManyHypotheses,
+    /// The views contradict each other, or say next to nothing.
+    WeakReading,
+    /// The pictures are too few or too small to be read.
+    TooLittleToRead,
+}
+
+/// The numbers behind a verdict. Null hypothesis: the suspect is independent of the secret, uniform pad that the message
+/// was whitened with, so that matches are Binomial(bits, 1/2).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Decision {
+    /// Bits compared, 1 to 150.
+    pub bits: u32,
+    /// Bits that match.
+    pub matched: u32,
+    /// Bits that the error-correcting code set right when the message was read; never part of the decision.
+    pub corrected: Option<u32>,
+    /// Hypotheses that were tried, at least 1.
+    pub hypotheses: u64,
+    /// P(Binomial(bits, 1/2) ≥ matched), 0 to 1: before the correction for several hypotheses.
+    pub p_single: f64,
+    /// The same after it: times `hypotheses`, at most 1.
+    pub p_value: f64,
+    /// A match needs a `p_value` at or below this rate of false positives, 0 to 1.
+    pub threshold: f64,
+    /// Matches that this needs; absent when even all bits would not do.
+    pub needed: Option<u32>,
+}
+
+impl Decision {
+    /// The numbers that follow from `matched` of `bits` after so many hypotheses.
+    pub fn new(bits: u32, matched: u32, corrected: Option<u32>, hypotheses: u64, threshold: f64) -> Self {
+        let p_single = tail::at_least(matched, bits);
+        Self {
+            bits,
+            matched,
+            corrected,
+            hypotheses,
+            p_single,
+            p_value: tail::corrected(p_single, hypotheses),
+            threshold,
+            needed: tail::needed(bits, hypotheses, threshold),
+        }
+    }
+
+    /// What follows from these numbers: [`Verdict::Inconclusive`] where no number of matches would do.
+    pub fn verdict(&self) -> Verdict {
+        match self.needed {
+            None => Verdict::Inconclusive,
+            Some(_) if self.p_value <= self.threshold => Verdict::Match,
+            Some(_) => Verdict::NoMatch,
+        }
+    }
+}
+
+/// Whose message was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// Who owns it.
+    pub owner: String,
+    /// What it was put into.
+    pub asset: String,
+    /// The payload in hexadecimal; for the owner only.
+    pub payload: Option<String>,
+}
+
+/// One bit of a reading.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bit {
+    /// What the message would have there; absent without a claim.
+    pub wanted: Option<bool>,
+    /// What was read.
+    pub read: bool,
+    /// How sure the reading is, 0 (a coin) to 1.
+    pub confidence: Option<f64>,
+    /// The sum of the bit's logits over all views.
+    pub logit: Option<f64>,
+}
