@@ -35,8 +35,11 @@ impl Opening {
             });
         }
         // Written in place, so that no copy is left behind.
-        let bytes = SecretBox::init_with_mut(|kept: &mut [u8; OPENING_BYTES]| kept.copy_from_slice(bytes));
-        Ok(Self { bytes })
+        let mut kept = Box::new([0; OPENING_BYTES]);
+        kept.copy_from_slice(bytes);
+        Ok(Self {
+            bytes: SecretBox::new(kept),
+        })
     }
 
     /// The nonce.
