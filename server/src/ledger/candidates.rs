@@ -11,7 +11,7 @@ const PAGE: u32 = 1000;
 pub fn of_key(ledger: &dyn Ledger, key: KeyId) -> impl Stream<Item = Result<Candidate>> + Send + '_ {
     // Behind which payload number the next page begins; none behind the last.
     let pages = stream::try_unfold(Some(0), move |after| async move {
-        let Some(after) = after else { return Ok(None) };
+        let Some(after) = after else { return Result::Ok(None) };
         let page = ledger.candidates(key, after, PAGE).await?;
         let full = page.len() == PAGE as usize;
         let next = page.last().filter(|_| full).map(|last| last.payload);

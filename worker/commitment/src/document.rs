@@ -105,7 +105,7 @@ impl Document {
                 reason: format!("must be {FORMAT}"),
             });
         }
-        if kind.version != VERSION.into() {
+        if kind.version != u64::from(VERSION) {
             return Err(Error::UnknownVersion {
                 found: kind.version,
                 known: VERSION,
