@@ -8,7 +8,6 @@ use guardsplat_proto::v1::{
     GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetOwnerRequest, GetPublicKeyRequest, ListAssetsRequest,
     ListCommitmentsRequest, ListOwnersRequest, Owner,
 };
-use secrecy::ExposeSecret;
 use tonic::{Code, Status};
 use uuid::Uuid;
 

@@ -47,7 +47,7 @@ pub(super) const CANDIDATES: &str =
     "SELECT id, payload, sealed_nonce FROM assets WHERE key_id = ?1 AND payload > ?2 ORDER BY payload LIMIT ?3";
 
 /// The highest payload number of a key.
-pub(super) const LAST_PAYLOAD: &str = "SELECT coalesce(max(payload), 0) FROM assets WHERE key_id = ?1";
+pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = ?1 ORDER BY payload DESC LIMIT 1";
 
 pub(super) async fn create_owner(db: &mut SqliteConnection, new: NewOwner, now: i64) -> Result<OwnerRow> {
     if let Some(request) = new.request_id {
@@ -121,10 +121,11 @@ pub(super) async fn create_asset(
             state: key.state,
         });
     }
-    let last: i64 = sqlx::query_scalar(LAST_PAYLOAD)
+    let last: Option<i64> = sqlx::query_scalar(LAST_PAYLOAD)
         .bind(new.key.as_bytes().as_slice())
-        .fetch_one(&mut *db)
+        .fetch_optional(&mut *db)
         .await?;
+    let last = last.unwrap_or(0);
     let limit = payloads(key.bits);
     if last >= limit {
         return Err(LedgerError::PayloadsUsedUp { key: key.id, limit });
