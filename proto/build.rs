@@ -2,11 +2,12 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 5] = [
+const FILES: [&str; 6] = [
     "guardsplat/v1/artifact_service.proto",
     "guardsplat/v1/job.proto",
     "guardsplat/v1/job_service.proto",
     "guardsplat/v1/key_service.proto",
+    "guardsplat/v1/registry_service.proto",
     "guardsplat/v1/worker_service.proto",
 ];
 

@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use uuid::Uuid;
 
+use crate::ledger::KeyState;
+
 /// A result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -26,7 +28,7 @@ pub enum Error {
     /// A resource that is not there.
     #[error("{name} does not exist")]
     NotFound {
-        /// Its kind: `job`, `artifact` or `key`.
+        /// Its kind, such as `job`.
         kind: &'static str,
         /// Its full name.
         name: String,
@@ -56,6 +58,36 @@ pub enum Error {
         name: String,
         /// The job's full name.
         job: String,
+    },
+    /// A key that is retired, for something that only active ones are for.
+    #[error("{name} is retired: it verifies, but it marks no more, and takes no more assets")]
+    KeyNotActive {
+        /// The key's full name.
+        name: String,
+    },
+    /// A key that is revoked.
+    #[error("{name} is revoked, and is used for nothing any more")]
+    KeyRevoked {
+        /// The key's full name.
+        name: String,
+    },
+    /// A key that can't go back to another state.
+    #[error("{name} is {state}, and can't become {wanted}")]
+    KeyStateFinal {
+        /// The key's full name.
+        name: String,
+        /// What it is.
+        state: &'static str,
+        /// What it was to become.
+        wanted: &'static str,
+    },
+    /// A key whose messages can hold no more payload numbers.
+    #[error("{name} has given out all {limit} payload numbers that its messages can hold; make a key with more bits")]
+    PayloadsUsedUp {
+        /// The key's full name.
+        name: String,
+        /// How many it had.
+        limit: i64,
     },
     /// A lease token that is not, or no longer, the job's.
     #[error("the lease of {name} is lost: its token is not the one that the job was given out with last")]
@@ -132,6 +164,14 @@ impl Error {
             field: field.into(),
             description: description.into(),
         }])
+    }
+
+    /// A key can't be used for what only active ones are for.
+    pub fn key_not_active(name: String, state: KeyState) -> Self {
+        match state {
+            KeyState::Revoked => Self::KeyRevoked { name },
+            KeyState::Active | KeyState::Retired => Self::KeyNotActive { name },
+        }
     }
 
     /// Something failed that no caller can help.

@@ -17,6 +17,7 @@ use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::ledger::SqliteLedger;
+use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::settings::Settings;
 use folder::DataFolder;
@@ -70,7 +71,8 @@ impl Server {
             true => Some(WorkerProcess::new(&settings, address)?),
             false => None,
         };
-        let api = Api::new(ledger.clone(), store, master, limits(&settings));
+        let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
+        let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,

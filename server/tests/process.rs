@@ -56,7 +56,13 @@ async fn answers_for_its_health_and_describes_itself() {
         panic!("{answer:?}")
     };
     let names: Vec<_> = list.service.iter().map(|service| service.name.as_str()).collect();
-    for name in ["JobService", "ArtifactService", "KeyService", "WorkerService"] {
+    for name in [
+        "JobService",
+        "ArtifactService",
+        "KeyService",
+        "RegistryService",
+        "WorkerService",
+    ] {
         assert!(names.contains(&format!("guardsplat.v1.{name}").as_str()), "{names:?}");
     }
     assert!(names.contains(&"grpc.health.v1.Health"), "{names:?}");

@@ -38,7 +38,7 @@ impl Api {
     }
 
     /// Whether a request made a job before.
-    async fn is_known(&self, submission: &Submission) -> Result<bool> {
+    pub(super) async fn is_known(&self, submission: &Submission) -> Result<bool> {
         match submission.request_id {
             Some(request) => Ok(self.ledger().find_request(request).await?.is_some()),
             None => Ok(false),

@@ -6,7 +6,7 @@ use prost::Message;
 use super::clock::timestamp;
 use super::names::Kind;
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactRow, JobKind, JobRow, JobState, KeyRow};
+use crate::ledger::{ArtifactRow, JobKind, JobRow, JobState, KeyRow, KeyState};
 
 /// A job for the API.
 pub fn job(row: JobRow) -> Result<v1::Job> {
@@ -73,6 +73,17 @@ pub fn key(row: KeyRow) -> v1::Key {
         seeded: row.seeded,
         create_time: Some(timestamp(row.create_time)),
         job: Kind::Job.name(row.job),
+        state: key_state(row.state).into(),
+        state_reason: row.state_reason,
+        state_time: row.state_time.map(timestamp),
+    }
+}
+
+fn key_state(state: KeyState) -> v1::key::State {
+    match state {
+        KeyState::Active => v1::key::State::Active,
+        KeyState::Retired => v1::key::State::Retired,
+        KeyState::Revoked => v1::key::State::Revoked,
     }
 }
 

@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use super::names::Kind;
 use super::submission::{self, Submission};
-use super::{Api, clock, convert, fingerprint, message, page, watch};
+use super::{Api, clock, convert, fingerprint, keys, message, page, watch};
 use crate::error::{Error, Result};
 use crate::ledger::NewJob;
 
@@ -63,6 +63,11 @@ impl Api {
                 .ok_or_else(|| Kind::Key.not_found(id))?;
             if let Some((field, text)) = &submission.message {
                 message::check(field, text, key.bits)?;
+            }
+            if let Err(error) = keys::usable(&key, submission.kind)
+                && !self.is_known(&submission).await?
+            {
+                return Err(error);
             }
         }
         self.admit(&submission).await?;

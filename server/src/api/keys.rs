@@ -1,11 +1,14 @@
-//! `KeyService`: what is known of keys. Their secrets are not here.
+//! `KeyService`: what is known of keys, and what they may be used for. Their secrets are not here.
+use guardsplat_proto::v1::key::State;
 use guardsplat_proto::v1::key_service_server::KeyService;
-use guardsplat_proto::v1::{GetKeyRequest, Key, ListKeysRequest, ListKeysResponse};
+use guardsplat_proto::v1::{GetKeyRequest, Key, ListKeysRequest, ListKeysResponse, UpdateKeyStateRequest};
 use tonic::{Request, Response, Status};
 
 use super::names::Kind;
-use super::{Api, convert, page};
+use super::problems::Problems;
+use super::{Api, clock, convert, page, text};
 use crate::error::{Error, Result};
+use crate::ledger::{JobKind, KeyId, KeyRow, KeyState};
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"keys"];
@@ -23,14 +26,50 @@ impl KeyService for Api {
         let size = page::size(page_size)?;
         let before = page::position(QUERY, &page_token)?;
         // One more than asked for tells whether there is another page.
-        let mut rows = self.ledger().list_keys(before, size + 1).await.map_err(Error::from)?;
-        let more = rows.len() > size as usize;
-        rows.truncate(size as usize);
-        let last = rows.last().filter(|_| more).map(|row| (row.create_time, row.id));
-        let next_page_token = last.map(|at| page::token(QUERY, at)).unwrap_or_default();
+        let rows = self.ledger().list_keys(before, size + 1).await.map_err(Error::from)?;
+        let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (row.create_time, row.id));
         Ok(Response::new(ListKeysResponse {
             keys: rows.into_iter().map(convert::key).collect(),
             next_page_token,
         }))
+    }
+    async fn update_key_state(&self, request: Request<UpdateKeyStateRequest>) -> Result<Response<Key>, Status> {
+        let (id, next, reason) = checked(request.into_inner())?;
+        let updated = self.ledger().update_key_state(id, next, &reason, clock::now()).await;
+        let row = updated.map_err(Error::from)?;
+        tracing::info!(key = %id, state = row.state.word(), reason = row.state_reason, "state of a key");
+        Ok(Response::new(convert::key(row)))
+    }
+}
+
+fn checked(request: UpdateKeyStateRequest) -> Result<(KeyId, KeyState, String)> {
+    let mut problems = Problems::default();
+    let id = problems.take(Kind::Key.parse("name", &request.name))?;
+    let next = match State::try_from(request.state) {
+        // Nothing leads there, which is said with the state that the key has.
+        Ok(State::Active) => Some(KeyState::Active),
+        Ok(State::Retired) => Some(KeyState::Retired),
+        Ok(State::Revoked) => Some(KeyState::Revoked),
+        Ok(State::Unspecified) | Err(_) => {
+            problems.add("state", "is missing or not known");
+            None
+        }
+    };
+    problems.take(text::reason("reason", &request.reason))?;
+    let told = next != Some(KeyState::Revoked) || !request.reason.is_empty();
+    problems.check(told, "reason", "is missing; it is needed to revoke a key");
+    problems.finish()?;
+    // Both were found to be there.
+    let all = id.zip(next).map(|(id, next)| (id, next, request.reason));
+    all.ok_or_else(|| Error::invalid("name", "is missing"))
+}
+
+/// Refuses a key whose state does not allow what a job of this kind does with it.
+pub(super) fn usable(key: &KeyRow, kind: JobKind) -> Result<()> {
+    let name = || Kind::Key.name(key.id);
+    match (key.state, kind) {
+        (KeyState::Active, _) | (KeyState::Retired, JobKind::Verify | JobKind::CreateKey) => Ok(()),
+        (KeyState::Retired, JobKind::Embed) => Err(Error::KeyNotActive { name: name() }),
+        (KeyState::Revoked, _) => Err(Error::KeyRevoked { name: name() }),
     }
 }

@@ -2,7 +2,7 @@
 use std::time::Duration;
 
 use futures::stream::{self, BoxStream, StreamExt};
-use guardsplat_proto::v1::{DownloadKeyResponse, EmbedSpec, LeaseJobRequest, LeaseJobResponse, VerifySpec};
+use guardsplat_proto::v1::{DownloadKeyResponse, EmbedSpec, LeaseJobRequest, LeaseJobResponse, VerifySpec, failure};
 use secrecy::ExposeSecret;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
@@ -14,7 +14,7 @@ use super::status::chain;
 use super::{Api, clock, convert, text};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
-use crate::ledger::{JobKind, JobRow, KeyId, Lease};
+use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease};
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// How late a job is found that became ready by time alone, after a failed attempt.
@@ -92,6 +92,9 @@ impl Api {
             .get_key(id)
             .await?
             .ok_or_else(|| Kind::Key.not_found(id))?;
+        if key.state == KeyState::Revoked {
+            return Err(self.fail_revoked(&job, token, &key).await);
+        }
         let file = self.ledger().get_any_artifact(key.artifact).await?;
         let file = file.ok_or_else(|| Error::internal("finding a key file", "the ledger has no such artifact"))?;
         let secret = self
@@ -106,6 +109,24 @@ impl Api {
             Some((Ok(DownloadKeyResponse { chunk }), (secret, next)))
         });
         Ok(chunks.boxed())
+    }
+
+    /// Ends a job whose key was revoked after it was queued, so that its owner hears of it in these words, whatever the
+    /// worker makes of the refusal.
+    async fn fail_revoked(&self, job: &JobRow, token: &str, key: &KeyRow) -> Error {
+        let refusal = Error::KeyRevoked {
+            name: Kind::Key.name(key.id),
+        };
+        let failure = Failure {
+            reason: failure::Reason::InvalidInput.into(),
+            message: format!("{refusal}; the reason that was given: {}", key.state_reason),
+        };
+        let failed = self
+            .ledger()
+            .fail(job.id, token, Some(failure), false, false, clock::now())
+            .await;
+        self.attempt_over(job.id);
+        failed.map_or_else(Error::from, |_| refusal)
     }
 }
 

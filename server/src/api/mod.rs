@@ -1,10 +1,11 @@
-//! The API over gRPC: the four services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+//! The API over gRPC: the five services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
 use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
+use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
 use guardsplat_proto::v1::worker_service_server::WorkerServiceServer;
 use tonic::Status;
 use tonic::service::Routes;
@@ -12,6 +13,7 @@ use tonic::service::Routes;
 use crate::artifacts::ArtifactStore;
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
+use crate::notary::Notary;
 use crate::secrets::MasterKey;
 
 mod admission;
@@ -35,6 +37,7 @@ mod page;
 mod problems;
 mod progress;
 mod refusals;
+mod registry;
 mod status;
 #[doc(hidden)]
 pub mod strangers;
@@ -47,6 +50,7 @@ mod upload;
 mod watch;
 mod worker;
 
+pub use clock::now;
 pub use housekeeping::housekeeping;
 pub use listen::serve;
 
@@ -83,7 +87,7 @@ impl Default for Limits {
     }
 }
 
-/// What the four services share. Cheap to clone.
+/// What the five services share. Cheap to clone.
 #[derive(Clone)]
 pub struct Api {
     shared: Arc<Shared>,
@@ -93,18 +97,27 @@ struct Shared {
     ledger: Arc<dyn Ledger>,
     store: ArtifactStore,
     master: MasterKey,
+    notary: Notary,
     limits: Limits,
     changes: changes::Changes,
     reports: progress::Reports,
 }
 
 impl Api {
-    /// The API over a ledger, a store and the key that secrets are sealed with.
-    pub fn new(ledger: Arc<dyn Ledger>, store: ArtifactStore, master: MasterKey, limits: Limits) -> Self {
+    /// The API over a ledger, a store, the key that secrets are sealed with, and the one that commitments are signed
+    /// with.
+    pub fn new(
+        ledger: Arc<dyn Ledger>,
+        store: ArtifactStore,
+        master: MasterKey,
+        notary: Notary,
+        limits: Limits,
+    ) -> Self {
         let shared = Shared {
             ledger,
             store,
             master,
+            notary,
             limits,
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
@@ -114,7 +127,7 @@ impl Api {
         }
     }
 
-    /// The four services and reflection. Health, which knows more than the API, is added by the caller.
+    /// The five services and reflection. Health, which knows more than the API, is added by the caller.
     pub fn routes(&self) -> Result<Routes> {
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -127,6 +140,7 @@ impl Api {
             Routes::new(JobServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(reflection().build_v1().map_err(failed)?)
                 .add_service(reflection().build_v1alpha().map_err(failed)?),
@@ -149,6 +163,10 @@ impl Api {
 
     fn master(&self) -> &MasterKey {
         &self.shared.master
+    }
+
+    fn notary(&self) -> &Notary {
+        &self.shared.notary
     }
 
     fn limits(&self) -> &Limits {

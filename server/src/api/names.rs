@@ -1,4 +1,4 @@
-//! Resource names: `jobs/{uuid}`, `artifacts/{uuid}`, `keys/{uuid}`.
+//! Resource names, such as `jobs/{uuid}`: a collection, and an id in its one spelling.
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
@@ -12,15 +12,34 @@ pub enum Kind {
     Artifact,
     /// A key.
     Key,
+    /// An owner of originals.
+    Owner,
+    /// An original that was registered.
+    Asset,
+    /// What was signed of an asset.
+    Commitment,
 }
 
 impl Kind {
+    /// Everything that has a name.
+    pub const ALL: [Self; 6] = [
+        Self::Job,
+        Self::Artifact,
+        Self::Key,
+        Self::Owner,
+        Self::Asset,
+        Self::Commitment,
+    ];
+
     /// The collection, the first segment of the name.
     pub fn collection(self) -> &'static str {
         match self {
             Self::Job => "jobs",
             Self::Artifact => "artifacts",
             Self::Key => "keys",
+            Self::Owner => "owners",
+            Self::Asset => "assets",
+            Self::Commitment => "commitments",
         }
     }
 
@@ -30,6 +49,9 @@ impl Kind {
             Self::Job => "job",
             Self::Artifact => "artifact",
             Self::Key => "key",
+            Self::Owner => "owner",
+            Self::Asset => "asset",
+            Self::Commitment => "commitment",
         }
     }
 
@@ -75,7 +97,7 @@ mod tests {
     #[test]
     fn names_are_read_back() {
         let id = Uuid::now_v7();
-        for kind in [Kind::Job, Kind::Artifact, Kind::Key] {
+        for kind in Kind::ALL {
             assert_eq!(kind.parse("name", &kind.name(id)).unwrap(), id);
         }
     }

@@ -47,6 +47,15 @@ pub fn position(query: &[&[u8]], token: &str) -> Result<Option<Position>> {
     Ok(Some((time, Uuid::from_bytes(std::array::from_fn(|i| id[i])))))
 }
 
+/// A page of `size` entries out of one more than that, if there are so many, and the token of the next page.
+pub fn cut<T>(query: &[&[u8]], mut rows: Vec<T>, size: u32, at: impl Fn(&T) -> Position) -> (Vec<T>, String) {
+    let more = rows.len() > size as usize;
+    rows.truncate(size as usize);
+    let last = rows.last().filter(|_| more);
+    let next = last.map(|row| token(query, at(row))).unwrap_or_default();
+    (rows, next)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +70,18 @@ mod tests {
                 .unwrap_err()
                 .to_string()
                 .starts_with("page_size: -1 is negative")
+        );
+    }
+
+    #[test]
+    fn a_page_that_is_not_the_last_has_a_token() {
+        let rows: Vec<Position> = (0..3).map(|time| (time, Uuid::nil())).collect();
+        let (page, next) = cut(&[b"q"], rows.clone(), 2, |row| *row);
+        assert_eq!((page.len(), position(&[b"q"], &next).unwrap()), (2, Some(rows[1])));
+        assert_eq!(cut(&[b"q"], rows.clone(), 3, |row| *row), (rows, String::new()));
+        assert_eq!(
+            cut(&[b"q"], Vec::new(), 1, |row: &Position| *row),
+            (vec![], String::new())
         );
     }
 

@@ -11,8 +11,10 @@ impl From<LedgerError> for Error {
     fn from(error: LedgerError) -> Self {
         match error {
             LedgerError::NotFound { kind, id } => {
-                let all = [Kind::Job, Kind::Artifact, Kind::Key];
-                let kind = all.into_iter().find(|k| k.singular() == kind).unwrap_or(Kind::Job);
+                let kind = Kind::ALL
+                    .into_iter()
+                    .find(|k| k.singular() == kind)
+                    .unwrap_or(Kind::Job);
                 kind.not_found(id)
             }
             LedgerError::RequestIdReused(request_id) => Self::RequestIdReused { request_id },
@@ -36,6 +38,16 @@ impl From<LedgerError> for Error {
             LedgerError::CancelNotRequested(job) => Self::NotCancelled {
                 name: Kind::Job.name(job),
             },
+            LedgerError::KeyNotActive { key, state } => Self::key_not_active(Kind::Key.name(key), state),
+            LedgerError::KeyStateFinal { key, state, wanted } => Self::KeyStateFinal {
+                name: Kind::Key.name(key),
+                state: state.word(),
+                wanted: wanted.word(),
+            },
+            LedgerError::PayloadsUsedUp { key, limit } => Self::PayloadsUsedUp {
+                name: Kind::Key.name(key),
+                limit,
+            },
             LedgerError::Database(ref cause) => match transient(cause) {
                 Trouble::Full => Self::NoSpace,
                 Trouble::Busy => Self::Unavailable {
@@ -48,7 +60,9 @@ impl From<LedgerError> for Error {
                 what: "the ledger",
                 source: Box::new(error),
             },
-            LedgerError::Migrate(_) | LedgerError::Corrupt { .. } => Self::internal("the ledger", error),
+            LedgerError::Migrate(_) | LedgerError::Corrupt { .. } | LedgerError::BadCommitment { .. } => {
+                Self::internal("the ledger", error)
+            }
         }
     }
 }

@@ -35,6 +35,10 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::NotCancelled { .. } => (Code::FailedPrecondition, "CANCEL_NOT_REQUESTED"),
         Error::InUse { .. } => (Code::FailedPrecondition, "ARTIFACT_IN_USE"),
         Error::SceneDoesNotFit { .. } => (Code::FailedPrecondition, "SCENE_DOES_NOT_FIT"),
+        Error::KeyNotActive { .. } => (Code::FailedPrecondition, "KEY_NOT_ACTIVE"),
+        Error::KeyRevoked { .. } => (Code::FailedPrecondition, "KEY_REVOKED"),
+        Error::KeyStateFinal { .. } => (Code::FailedPrecondition, "KEY_STATE_FINAL"),
+        Error::PayloadsUsedUp { .. } => (Code::ResourceExhausted, "PAYLOADS_USED_UP"),
         Error::LeaseLost { .. } => (Code::Aborted, "LEASE_LOST"),
         Error::QueueFull { .. } => (Code::ResourceExhausted, "QUEUE_FULL"),
         Error::NoSpace => (Code::ResourceExhausted, "NO_SPACE"),
@@ -53,6 +57,10 @@ fn metadata(error: &Error) -> HashMap<String, String> {
         Error::InUse { name, job } => vec![("name", name.clone()), ("job", job.clone())],
         Error::Finished { name } | Error::LeaseLost { name } => vec![("name", name.clone())],
         Error::NotFound { name, .. } | Error::NotCancelled { name } => vec![("name", name.clone())],
+        Error::KeyNotActive { name } => vec![("name", name.clone()), ("state", "retired".to_owned())],
+        Error::KeyRevoked { name } => vec![("name", name.clone()), ("state", "revoked".to_owned())],
+        Error::KeyStateFinal { name, state, .. } => vec![("name", name.clone()), ("state", (*state).to_owned())],
+        Error::PayloadsUsedUp { name, limit } => vec![("name", name.clone()), ("limit", limit.to_string())],
         Error::RequestIdReused { request_id } => vec![("request_id", request_id.to_string())],
         Error::QueueFull { limit, .. } => vec![("limit", limit.to_string())],
         Error::SceneDoesNotFit {
@@ -91,6 +99,9 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         Error::Finished { name }
         | Error::InUse { name, .. }
         | Error::NotCancelled { name }
+        | Error::KeyNotActive { name }
+        | Error::KeyRevoked { name }
+        | Error::KeyStateFinal { name, .. }
         | Error::SceneDoesNotFit { name, .. } => {
             let violation = PreconditionViolation::new(kind(error).1, name, error.to_string());
             details.set_precondition_failure(vec![violation]);

@@ -24,12 +24,11 @@ pub fn page_token(text: &str) -> Result<Option<String>> {
     Ok(page::position(query, text)?.map(|position| page::token(query, position)))
 }
 
-/// Reads the name of a job, an artifact or a key, and makes it again.
+/// Reads a name of whatever has one, and makes it again.
 pub fn name(text: &str) -> Result<String> {
     let parsed = |kind: Kind| kind.parse("name", text).map(|id| kind.name(id));
-    parsed(Kind::Job)
-        .or_else(|_| parsed(Kind::Artifact))
-        .or_else(|_| parsed(Kind::Key))
+    let found = Kind::ALL.into_iter().find_map(|kind| parsed(kind).ok());
+    found.map_or_else(|| parsed(Kind::Job), Ok)
 }
 
 /// Checks a name for people.

@@ -181,7 +181,8 @@ fn output_only(job: &Job, problems: &mut Problems) {
     }
 }
 
-fn request_id(text: &str) -> Result<Option<Uuid>> {
+/// The id that names a request; none when it is empty.
+pub fn request_id(text: &str) -> Result<Option<Uuid>> {
     if text.is_empty() {
         return Ok(None);
     }

@@ -2,15 +2,25 @@
 use crate::error::{Error, Result};
 
 const MAX_DISPLAY_CHARS: usize = 63;
+const MAX_REASON_CHARS: usize = 500;
 const MAX_FILE_BYTES: usize = 255;
 
 /// Checks a name for people: at most 63 characters, all of which can be shown in one line.
 pub fn display_name(field: &str, text: &str) -> Result<()> {
+    line(field, text, MAX_DISPLAY_CHARS)
+}
+
+/// Checks a reason for people: at most 500 characters in one line.
+pub fn reason(field: &str, text: &str) -> Result<()> {
+    line(field, text, MAX_REASON_CHARS)
+}
+
+fn line(field: &str, text: &str, limit: usize) -> Result<()> {
     let length = text.chars().count();
-    if length > MAX_DISPLAY_CHARS {
+    if length > limit {
         return Err(Error::invalid(
             field,
-            format!("has {length} characters, at most {MAX_DISPLAY_CHARS} are taken"),
+            format!("has {length} characters, at most {limit} are taken"),
         ));
     }
     printable(field, text)

@@ -130,7 +130,7 @@ impl Api {
     }
 
     /// Tells those who wait that an attempt has ended, however it did: the job may be queued again.
-    fn attempt_over(&self, id: ledger::JobId) {
+    pub(super) fn attempt_over(&self, id: ledger::JobId) {
         self.reports().forget(id);
         self.changes().job(id);
         self.changes().queue_grew();

@@ -3,7 +3,8 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::types::{ArtifactId, JobId, JobState};
+use super::registry::KeyState;
+use super::types::{ArtifactId, JobId, JobState, KeyId};
 
 /// Result of a ledger operation.
 pub type Result<T> = std::result::Result<T, LedgerError>;
@@ -14,13 +15,13 @@ pub enum LedgerError {
     /// There is no such thing, or it isn't visible.
     #[error("there is no {kind} {id}")]
     NotFound {
-        /// `job`, `artifact` or `key`.
+        /// `job`, `artifact`, `key` or `owner`.
         kind: &'static str,
         /// Which.
         id: Uuid,
     },
     /// The request id was used for something else.
-    #[error("request id {0} was used for another job")]
+    #[error("request id {0} was used for another request")]
     RequestIdReused(Uuid),
     /// The job is over, so it can't be cancelled.
     #[error("job {job} is already over")]
@@ -47,6 +48,41 @@ pub enum LedgerError {
     /// A worker gave a job up as cancelled that nobody had cancelled.
     #[error("nobody asked for the end of job {0}")]
     CancelNotRequested(JobId),
+    /// The key takes no more assets.
+    #[error("key {key} is {}", state.word())]
+    KeyNotActive {
+        /// Which.
+        key: KeyId,
+        /// What it is.
+        state: KeyState,
+    },
+    /// The key can't go from the state it has to another one.
+    #[error("key {key} is {}, and never becomes {} again", state.word(), wanted.word())]
+    KeyStateFinal {
+        /// Which.
+        key: KeyId,
+        /// What it is.
+        state: KeyState,
+        /// What it was to become.
+        wanted: KeyState,
+    },
+    /// The key has given out all payload numbers that its messages can hold.
+    #[error("all {limit} payload numbers of key {key} are used up")]
+    PayloadsUsedUp {
+        /// Which.
+        key: KeyId,
+        /// How many it had.
+        limit: i64,
+    },
+    /// What is kept of a commitment can't be read.
+    #[error("commitment {sequence} can't be read")]
+    BadCommitment {
+        /// Its place in the chain.
+        sequence: i64,
+        /// Why not.
+        #[source]
+        source: guardsplat_commitment::Error,
+    },
     /// The database failed.
     #[error("the ledger's database failed")]
     Database(#[source] Arc<sqlx::Error>),

@@ -1,4 +1,5 @@
-//! The job ledger: jobs, leases, artifacts and keys as rows of a database. The ledger is the whole queue.
+//! The job ledger: jobs, leases, artifacts and keys as rows of a database. The ledger is the whole queue. Beside it
+//! the registry: owners, assets, and the chain of commitments, which only grows.
 //!
 //! A job is given to a worker by [`Ledger::claim`], which counts the attempt and hands out a fresh lease token. From
 //! then on every write for that attempt carries the token and is checked against the job's in the transaction that
@@ -6,19 +7,27 @@
 //! [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
+pub mod candidates;
 #[cfg(test)]
 pub mod conformance;
 mod error;
+mod registry;
 pub mod retry;
 pub mod sqlite;
 mod token;
 mod types;
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use guardsplat_commitment::{Signed, SigningKey};
 use uuid::Uuid;
 
 pub use error::{LedgerError, Result};
+pub use registry::{
+    AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
+    SealedSigningKey,
+};
 pub use sqlite::SqliteLedger;
 pub use types::{
     ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow,
@@ -154,6 +163,65 @@ pub trait Ledger: Send + Sync + 'static {
 
     /// Keys, newest first; those after `before`, as with `list_jobs`.
     async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>>;
+
+    /// Retires or revokes a key, for a reason. One that is in that state stays as it is.
+    ///
+    /// # Errors
+    /// `NotFound`; `KeyStateFinal` when nothing leads from the state it has to this one.
+    async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow>;
+
+    /// The key that commitments are signed with; none before the first start.
+    async fn signing_key(&self) -> Result<Option<SealedSigningKey>>;
+
+    /// Keeps a signing key for good, unless there is one already; returns the one that is kept.
+    async fn keep_signing_key(&self, new: SealedSigningKey, now: i64) -> Result<SealedSigningKey>;
+
+    /// Registers an owner. The same request id with the same display name gives the one that the first call made.
+    ///
+    /// # Errors
+    /// `RequestIdReused` for the same request id with another name.
+    async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow>;
+
+    /// One owner.
+    async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>>;
+
+    /// Owners, newest first; those after `before`, as with `list_jobs`.
+    async fn list_owners(&self, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>>;
+
+    /// Registers an asset: gives it the next payload number of its key, and appends a commitment to the chain, signed by
+    /// `signer`, at once. The same request id with the same owner, key, hash and display name gives the asset that the
+    /// first call made, with the nonce of then.
+    ///
+    /// # Errors
+    /// `RequestIdReused` for the same request id with another asset, `NotFound` for an owner or a key that isn't there,
+    /// `KeyNotActive`, `PayloadsUsedUp`.
+    async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow>;
+
+    /// The asset that was registered under a request id.
+    async fn find_asset_request(&self, request: Uuid) -> Result<Option<AssetRow>>;
+
+    /// One asset.
+    async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>>;
+
+    /// Assets, newest first; those after `before`, as with `list_jobs`.
+    async fn list_assets(
+        &self,
+        filter: AssetFilter,
+        before: Option<(i64, AssetId)>,
+        limit: u32,
+    ) -> Result<Vec<AssetRow>>;
+
+    /// Assets of a key by payload number, those with higher ones than `after`. [`candidates::of_key`] reads all.
+    async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>>;
+
+    /// One commitment.
+    async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>>;
+
+    /// Commitments in the order of the chain, those behind the one at place `after`.
+    async fn list_commitments(&self, after: i64, limit: u32) -> Result<Vec<Signed>>;
+
+    /// The last commitment of the chain.
+    async fn head(&self) -> Result<Option<Signed>>;
 
     /// How many jobs are queued.
     async fn queue_depth(&self) -> Result<i64>;

@@ -3,6 +3,8 @@ use std::fmt;
 
 use uuid::Uuid;
 
+use super::registry::KeyState;
+
 /// Name of a job; a version 7 UUID.
 pub type JobId = Uuid;
 /// Name of an artifact.
@@ -267,4 +269,10 @@ pub struct KeyRow {
     pub job: JobId,
     /// The secret artifact that holds the key file.
     pub artifact: ArtifactId,
+    /// What it may be used for.
+    pub state: KeyState,
+    /// Why it is retired or revoked.
+    pub state_reason: String,
+    /// Since when it is; none while it is active.
+    pub state_time: Option<i64>,
 }

@@ -27,6 +27,14 @@ pub struct MasterKey {
     id: [u8; ID_BYTES],
 }
 
+/// Secret bytes from the operating system's random numbers.
+pub fn random<const N: usize>() -> SecretResult<SecretBox<[u8; N]>> {
+    let mut bytes = <[u8; N]>::try_generate().map_err(|error| SecretError::NoRandomness(error.to_string()))?;
+    let secret = SecretBox::new(Box::new(bytes));
+    bytes.zeroize();
+    Ok(secret)
+}
+
 impl MasterKey {
     /// A new one, from the operating system's random numbers.
     pub fn generate() -> SecretResult<Self> {

@@ -9,6 +9,7 @@ use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::key_service_client::KeyServiceClient;
+use guardsplat_proto::v1::registry_service_client::RegistryServiceClient;
 use guardsplat_proto::v1::worker_service_client::WorkerServiceClient;
 use guardsplat_proto::v1::{
     Artifact, CompleteJobRequest, CreateJobRequest, EmbedSpec, GetJobRequest, Job, Key, KeyOutput, KeyResult, KeySpec,
@@ -27,6 +28,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use crate::api::{Api, Limits, housekeeping, serve};
 use crate::artifacts::ArtifactStore;
 use crate::ledger::SqliteLedger;
+use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 
 pub const MAX_ARTIFACT_BYTES: u64 = 8 << 20;
@@ -37,6 +39,7 @@ pub struct Server {
     pub jobs: JobServiceClient<Channel>,
     pub artifacts: ArtifactServiceClient<Channel>,
     pub keys: KeyServiceClient<Channel>,
+    pub registry: RegistryServiceClient<Channel>,
     pub worker: WorkerServiceClient<Channel>,
     pub channel: Channel,
     folder: TempDir,
@@ -59,7 +62,8 @@ impl Server {
         let ledger = Arc::new(SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap());
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
-        let api = Api::new(ledger.clone(), store, master, limits);
+        let notary = Notary::open(&*ledger, &master, 0).await.unwrap();
+        let api = Api::new(ledger.clone(), store, master, notary, limits);
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = format!("http://{}", listener.local_addr().unwrap());
         let (end, ended) = oneshot::channel();
@@ -71,6 +75,7 @@ impl Server {
             jobs: JobServiceClient::new(channel.clone()),
             artifacts: ArtifactServiceClient::new(channel.clone()),
             keys: KeyServiceClient::new(channel.clone()),
+            registry: RegistryServiceClient::new(channel.clone()),
             worker: WorkerServiceClient::new(channel.clone()),
             channel,
             api,
@@ -91,7 +96,8 @@ impl Server {
     pub async fn restart_after(self, absence: Duration, limits: Limits) -> Self {
         self.api.stop();
         self.end.send(()).unwrap();
-        drop((self.jobs, self.artifacts, self.keys, self.worker, self.channel));
+        drop((self.jobs, self.artifacts, self.keys));
+        drop((self.registry, self.worker, self.channel));
         self.served.await.unwrap().unwrap();
         self.housekeeper.await.unwrap();
         self.ledger.close().await;

@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::job::{Result as JobResult, Spec, State};
+use guardsplat_proto::v1::key::State as KeyState;
 use guardsplat_proto::v1::{
     DownloadArtifactRequest, DownloadKeyRequest, GetArtifactRequest, GetKeyRequest, Job, Key, KeySpec, ListKeysRequest,
 };
@@ -85,6 +86,9 @@ async fn a_job_makes_a_key_that_later_jobs_read() {
         seeded: false,
         create_time: key.create_time,
         job,
+        state: KeyState::Active.into(),
+        state_reason: String::new(),
+        state_time: None,
     };
     assert_eq!(key, wanted);
 

@@ -124,7 +124,14 @@ async fn reflection_knows_every_service() {
         panic!("no list")
     };
     let names: Vec<_> = list.service.into_iter().map(|service| service.name).collect();
-    for service in ["JobService", "ArtifactService", "KeyService", "WorkerService"] {
+    let services = [
+        "JobService",
+        "ArtifactService",
+        "KeyService",
+        "RegistryService",
+        "WorkerService",
+    ];
+    for service in services {
         assert!(names.contains(&format!("guardsplat.v1.{service}")), "{names:?}");
     }
     // Types of details too, so that a generic client can show them.

@@ -10,6 +10,7 @@ pub(crate) mod fixture;
 pub mod model;
 mod outputs;
 mod queue;
+mod registry;
 mod submission;
 
 use std::sync::Arc;
@@ -22,6 +23,7 @@ pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
+pub(crate) use registry::*;
 pub(crate) use submission::*;
 
 /// A place for one ledger, empty at first.
@@ -73,6 +75,16 @@ macro_rules! conformance_suite {
             completion_publishes_all_or_nothing
             keys_are_published_and_their_files_never
             keys_come_in_pages
+            keys_are_retired_and_revoked_for_good
+            an_asset_is_kept_and_committed_to
+            the_same_request_registers_once
+            one_registration_sent_many_times_at_once_is_one_asset
+            what_an_asset_needs_must_be_there
+            registrations_at_once_make_one_chain_without_gaps
+            a_chain_goes_on_after_a_restart
+            payload_numbers_run_out
+            owners_and_assets_come_in_pages
+            a_search_sees_every_asset_of_its_key_once
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

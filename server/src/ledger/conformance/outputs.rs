@@ -1,7 +1,7 @@
 //! What jobs make: seen when the job is complete, and not before.
 use uuid::Uuid;
 
-use super::super::{Completion, JobId, JobKind, JobState, KeyRow, Ledger, LedgerError, NewJob, NewKey};
+use super::super::{Completion, JobId, JobKind, JobState, KeyRow, KeyState, Ledger, LedgerError, NewJob, NewKey};
 use super::Factory;
 use super::fixture::*;
 
@@ -73,7 +73,12 @@ fn with_key(key: &NewKey) -> Completion {
 }
 
 /// Has a job make a key.
-async fn make_key(ledger: &dyn Ledger, now: i64) -> (JobId, NewKey) {
+pub(super) async fn make_key(ledger: &dyn Ledger, now: i64) -> (JobId, NewKey) {
+    make_key_of(ledger, 48, now).await
+}
+
+/// Has a job make a key of so many bits.
+pub(super) async fn make_key_of(ledger: &dyn Ledger, bits: u32, now: i64) -> (JobId, NewKey) {
     let id = ledger
         .create_job(
             NewJob {
@@ -86,7 +91,10 @@ async fn make_key(ledger: &dyn Ledger, now: i64) -> (JobId, NewKey) {
         .unwrap()
         .id;
     let lease = claim_of(ledger, id, now).await;
-    let key = new_key(output(ledger, &lease, true, now).await);
+    let key = NewKey {
+        bits,
+        ..new_key(output(ledger, &lease, true, now).await)
+    };
     ledger.complete(id, &lease.token, with_key(&key), now).await.unwrap();
     // A worker that did not hear the answer says it again, for which the server thinks of another name.
     let again = NewKey {
@@ -119,6 +127,9 @@ pub(crate) async fn keys_are_published_and_their_files_never(factory: &dyn Facto
         create_time: at(2),
         job,
         artifact: key.artifact,
+        state: KeyState::Active,
+        state_reason: String::new(),
+        state_time: None,
     };
     assert_eq!(ledger.get_key(key.id).await.unwrap(), Some(expected));
     assert!(!visible(&*ledger, key.artifact).await);

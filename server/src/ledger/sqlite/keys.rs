@@ -2,8 +2,9 @@
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-use super::super::Result;
+use super::super::registry::KeyState;
 use super::super::types::{JobId, KeyId, KeyRow, NewKey};
+use super::super::{LedgerError, Result};
 use super::rows;
 
 pub(super) async fn create(db: &mut SqliteConnection, new: NewKey, job: JobId, now: i64) -> Result<()> {
@@ -42,4 +43,34 @@ pub(super) async fn list(db: &mut SqliteConnection, before: Option<(i64, KeyId)>
         .fetch_all(db)
         .await?;
     found.iter().map(rows::key).collect()
+}
+
+pub(super) async fn update_state(
+    db: &mut SqliteConnection,
+    id: KeyId,
+    next: KeyState,
+    reason: String,
+    now: i64,
+) -> Result<KeyRow> {
+    let key = get(db, id).await?.ok_or(LedgerError::NotFound { kind: "key", id })?;
+    if key.state == next {
+        return Ok(key);
+    }
+    if !key.state.may_become(next) {
+        return Err(LedgerError::KeyStateFinal {
+            key: id,
+            state: key.state,
+            wanted: next,
+        });
+    }
+    let update =
+        sqlx::query("UPDATE keys SET state = ?2, state_reason = ?3, state_time = ?4 WHERE id = ?1 RETURNING *");
+    let row = update
+        .bind(id.as_bytes().as_slice())
+        .bind(next as i64)
+        .bind(reason)
+        .bind(now)
+        .fetch_one(db)
+        .await?;
+    rows::key(&row)
 }

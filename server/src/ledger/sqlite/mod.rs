@@ -1,9 +1,11 @@
 //! The ledger in a SQLite file: one writer that commits in groups, readers beside it (WAL).
 mod artifacts;
+mod commitments;
 mod jobs;
 mod keys;
 mod leases;
 mod open;
+mod registry;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -11,11 +13,17 @@ mod transition;
 mod writer;
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
+use guardsplat_commitment::{Signed, SigningKey};
 use sqlx::SqlitePool;
 use uuid::Uuid;
 
+use super::registry::{
+    AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
+    SealedSigningKey,
+};
 use super::types::{
     ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
 };
@@ -183,6 +191,76 @@ impl Ledger for SqliteLedger {
 
     async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
         keys::list(&mut *self.readers.acquire().await?, before, limit).await
+    }
+
+    async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow> {
+        let reason = reason.to_owned();
+        self.writer
+            .run(move |db| Box::pin(keys::update_state(db, id, next, reason, now)))
+            .await
+    }
+
+    async fn signing_key(&self) -> Result<Option<SealedSigningKey>> {
+        commitments::signing_key(&mut *self.readers.acquire().await?).await
+    }
+
+    async fn keep_signing_key(&self, new: SealedSigningKey, now: i64) -> Result<SealedSigningKey> {
+        self.writer
+            .run(move |db| Box::pin(commitments::keep_signing_key(db, new, now)))
+            .await
+    }
+
+    async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow> {
+        self.writer
+            .run(move |db| Box::pin(registry::create_owner(db, new, now)))
+            .await
+    }
+
+    async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>> {
+        registry::get_owner(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn list_owners(&self, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
+        registry::list_owners(&mut *self.readers.acquire().await?, before, limit).await
+    }
+
+    async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow> {
+        self.writer
+            .run(move |db| Box::pin(async move { registry::create_asset(db, new, &signer, now).await }))
+            .await
+    }
+
+    async fn find_asset_request(&self, request: Uuid) -> Result<Option<AssetRow>> {
+        registry::find_asset_request(&mut *self.readers.acquire().await?, request).await
+    }
+
+    async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>> {
+        registry::get_asset(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn list_assets(
+        &self,
+        filter: AssetFilter,
+        before: Option<(i64, AssetId)>,
+        limit: u32,
+    ) -> Result<Vec<AssetRow>> {
+        registry::list_assets(&mut *self.readers.acquire().await?, filter, before, limit).await
+    }
+
+    async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
+        registry::candidates(&mut *self.readers.acquire().await?, key, after, limit).await
+    }
+
+    async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>> {
+        commitments::get(&mut *self.readers.acquire().await?, id).await
+    }
+
+    async fn list_commitments(&self, after: i64, limit: u32) -> Result<Vec<Signed>> {
+        commitments::list(&mut *self.readers.acquire().await?, after, limit).await
+    }
+
+    async fn head(&self) -> Result<Option<Signed>> {
+        commitments::head(&mut *self.readers.acquire().await?).await
     }
 
     async fn queue_depth(&self) -> Result<i64> {

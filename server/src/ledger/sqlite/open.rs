@@ -61,5 +61,10 @@ fn migrator() -> Migrator {
             "completion",
             include_str!("../../../migrations/sqlite/0002_completion.sql"),
         ),
+        step(
+            3,
+            "registry",
+            include_str!("../../../migrations/sqlite/0003_registry.sql"),
+        ),
     ])
 }

@@ -3,6 +3,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use uuid::Uuid;
 
+use super::super::registry::KeyState;
 use super::super::types::{ArtifactRow, ArtifactState, Failure, JobKind, JobRow, JobState, KeyRow};
 use super::super::{LedgerError, Result};
 
@@ -67,6 +68,19 @@ pub(super) fn key(row: &SqliteRow) -> Result<KeyRow> {
         create_time: row.try_get("create_time")?,
         job: id(row, "job_id")?,
         artifact: id(row, "artifact_id")?,
+        state: match row.try_get("state")? {
+            1 => KeyState::Active,
+            2 => KeyState::Retired,
+            3 => KeyState::Revoked,
+            value => {
+                return Err(LedgerError::Corrupt {
+                    what: "state of a key",
+                    value,
+                });
+            }
+        },
+        state_reason: row.try_get("state_reason")?,
+        state_time: row.try_get("state_time")?,
     })
 }
 
@@ -74,13 +88,25 @@ pub(super) fn id(row: &SqliteRow, column: &str) -> Result<Uuid> {
     optional_id(row, column)?.ok_or_else(|| sqlx::Error::ColumnNotFound(column.to_owned()).into())
 }
 
-fn optional_id(row: &SqliteRow, column: &str) -> Result<Option<Uuid>> {
+pub(super) fn optional_id(row: &SqliteRow, column: &str) -> Result<Option<Uuid>> {
     let bytes: Option<Vec<u8>> = row.try_get(column)?;
     let uuid = bytes.as_deref().map(Uuid::from_slice).transpose();
     uuid.map_err(|e| {
         sqlx::Error::ColumnDecode {
             index: column.to_owned(),
             source: e.into(),
+        }
+        .into()
+    })
+}
+
+/// A value that always has so many bytes.
+pub(super) fn bytes<const N: usize>(row: &SqliteRow, column: &str) -> Result<[u8; N]> {
+    let bytes: Vec<u8> = row.try_get(column)?;
+    <[u8; N]>::try_from(bytes).map_err(|bytes| {
+        sqlx::Error::ColumnDecode {
+            index: column.to_owned(),
+            source: format!("has {} bytes, not {N}", bytes.len()).into(),
         }
         .into()
     })

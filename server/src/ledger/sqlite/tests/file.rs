@@ -4,7 +4,9 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{Connection, Row, SqliteConnection};
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{JobState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, SqliteLedger};
+use super::super::super::{
+    JobState, KeyState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, SqliteLedger,
+};
 use super::super::open;
 use super::Folder;
 
@@ -131,6 +133,13 @@ async fn a_file_of_the_first_version_is_taken_along() {
     for statement in [
         "ALTER TABLE jobs DROP COLUMN completed_token",
         "ALTER TABLE jobs DROP COLUMN completed_fingerprint",
+        "DROP TABLE commitments",
+        "DROP TABLE assets",
+        "DROP TABLE owners",
+        "DROP TABLE signing_keys",
+        "ALTER TABLE keys DROP COLUMN state",
+        "ALTER TABLE keys DROP COLUMN state_reason",
+        "ALTER TABLE keys DROP COLUMN state_time",
         "DELETE FROM _sqlx_migrations WHERE version > 1",
     ] {
         sqlx::query(statement).execute(&mut db).await.unwrap();
@@ -141,6 +150,29 @@ async fn a_file_of_the_first_version_is_taken_along() {
     assert_eq!(job(&*ledger, id).await, lease.job);
     let done = complete(&*ledger, &lease, &[], at(2)).await;
     assert_eq!(complete(&*ledger, &lease, &[], at(3)).await, done);
+}
+
+#[tokio::test]
+async fn commitments_are_not_changed_by_accident() {
+    let folder = Folder::new();
+    folder.ledger().await.close().await;
+    let mut db = raw(&folder).await;
+    for statement in [
+        "PRAGMA foreign_keys = OFF",
+        "INSERT INTO commitments VALUES (1, zeroblob(16), zeroblob(16), x'00', zeroblob(32), zeroblob(64))",
+    ] {
+        sqlx::query(statement).execute(&mut db).await.unwrap();
+    }
+    for statement in [
+        "UPDATE commitments SET signature = zeroblob(64)",
+        "DELETE FROM commitments",
+    ] {
+        let error = sqlx::query(statement).execute(&mut db).await.unwrap_err();
+        assert!(error.to_string().contains("commitments never"), "{error}");
+    }
+    // And bytes that are no commitment are an error, and no panic.
+    let ledger = folder.ledger().await;
+    refused!(ledger.head().await, LedgerError::BadCommitment { sequence: 1, .. });
 }
 
 #[tokio::test]
@@ -181,6 +213,14 @@ fn numbers_are_those_of_the_api() {
         (JobState::Succeeded, State::Succeeded),
         (JobState::Failed, State::Failed),
         (JobState::Cancelled, State::Cancelled),
+    ] {
+        assert_eq!(ours as i32, theirs as i32);
+    }
+    use guardsplat_proto::v1::key;
+    for (ours, theirs) in [
+        (KeyState::Active, key::State::Active),
+        (KeyState::Retired, key::State::Retired),
+        (KeyState::Revoked, key::State::Revoked),
     ] {
         assert_eq!(ours as i32, theirs as i32);
     }

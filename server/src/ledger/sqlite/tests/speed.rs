@@ -7,6 +7,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{Ledger, NewJob};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
+use super::super::{commitments, registry};
 use super::Folder;
 use super::file::raw;
 
@@ -18,7 +19,7 @@ async fn plan(folder: &Folder, statement: &str) -> String {
 }
 
 #[tokio::test]
-async fn jobs_are_found_by_their_indexes_and_never_sorted() {
+async fn rows_are_found_by_their_indexes_and_never_sorted() {
     let folder = Folder::new();
     folder.ledger().await.close().await;
     let by_index = [
@@ -27,6 +28,16 @@ async fn jobs_are_found_by_their_indexes_and_never_sorted() {
         (PAGE, "INDEX jobs_by_time ((create_time,id)<"),
         (PAGE_OF_STATE, "INDEX jobs_by_state (state=? AND (create_time,id)<"),
         (QUEUE, "INDEX jobs_queue"),
+        (registry::ASSETS, "INDEX assets_by_time ((create_time,id)<"),
+        (
+            registry::OF_OWNER,
+            "INDEX assets_by_owner (owner_id=? AND (create_time,id)<",
+        ),
+        (registry::OF_KEY, "INDEX assets_by_key (key_id=? AND (create_time,id)<"),
+        (registry::OF_BOTH, "=? AND (create_time,id)<"),
+        (registry::CANDIDATES, "(key_id=? AND payload>?)"),
+        (registry::LAST_PAYLOAD, "(key_id=?)"),
+        (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
     for (statement, index) in by_index {
         let plan = plan(&folder, statement).await;

@@ -1,0 +1,70 @@
+//! `RegistryService`: who owns which original, and what was signed about it.
+mod assets;
+mod commitments;
+mod owners;
+
+use guardsplat_proto::v1::registry_service_server::RegistryService;
+use guardsplat_proto::v1::{
+    Asset, Commitment, CreateAssetRequest, CreateOwnerRequest, ExportCommitmentRequest, ExportCommitmentResponse,
+    GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetOwnerRequest, GetPublicKeyRequest, ListAssetsRequest,
+    ListAssetsResponse, ListCommitmentsRequest, ListCommitmentsResponse, ListOwnersRequest, ListOwnersResponse, Owner,
+    PublicKey,
+};
+use tonic::{Request, Response, Status};
+
+use super::Api;
+
+#[tonic::async_trait]
+impl RegistryService for Api {
+    async fn create_owner(&self, request: Request<CreateOwnerRequest>) -> Result<Response<Owner>, Status> {
+        Ok(Response::new(self.register_owner(request.into_inner()).await?))
+    }
+
+    async fn get_owner(&self, request: Request<GetOwnerRequest>) -> Result<Response<Owner>, Status> {
+        Ok(Response::new(self.owner(&request.get_ref().name).await?))
+    }
+
+    async fn list_owners(&self, request: Request<ListOwnersRequest>) -> Result<Response<ListOwnersResponse>, Status> {
+        Ok(Response::new(self.page_of_owners(request.get_ref()).await?))
+    }
+
+    async fn create_asset(&self, request: Request<CreateAssetRequest>) -> Result<Response<Asset>, Status> {
+        Ok(Response::new(self.register_asset(request.into_inner()).await?))
+    }
+
+    async fn get_asset(&self, request: Request<GetAssetRequest>) -> Result<Response<Asset>, Status> {
+        Ok(Response::new(self.asset(&request.get_ref().name).await?))
+    }
+
+    async fn list_assets(&self, request: Request<ListAssetsRequest>) -> Result<Response<ListAssetsResponse>, Status> {
+        Ok(Response::new(self.page_of_assets(request.get_ref()).await?))
+    }
+
+    async fn get_commitment(&self, request: Request<GetCommitmentRequest>) -> Result<Response<Commitment>, Status> {
+        let signed = self.commitment(&request.get_ref().name).await?;
+        Ok(Response::new(commitments::message(&signed)))
+    }
+
+    async fn list_commitments(
+        &self,
+        request: Request<ListCommitmentsRequest>,
+    ) -> Result<Response<ListCommitmentsResponse>, Status> {
+        Ok(Response::new(self.page_of_commitments(request.get_ref()).await?))
+    }
+
+    async fn get_head(&self, _: Request<GetHeadRequest>) -> Result<Response<Commitment>, Status> {
+        Ok(Response::new(self.head().await?))
+    }
+
+    async fn export_commitment(
+        &self,
+        request: Request<ExportCommitmentRequest>,
+    ) -> Result<Response<ExportCommitmentResponse>, Status> {
+        let document = self.document(&request.get_ref().name).await?;
+        Ok(Response::new(ExportCommitmentResponse { document }))
+    }
+
+    async fn get_public_key(&self, _: Request<GetPublicKeyRequest>) -> Result<Response<PublicKey>, Status> {
+        Ok(Response::new(self.public_key()?))
+    }
+}

@@ -1,0 +1,67 @@
+//! Owners: registered, looked at, listed.
+use guardsplat_proto::v1::{CreateOwnerRequest, ListOwnersRequest, ListOwnersResponse, Owner};
+use uuid::Uuid;
+
+use crate::api::clock::{self, timestamp};
+use crate::api::names::Kind;
+use crate::api::problems::Problems;
+use crate::api::{Api, page, submission, text};
+use crate::error::{Error, Result};
+use crate::ledger::{NewOwner, OwnerRow};
+
+/// What page tokens of this list are bound to.
+const QUERY: &[&[u8]] = &[b"owners"];
+
+impl Api {
+    pub(super) async fn register_owner(&self, request: CreateOwnerRequest) -> Result<Owner> {
+        let new = checked(request)?;
+        Ok(message(self.ledger().create_owner(new, clock::now()).await?))
+    }
+
+    pub(super) async fn owner(&self, name: &str) -> Result<Owner> {
+        let id = Kind::Owner.parse("name", name)?;
+        let row = self.ledger().get_owner(id).await?;
+        Ok(message(row.ok_or_else(|| Kind::Owner.not_found(id))?))
+    }
+
+    pub(super) async fn page_of_owners(&self, request: &ListOwnersRequest) -> Result<ListOwnersResponse> {
+        let size = page::size(request.page_size)?;
+        let before = page::position(QUERY, &request.page_token)?;
+        // One more than asked for tells whether there is another page.
+        let rows = self.ledger().list_owners(before, size + 1).await?;
+        let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (row.create_time, row.id));
+        Ok(ListOwnersResponse {
+            owners: rows.into_iter().map(message).collect(),
+            next_page_token,
+        })
+    }
+}
+
+fn checked(request: CreateOwnerRequest) -> Result<NewOwner> {
+    let CreateOwnerRequest { owner, request_id } = request;
+    let owner = owner.ok_or_else(|| Error::invalid("owner", "is missing"))?;
+    let mut problems = Problems::default();
+    let request_id = problems.take(submission::request_id(&request_id))?.flatten();
+    problems.check(!owner.display_name.is_empty(), "owner.display_name", "is missing");
+    problems.take(text::display_name("owner.display_name", &owner.display_name))?;
+    for (field, empty) in [
+        ("owner.name", owner.name.is_empty()),
+        ("owner.create_time", owner.create_time.is_none()),
+    ] {
+        problems.check(empty, field, "is set by the server and must be empty");
+    }
+    problems.finish()?;
+    Ok(NewOwner {
+        id: Uuid::now_v7(),
+        display_name: owner.display_name,
+        request_id,
+    })
+}
+
+fn message(row: OwnerRow) -> Owner {
+    Owner {
+        name: Kind::Owner.name(row.id),
+        display_name: row.display_name,
+        create_time: Some(timestamp(row.create_time)),
+    }
+}

@@ -1,0 +1,108 @@
+//! Rows of commitments, each of which follows on the one before, and of the key that they are signed with.
+use guardsplat_commitment::{Commitment, Hash, Link, Signed, SigningKey};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+
+use super::super::registry::{AssetRow, CommitmentId, SealedSigningKey};
+use super::super::{LedgerError, Result};
+use super::rows;
+
+/// The end of the chain.
+pub(super) const HEAD: &str = "SELECT * FROM commitments ORDER BY sequence DESC LIMIT 1";
+
+/// A page of the chain.
+pub(super) const CHAIN: &str = "SELECT * FROM commitments WHERE sequence > ?1 ORDER BY sequence LIMIT ?2";
+
+/// Signs a commitment to an asset behind the last one. It must run in the transaction that makes the asset, so that
+/// nothing comes in between.
+pub(super) async fn append(
+    db: &mut SqliteConnection,
+    asset: &AssetRow,
+    nonce_hash: Hash,
+    signer: &SigningKey,
+) -> Result<()> {
+    let last = head(db).await?.as_ref().map_or(Link::START, Link::at);
+    let signed = signer.sign(Commitment {
+        sequence: last.sequence.saturating_add(1),
+        previous: last.hash,
+        id: asset.commitment,
+        asset: asset.id,
+        owner: asset.owner,
+        sha256: asset.sha256,
+        key: asset.key,
+        payload: u64::try_from(asset.payload).unwrap_or_default(), // the table holds none below 1
+        nonce_hash,
+        // A clock that was set back must not make a chain that nobody believes.
+        time: asset.create_time.max(last.time),
+    });
+    let sequence = i64::try_from(signed.commitment.sequence).unwrap_or(i64::MAX);
+    sqlx::query(
+        "INSERT INTO commitments (sequence, id, asset_id, canonical, hash, signature) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+    )
+    .bind(sequence)
+    .bind(asset.commitment.as_bytes().as_slice())
+    .bind(asset.id.as_bytes().as_slice())
+    .bind(signed.commitment.canonical())
+    .bind(signed.hash().as_slice())
+    .bind(signed.signature.as_slice())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn head(db: &mut SqliteConnection) -> Result<Option<Signed>> {
+    sqlx::query(HEAD)
+        .fetch_optional(db)
+        .await?
+        .as_ref()
+        .map(signed)
+        .transpose()
+}
+
+pub(super) async fn get(db: &mut SqliteConnection, id: CommitmentId) -> Result<Option<Signed>> {
+    let query = sqlx::query("SELECT * FROM commitments WHERE id = ?1").bind(id.as_bytes().as_slice());
+    query.fetch_optional(db).await?.as_ref().map(signed).transpose()
+}
+
+pub(super) async fn list(db: &mut SqliteConnection, after: i64, limit: u32) -> Result<Vec<Signed>> {
+    let found = sqlx::query(CHAIN).bind(after).bind(limit).fetch_all(db).await?;
+    found.iter().map(signed).collect()
+}
+
+/// What is read is what was signed: the canonical bytes, and not columns that say the same.
+fn signed(row: &SqliteRow) -> Result<Signed> {
+    let canonical: Vec<u8> = row.try_get("canonical")?;
+    let sequence = row.try_get("sequence")?;
+    let commitment =
+        Commitment::from_canonical(&canonical).map_err(|source| LedgerError::BadCommitment { sequence, source })?;
+    Ok(Signed {
+        commitment,
+        signature: rows::bytes(row, "signature")?,
+    })
+}
+
+pub(super) async fn signing_key(db: &mut SqliteConnection) -> Result<Option<SealedSigningKey>> {
+    let row = sqlx::query("SELECT * FROM signing_keys").fetch_optional(db).await?;
+    row.map(|row| {
+        Ok(SealedSigningKey {
+            public_key: rows::bytes(&row, "public_key")?,
+            sealed: row.try_get("sealed")?,
+        })
+    })
+    .transpose()
+}
+
+/// Keeps the first one for good, and says which that is.
+pub(super) async fn keep_signing_key(
+    db: &mut SqliteConnection,
+    new: SealedSigningKey,
+    now: i64,
+) -> Result<SealedSigningKey> {
+    sqlx::query("INSERT OR IGNORE INTO signing_keys (id, public_key, sealed, create_time) VALUES (1, ?1, ?2, ?3)")
+        .bind(new.public_key.as_slice())
+        .bind(&new.sealed)
+        .bind(now)
+        .execute(&mut *db)
+        .await?;
+    Ok(signing_key(db).await?.unwrap_or(new))
+}
