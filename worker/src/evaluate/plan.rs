@@ -79,7 +79,7 @@ impl Plan {
 /// None but a suite of attacks that cannot be read, which the tests rule out.
 pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &Trade) -> Result<Plan> {
     let mut plan = Plan::default();
-    let free = if bits.is_empty() { &[BITS] } else { bits };
+    let free: &[usize] = if bits.is_empty() { &[BITS] } else { bits };
     if experiments.contains(&Kind::Security) {
         plan.judged = free.to_vec();
     }
