@@ -142,10 +142,13 @@ fn places<'a>(selection: &Selection<'a>) -> BTreeMap<Place, BTreeMap<&'a str, Ve
             continue;
         };
         let machine = |timing: &Timing| {
-            let s = if timing.threads == 1 { "" } else { "s" };
+            let s = |count: u32| if count == 1 { "" } else { "s" };
+            let (threads, cores) = (timing.threads, timing.cores);
             format!(
-                "{} with {} of {} cores' thread{s}",
-                timing.processor, timing.threads, timing.cores
+                "{}, {threads} thread{} on {cores} core{}",
+                timing.processor,
+                s(threads),
+                s(cores)
             )
         };
         let place = Place {
@@ -300,15 +303,15 @@ fn notes(lines: &[Line<'_>]) -> Vec<String> {
              seconds of one run on a quiet machine can be compared."
         ));
     }
-    let load = |timing: &&Timing| Some(timing.load_before? / f64::from(timing.cores.max(1)));
-    match timings.iter().filter_map(load).max_by(f64::total_cmp) {
+    let load = |timing: &&Timing| Some((timing.load_before?, timing.cores.max(1)));
+    let share = |(load, cores): &(f64, u32)| load / f64::from(*cores);
+    match timings.iter().filter_map(load).max_by(|a, b| share(a).total_cmp(&share(b))) {
         None => notes.push("It is not known whether the machine was quiet.".into()),
-        Some(load) if load <= QUIET => notes.push("The machine was quiet before the run began.".into()),
-        Some(load) => notes.push(format!(
-            "The machine was not quiet: other programs took {:.0} % of its cores in the minute before. Seconds here \
-             cannot be compared with those of anywhere else, and not well with each other; processor seconds are \
-             less affected.",
-            100.0 * load
+        Some(load) if share(&load) <= QUIET => notes.push("The machine was quiet before the run began.".into()),
+        Some((load, cores)) => notes.push(format!(
+            "The machine was not quiet: in the minute before the run its load was {load:.1}, with {cores} cores. Seconds \
+             here cannot be compared with those of anywhere else, and not well with each other; processor seconds are \
+             less affected."
         )),
     }
     notes

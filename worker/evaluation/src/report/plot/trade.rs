@@ -31,7 +31,7 @@ pub struct Compromise {
 /// Height of the legend.
 const LEGEND: u32 = 52;
 /// Sizes of labels that must be there, and of others.
-const SIZES: [u32; 2] = [14, 10];
+const SIZES: [u32; 2] = [14, 12];
 
 /// Draws them; a thin line joins those that nothing beats in the two axes alone.
 ///

@@ -58,7 +58,7 @@ fn a_hand_computed_table() {
     assert_eq!(fronts(&report), expected);
     let table = &report.tables[0];
     assert!(
-        table.title.contains("16 bits, cpu, a processor with 4 of 4"),
+        table.title.contains("16 bits, cpu, a processor, 4 threads on 4 cores"),
         "{}",
         table.title
     );
@@ -113,7 +113,7 @@ fn other_runs_devices_and_lacking_scenes_are_told() {
     for needle in [
         "2 runs of the program",
         "was not quiet",
-        "50 % of its cores",
+        "load was 2.0, with 4 cores",
         "1 variants lack",
     ] {
         assert!(notes.contains(needle), "{needle}: {notes}");
