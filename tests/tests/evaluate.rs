@@ -64,6 +64,119 @@ fn reports_tell_what_was_measured_and_what_was_not() {
     assert_eq!(String::from_utf8(bench.read("results/report.html")).unwrap(), html);
 }
 
+const SECURITY: &str = "evaluate results --scenes one.ply two.ply --experiments security --bits 16 --seeds 1 \
+    --settings hasty.json --size 48 --views 8 --device cpu";
+
+/// Detectors and areas of a folder's detections, in order.
+fn areas(bench: &Bench) -> Vec<(String, f64)> {
+    let detections = records(bench)
+        .into_iter()
+        .map(|line| line["record"]["detection"].clone());
+    let detections = detections.filter(|detection| !detection.is_null());
+    detections
+        .map(|one| (one["detector"].as_str().unwrap().into(), one["auc"].as_f64().unwrap()))
+        .collect()
+}
+
+#[test]
+fn detectors_judge_marks_once_and_find_replaced_bits() {
+    let bench = bench();
+    bench.exits(SECURITY, 0);
+    let areas = areas(&bench);
+    let names: Vec<&str> = areas.iter().map(|(name, _)| name.as_str()).collect();
+    let detectors = [
+        "rs-analysis",
+        "sample-pairs",
+        "chi-square",
+        "primary-sets",
+        "fusion",
+        "learned",
+    ];
+    assert_eq!(names[..6], detectors);
+    assert_eq!(names[6..], detectors.map(|name| format!("control:{name}")));
+    for (name, area) in &areas {
+        // Scattered bits escape the chi-square attack.
+        let fires = name.starts_with("control:") && !name.ends_with("chi-square");
+        assert!((0.0..=1.0).contains(area) && (!fires || *area > 0.9), "{name}: {area}");
+    }
+    let whole = bench.read("results/results.jsonl");
+    let detection = &records(&bench)[4]["record"]["detection"];
+    assert_eq!(detection["clean"].as_array().unwrap().len(), 16);
+    assert_eq!((&detection["views"], &detection["clusters"]), (&8.into(), &2.into()));
+    bench.exits(SECURITY, 0);
+    assert_eq!(bench.read("results/results.jsonl"), whole);
+    // The last two are lost: they alone are made again, to the same bytes.
+    let lines: Vec<&[u8]> = whole.split_inclusive(|byte| *byte == b'\n').collect();
+    bench.write("results/results.jsonl", lines[..lines.len() - 2].concat());
+    bench.exits(SECURITY, 0);
+    assert_eq!(bench.read("results/results.jsonl"), whole);
+    let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+    assert_eq!(report[0]["missing"], serde_json::json!([]));
+    let html = String::from_utf8(bench.read("results/report.html")).unwrap();
+    assert!(html.contains("Positive control"));
+}
+
+#[test]
+fn one_scene_has_no_learned_detector_and_the_report_says_so() {
+    let bench = bench();
+    bench.exits(&SECURITY.replace(" two.ply", ""), 0);
+    let areas = areas(&bench);
+    assert_eq!(areas.len(), 10);
+    assert!(areas.iter().all(|(name, _)| !name.ends_with("learned")));
+    let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+    let missing = report[0]["missing"][0].as_str().unwrap();
+    assert!(missing.contains("learned: not measured; it judges"), "{missing}");
+}
+
+const TRADE: &str = "evaluate results --scenes one.ply two.ply --experiments trade --bits 16 --seeds 1 \
+    --settings hasty.json --size 48 --views 5 --device cpu --variants own.json --only base,one-step,half-weights";
+
+#[test]
+fn variants_are_timed_once_and_plotted() {
+    let bench = bench();
+    bench.write("own.json", r#"[{"name": "one-step", "settings": {"steps": 1}}]"#);
+    bench.write("page.md", "<!-- BEGIN trade -->\n<!-- END trade -->\n");
+    bench.exits(&format!("{TRADE} --document page.md --plot trade.svg"), 0);
+    let marks: Vec<Value> = records(&bench)
+        .into_iter()
+        .map(|line| line["record"]["mark"].clone())
+        .filter(|mark| !mark.is_null())
+        .collect();
+    let names: Vec<&str> = marks
+        .iter()
+        .map(|m| m["embedding"]["variant"].as_str().unwrap())
+        .collect();
+    let expected = ["trade:cpu:base", "trade:cpu:half-weights", "trade:cpu:one-step"];
+    assert_eq!(names, expected.map(|name| [name; 2]).concat());
+    for mark in &marks {
+        let timing = &mark["timing"];
+        assert!(
+            timing["threads"].as_u64().unwrap() > 0 && timing["processor"].is_string(),
+            "{timing}"
+        );
+        assert_eq!(timing["run"], marks[0]["timing"]["run"]);
+    }
+    assert_eq!((&marks[4]["steps"], &marks[0]["steps"]), (&1.into(), &2.into()));
+    let page = String::from_utf8(bench.read("page.md")).unwrap();
+    for text in ["| one-step |", "times base", "On the front", "Timed from"] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+    let plot = String::from_utf8(bench.read("trade.svg")).unwrap();
+    assert!(plot.starts_with("<svg") && plot.contains("prefers-color-scheme"));
+    assert_eq!(plot.matches("<circle").count() - plot.matches("r=\"8\"").count(), 3);
+
+    // Nothing is timed twice; what is new is.
+    let whole = bench.read("results/results.jsonl");
+    bench.exits(TRADE, 0);
+    assert_eq!(bench.read("results/results.jsonl"), whole);
+    let own = r#"[{"name": "one-step", "settings": {"steps": 1}}, {"name": "new", "settings": {"steps": 1}}]"#;
+    bench.write("own.json", own);
+    bench.exits(&format!("{TRADE},new --document page.md"), 0);
+    assert_eq!(records(&bench).len(), 2 * (3 + 1) * 2);
+    let page = String::from_utf8(bench.read("page.md")).unwrap();
+    assert!(page.contains("| new |"), "{page}");
+}
+
 #[test]
 fn what_cannot_be_evaluated_is_refused() {
     let bench = bench();
@@ -73,6 +186,11 @@ fn what_cannot_be_evaluated_is_refused() {
         "evaluate results --experiments magic --scenes one.ply",
         &["magic", "capacity"],
     );
+    let trade = "evaluate results --experiments trade --device cpu --scenes one.ply";
+    bench.refuses(&format!("{trade} --only magic"), &["magic", "draft", "half-weights"]);
+    bench.refuses(&format!("{trade} --variants no.json"), &["no.json"]);
+    let plot = "evaluate results --scenes one.ply --device cpu --plot a.svg";
+    bench.refuses(plot, &["plot", "trade"]);
     bench.refuses("evaluate results --report-only", &["results", "no folder"]);
     std::fs::create_dir(bench.path("results")).unwrap();
     bench.write("results/results.jsonl", "nonsense\n");

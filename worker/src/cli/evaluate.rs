@@ -10,7 +10,7 @@ use guardsplat_evaluation::report::selection::Selection;
 use guardsplat_evaluation::report::store::Store;
 use guardsplat_worker::device::{Compute, DeviceChoice, open};
 use guardsplat_worker::embed::{self, Preset, Settings};
-use guardsplat_worker::evaluate::{Options, Progress, plan, run as carry_out};
+use guardsplat_worker::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_worker::stop::Stop;
@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     scenes: Vec<PathBuf>,
     /// Which experiments: capacity, robustness, trained, losses, pruning, longer, perturbations, sensitivity, elevation,
-    /// formats, security
+    /// formats, security, trade
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "capacity")]
     experiments: Vec<Kind>,
     /// Only messages of these lengths
@@ -44,6 +44,13 @@ pub struct Arguments {
     /// A JSON file with settings in place of the preset's
     #[arg(long, value_name = "FILE", hide_short_help = true)]
     settings: Option<PathBuf>,
+    /// A JSON file with settings for trade to time besides its own: [{"name": "quick", "preset": "draft", "settings":
+    /// {"steps": 60}}]
+    #[arg(long, value_name = "FILE")]
+    variants: Option<PathBuf>,
+    /// Only these variants of trade
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
     /// Side of the pictures that are read, in pixels
     #[arg(long, value_name = "PX", default_value_t = 160, value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: u32,
@@ -64,9 +71,18 @@ pub struct Arguments {
     /// A Markdown file whose tables between markers are replaced too
     #[arg(long, value_name = "FILE")]
     document: Option<PathBuf>,
+    /// An SVG file for the plots of trade
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    if arguments.plot.is_some() && !arguments.experiments.contains(&Kind::Trade) {
+        return Err(Error::BadOption {
+            field: "plot",
+            reason: "it is of trade, which is not among the experiments".into(),
+        });
+    }
     // What is refused leaves no folder behind.
     if !arguments.report_only {
         check(arguments)?;
@@ -87,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 /// Whether there are settings that can be used, and scenes that can be opened: a run of hours should not end at its
 /// last scene.
 fn check(arguments: &Arguments) -> Result<()> {
-    settings(arguments)?;
+    timed(arguments)?;
     if arguments.scenes.is_empty() {
         return Err(Error::BadOption {
             field: "scenes",
@@ -101,7 +117,13 @@ fn check(arguments: &Arguments) -> Result<()> {
 }
 
 fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
-    let plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits)?;
+    let compute = open(arguments.device)?;
+    let trade = Trade {
+        // Without the name of the card.
+        device: compute.name.split(':').next().unwrap_or_default().into(),
+        variants: timed(arguments)?,
+    };
+    let plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits, &trade)?;
     let options = Options {
         scenes: arguments.scenes.clone(),
         seeds: arguments.seeds.clone(),
@@ -111,7 +133,7 @@ fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
     let folder = arguments.folder.join("keys");
     std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
     let mut display = Display::new("marking");
-    let engine = |bits, seed| engine(arguments, &folder, open(arguments.device)?, bits, seed);
+    let engine = |bits, seed| engine(arguments, &folder, compute.clone(), bits, seed);
     carry_out(&plan, &options, store, engine, |progress| match progress {
         Progress::Mark(done, total, what) => display.say(&format!("mark {done} of {total}: {what}")),
         Progress::Embedding(embed::Progress::Step(step)) => display.set(step.step, step.total, || {
@@ -119,6 +141,8 @@ fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
         }),
         Progress::Embedding(_) => {}
         Progress::Read(attack, accuracy) => display.say(&format!("  {attack}: {:.2} %", 100.0 * accuracy)),
+        Progress::Failed(why) => display.say(&format!("  failed: {why}")),
+        Progress::Detected(bits, detector, area) => display.say(&format!("{bits} bits, {detector}: area {area:.3}")),
     })
 }
 
@@ -128,6 +152,16 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
         None => Ok(settings),
         Some(path) => settings.overridden(&std::fs::read_to_string(path).map_err(Error::io(path))?),
     }
+}
+
+/// What trade times, if it is asked for.
+fn timed(arguments: &Arguments) -> Result<Vec<Variant>> {
+    let base = settings(arguments)?;
+    let own = match &arguments.variants {
+        None => None,
+        Some(path) => Some(std::fs::read_to_string(path).map_err(Error::io(path))?),
+    };
+    variants(&base, own.as_deref(), &arguments.only)
 }
 
 /// The engine for a length and a seed, with a key that is kept in `folder`, and the seconds that making it took.
@@ -183,6 +217,10 @@ fn write_reports(arguments: &Arguments, store: &Store) -> Result<()> {
         output::write_json(&reports, &folder.join("report.json"))?;
         output::write_csv(&selection, &folder.join("readings.csv"))?;
         output::write_html(&reports, folder, &folder.join("report.html"))?;
+        if let Some(path) = &arguments.plot {
+            let trade = reports.iter().find(|report| report.name == Kind::Trade.name());
+            output::write_svg(trade.map_or(&[], |report| &report.plots), path)?;
+        }
         if let Some(document) = &arguments.document {
             for report in &reports {
                 output::write_markdown(report, document)?;

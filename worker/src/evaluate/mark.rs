@@ -1,9 +1,9 @@
 //! Makes one mark and measures it: the key, the marked file, how much it shows.
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use guardsplat_evaluation::report::record::{Embedding, Mark};
 
+use super::machine::Machine;
 use super::read::Views;
 use crate::embed::{Progress, Settings, optimise};
 use crate::error::{Error, Result};
@@ -25,6 +25,9 @@ pub(super) struct Making<'a> {
     pub settings: &'a Settings,
     /// The store's folder.
     pub folder: &'a Path,
+    pub machine: &'a Machine,
+    /// Whether seconds are what is asked for.
+    pub timed: bool,
 }
 
 /// Where the marked scene of an embedding lies, in the store's folder.
@@ -45,7 +48,10 @@ impl Making<'_> {
         unmarked: &Views,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(Mark, Gaussians)> {
-        let start = Instant::now();
+        if self.timed {
+            self.warm_up()?;
+        }
+        let stopwatch = self.machine.stopwatch();
         let mut made_after = None;
         let optimised = optimise(self.engine, self.scene, self.message, self.settings, &mut |p| {
             if let Progress::Check(check) = p
@@ -55,7 +61,7 @@ impl Making<'_> {
             }
             progress(p);
         })?;
-        let seconds = start.elapsed().as_secs_f64();
+        let (seconds, timing) = stopwatch.stop();
         let id = embedding.id().to_string();
         let path = path(self.folder, &id, self.scene);
         make_folder(&path)?;
@@ -89,10 +95,24 @@ impl Making<'_> {
                 peak_memory_bytes: crate::memory::peak(),
                 unmarked_accuracy: Some(before.bit_accuracy),
                 difference_picture: Some(picture),
+                timing: Some(timing),
                 embedding,
             },
             marked,
         ))
+    }
+
+    /// Has a graphics card's kernels compiled for pictures of this size, which only the first embedding would pay for.
+    fn warm_up(&self) -> Result<()> {
+        if self.engine.compute.name == "cpu" {
+            return Ok(());
+        }
+        let settings = Settings {
+            steps: 2,
+            early_stop: None,
+            ..*self.settings
+        };
+        optimise(self.engine, self.scene, self.message, &settings, &mut |_| {}).map(|_| ())
     }
 }
 

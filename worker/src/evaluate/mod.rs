@@ -1,15 +1,19 @@
 //! Evaluation: scenes, lengths, settings and seeds are marked, every mark is read under every attack, and all of it is kept.
 //!
 //! [`plan`] says what an experiment needs, [`trial`] what is done to a mark before it is read, [`run`] does what is not in
-//! the store yet. What comes of it is told by [`guardsplat_evaluation::report`].
+//! the store yet, and has detectors judge marks where that is asked for. What comes of it is told by [`guardsplat_evaluation::report`].
+mod machine;
 mod mark;
 mod plan;
 mod read;
 mod run;
+mod security;
+mod trade;
 mod trial;
 
-pub use plan::{Plan, Wanted, plan};
+pub use plan::{Plan, Trade, Wanted, plan};
 pub use run::{Options, Progress, run};
+pub use trade::{Variant, variants};
 pub use trial::{SceneChange, Trial};
 
 /// An error of the crate that judges marks.

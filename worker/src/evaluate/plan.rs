@@ -3,6 +3,7 @@ use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::named::Kind;
 use guardsplat_evaluation::report::names;
 
+use super::trade::Variant;
 use super::trial::Trial;
 use crate::embed::{DescentOptions, Settings};
 use crate::error::Result;
@@ -27,6 +28,8 @@ pub struct Wanted {
     pub settings: Settings,
     /// What is done before marks are read.
     pub trials: Vec<Trial>,
+    /// Whether seconds are what is asked for.
+    pub timed: bool,
 }
 
 /// Everything that some experiments need.
@@ -34,6 +37,17 @@ pub struct Wanted {
 pub struct Plan {
     /// One of each length and variant.
     pub wanted: Vec<Wanted>,
+    /// Lengths whose standard marks detectors are to judge.
+    pub judged: Vec<usize>,
+}
+
+/// What `trade` times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trade {
+    /// Kind of device, such as "cpu": variants on each are variants of their own.
+    pub device: String,
+    /// Settings by name.
+    pub variants: Vec<Variant>,
 }
 
 impl Plan {
@@ -53,16 +67,22 @@ impl Plan {
             variant: variant.into(),
             settings,
             trials,
+            timed: experiment == Kind::Trade,
         });
     }
 }
 
-/// What these experiments need with `standard` settings. `bits` restricts lengths, where given.
+/// What these experiments need with `standard` settings. `bits` restricts lengths, where given; `trade` and `security` are
+/// of any length, and of 32 bits without.
 ///
 /// # Errors
 /// None but a suite of attacks that cannot be read, which the tests rule out.
-pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize]) -> Result<Plan> {
+pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &Trade) -> Result<Plan> {
     let mut plan = Plan::default();
+    let free: &[usize] = if bits.is_empty() { &[BITS] } else { bits };
+    if experiments.contains(&Kind::Security) {
+        plan.judged = free.to_vec();
+    }
     for &kind in experiments {
         let mut add = |bits_of: usize, variant: &str, settings: Settings, trials: &[&str]| -> Result<()> {
             if bits.is_empty() || bits.contains(&bits_of) {
@@ -126,8 +146,20 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize]) -> Result
                 let trials: Vec<&str> = trials.iter().map(String::as_str).collect();
                 add(BITS, names::STANDARD, *standard, &trials)?;
             }
-            // Made from marks that are there; see `security`.
-            Kind::Security => add(BITS, names::STANDARD, *standard, &none)?,
+            // What detectors make of these marks comes after all of them; see `security`.
+            Kind::Security => {
+                for bits in free {
+                    add(*bits, names::STANDARD, *standard, &none)?;
+                }
+            }
+            Kind::Trade => {
+                for bits in free {
+                    for variant in &trade.variants {
+                        let name = format!("{}{}:{}", names::TRADE, trade.device, variant.name);
+                        add(*bits, &name, variant.settings, &none)?;
+                    }
+                }
+            }
         }
     }
     Ok(plan)
@@ -167,11 +199,25 @@ fn learning(standard: &Settings, dc: f32, rest: f32) -> Settings {
 mod tests {
     use super::*;
     use crate::embed::Preset;
+    use crate::evaluate::variants;
 
     #[test]
     fn a_mark_that_several_experiments_need_is_made_once() {
         let standard = Preset::Standard.settings();
-        let plan = plan(&Kind::ALL, &standard, &[]).unwrap();
+        let trade = Trade {
+            device: "cpu".into(),
+            variants: variants(&standard, None, &[]).unwrap(),
+        };
+        let plan = plan(&Kind::ALL, &standard, &[], &trade).unwrap();
+        assert_eq!(plan.judged, [32]);
+        let timed: Vec<&str> = plan
+            .wanted
+            .iter()
+            .filter(|w| w.timed)
+            .map(|w| w.variant.as_str())
+            .collect();
+        assert_eq!(timed.len(), trade.variants.len());
+        assert!(timed.contains(&"trade:cpu:draft") && timed.contains(&"trade:cpu:standard"));
         for (i, one) in plan.wanted.iter().enumerate() {
             one.settings.check().unwrap();
             let again = |other: &Wanted| (other.bits, &other.variant) == (one.bits, &one.variant);
@@ -196,8 +242,22 @@ mod tests {
 
     #[test]
     fn lengths_can_be_chosen() {
-        let plan = plan(&[Kind::Capacity], &Preset::Standard.settings(), &[32, 64]).unwrap();
+        let plan = plan(
+            &[Kind::Capacity],
+            &Preset::Standard.settings(),
+            &[32, 64],
+            &Trade::default(),
+        )
+        .unwrap();
         let bits: Vec<usize> = plan.wanted.iter().map(|w| w.bits).collect();
         assert_eq!(bits, [32, 64]);
+        let other = super::plan(
+            &[Kind::Security],
+            &Preset::Standard.settings(),
+            &[16],
+            &Trade::default(),
+        )
+        .unwrap();
+        assert_eq!((other.wanted.len(), other.judged), (1, vec![16]));
     }
 }

@@ -1,16 +1,19 @@
 //! Does what a plan wants and the store does not have yet.
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-use guardsplat_evaluation::report::record::{Embedding, Record, reading_id};
+use guardsplat_evaluation::report::names;
+use guardsplat_evaluation::report::record::{Embedding, Id, Record, reading_id};
 use guardsplat_evaluation::report::store::Store;
 use rand::SeedableRng;
 use rand_chacha::ChaCha20Rng;
 use sha2::{Digest, Sha256};
 
+use super::machine::Machine;
 use super::mark::{Making, path};
 use super::plan::{Plan, Wanted};
 use super::read::{Views, cameras};
+use super::security::{Judged, Marked};
 use super::trial::Trial;
 use crate::embed;
 use crate::error::{Error, Result};
@@ -40,10 +43,17 @@ pub enum Progress {
     Embedding(embed::Progress),
     /// A mark was read under an attack, with this share of bits right.
     Read(String, f64),
+    /// A mark could not be made, and the run goes on without it: why.
+    Failed(String),
+    /// A detector looked at marks of this length, with this area under its ROC curve.
+    Detected(usize, String, f64),
 }
 
 /// Carries out `plan`. `engine` makes the engine for a length and a seed, with the key, and says how long the key took if
 /// it was made now; it is called once for each pair that something is left to do for.
+///
+/// Settings under which an embedding stops giving numbers leave a gap where many settings are tried (`trade`), and are tried
+/// again by the next run.
 ///
 /// # Errors
 /// Whatever reading, embedding and writing may fail with. What was recorded before stays, and is not done again.
@@ -56,6 +66,8 @@ pub fn run(
 ) -> Result<()> {
     let total = plan.wanted.len() * options.scenes.len() * options.seeds.len();
     let mut done = 0;
+    let machine = Machine::here();
+    let mut judged: BTreeMap<usize, Vec<Marked>> = BTreeMap::new();
     // Seed by seed and length by length, so that what there is after a while is even over scenes.
     for &seed in &options.seeds {
         for wanted in &plan.wanted {
@@ -81,10 +93,38 @@ pub fn run(
                     engine,
                     key,
                     key_seconds: key_seconds.take(),
+                    machine: &machine,
                 };
-                one.carry_out(scene, &name, store, &mut progress)?;
+                let id = match one.carry_out(scene, &name, store, &mut progress) {
+                    Ok(id) => id,
+                    Err(Error::NotFinite { .. }) if wanted.timed => {
+                        progress(Progress::Failed(format!(
+                            "{name}, {}: no longer numbers",
+                            wanted.variant
+                        )));
+                        continue;
+                    }
+                    Err(e) => return Err(e),
+                };
+                if wanted.variant == names::STANDARD && plan.judged.contains(&wanted.bits) {
+                    judged.entry(wanted.bits).or_default().push(Marked {
+                        scene: scene.clone(),
+                        name,
+                        seed,
+                        id,
+                    });
+                }
             }
         }
+    }
+    for (bits, marks) in judged {
+        let Some(first) = marks.first() else { continue };
+        let seed = first.seed;
+        let judged = Judged { marks: &marks, options };
+        let engine = || engine(bits, seed).map(|(engine, ..)| engine);
+        judged.carry_out(store, engine, |detector, area| {
+            progress(Progress::Detected(bits, detector, area));
+        })?;
     }
     Ok(())
 }
@@ -109,6 +149,7 @@ struct One<'a> {
     engine: &'a Engine,
     key: &'a Key,
     key_seconds: Option<f64>,
+    machine: &'a Machine,
 }
 
 impl One<'_> {
@@ -132,13 +173,14 @@ impl One<'_> {
         })
     }
 
+    /// Makes the mark and its readings, as far as they are not there, and says which it is.
     fn carry_out(
         &self,
         path_of_scene: &Path,
         name: &str,
         store: &mut Store,
         progress: &mut impl FnMut(Progress),
-    ) -> Result<()> {
+    ) -> Result<Id> {
         let message = message(self.wanted.bits, self.seed)?;
         let embedding = self.embedding(name, &message)?;
         let id = embedding.id();
@@ -148,7 +190,7 @@ impl One<'_> {
             self.wanted.trials.iter().filter(is_left).collect()
         };
         if store.has(&id) && left(store).is_empty() {
-            return Ok(());
+            return Ok(id);
         }
         let scene = Scene::read(path_of_scene)?;
         let cameras = cameras(&scene.gaussians, views, size, self.seed)?;
@@ -166,14 +208,15 @@ impl One<'_> {
                 message: &message,
                 settings: &settings,
                 folder: store.folder(),
+                machine: self.machine,
+                timed: self.wanted.timed,
             };
             let unmarked = Views::render(self.engine, &scene.gaussians, &cameras)?;
             let key = (self.key_seconds, self.key.accuracy_unseen);
-            let start = Instant::now();
             let (mark, marked) = making.make(embedding, self.wanted.experiment.name(), key, &unmarked, &mut |p| {
                 progress(Progress::Embedding(p));
             })?;
-            tracing::debug!(seconds = start.elapsed().as_secs_f64(), "marked");
+            tracing::debug!(seconds = mark.seconds, "marked");
             // A file that was lost is made again; its mark is known.
             if !store.has(&id) {
                 store.append(Record::Mark(mark)).map_err(super::judged)?;
@@ -196,6 +239,6 @@ impl One<'_> {
             store.append(Record::Reading(record)).map_err(super::judged)?;
             progress(Progress::Read(attack, accuracy));
         }
-        Ok(())
+        Ok(id)
     }
 }

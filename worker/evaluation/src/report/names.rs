@@ -22,6 +22,13 @@ pub const LAMBDA_MSG: &str = "lambda-msg:";
 /// Variants that change the weight of the offsets' size are called this, and the weight.
 pub const LAMBDA_OFFSET: &str = "lambda-offset:";
 
+/// Variants that are timed are called this, the kind of device, a colon, and their own name, such as
+/// "trade:cpu:draft": one folder can hold those of several devices, and marks that other experiments made at other times
+/// are not among them.
+pub const TRADE: &str = "trade:";
+/// Detections of what must be found, replaced bits instead of marks, are called this and the detector.
+pub const CONTROL: &str = "control:";
+
 /// Views as they are.
 pub const NONE: &str = "none";
 /// Lowest opacity first, a quarter of the Gaussians.

@@ -1,5 +1,5 @@
 //! Records for the tests of reports.
-use super::record::{Detection, Embedding, Mark, Reading, Record};
+use super::record::{Detection, Embedding, Mark, Reading, Record, Timing};
 use super::store::Records;
 
 /// A change of a record, and the field that it is of.
@@ -36,6 +36,7 @@ pub fn mark(scene: &str, bits: u32, variant: &str, seed: u64) -> Mark {
         peak_memory_bytes: None,
         unmarked_accuracy: Some(0.53),
         difference_picture: None,
+        timing: None,
     }
 }
 
@@ -62,10 +63,12 @@ pub fn detection(marks: &[Mark]) -> Detection {
         scenes: marks.iter().map(|mark| mark.embedding.scene.clone()).collect(),
         marks: marks.iter().map(Mark::id).collect(),
         seed: 1,
+        views: None,
         clean: vec![0.1, 0.4],
         marked: vec![0.3, 0.9],
         auc: 0.75,
         auc_interval: [0.2, 0.98],
+        clusters: None,
     }
 }
 
@@ -78,4 +81,17 @@ pub fn records(all: impl IntoIterator<Item = Record>) -> Records {
         records.insert(id, record);
     }
     records
+}
+
+/// When and where a mark of that run was timed.
+pub fn timing(run: &str) -> Timing {
+    Timing {
+        processor: "a processor".into(),
+        cores: 4,
+        threads: 4,
+        run: run.into(),
+        began: run.into(),
+        load_before: Some(0.1),
+        processor_seconds: Some(100.0),
+    }
 }

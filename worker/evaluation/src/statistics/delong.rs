@@ -40,7 +40,7 @@ pub(super) fn area(positives: &[f64], negatives: &[f64], confidence: f64) -> Res
 }
 
 /// For each value the share of `others` below it, ties counted half.
-fn placements(values: &[f64], others: &[f64]) -> Vec<f64> {
+pub(super) fn placements(values: &[f64], others: &[f64]) -> Vec<f64> {
     let mut sorted = others.to_vec();
     sorted.sort_by(f64::total_cmp);
     let share = |value: &f64| {

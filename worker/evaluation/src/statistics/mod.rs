@@ -1,6 +1,7 @@
 //! What a handful of measurements allows to say: summaries, intervals, ROC curves and Pareto fronts.
 //!
 //! Every function refuses NaN and infinity with [`Error::BadOption`], and says what it makes of none or one sample.
+mod clustered;
 mod clusters;
 mod delong;
 mod interval;
@@ -9,6 +10,7 @@ mod proportion;
 mod roc;
 mod summary;
 
+pub use clustered::{Cluster, clustered_area};
 pub use clusters::{ClusterMean, bootstrap_mean, cluster_means, student_mean};
 pub use interval::Interval;
 pub use pareto::{Direction, pareto_front};

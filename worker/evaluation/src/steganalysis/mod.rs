@@ -9,7 +9,9 @@
 //! be measured with the latter.
 mod channel;
 mod chi_square;
+pub mod control;
 mod detector;
+mod judge;
 pub mod learned;
 mod primary_sets;
 mod quadratic;
@@ -22,4 +24,5 @@ mod testing;
 mod tests;
 
 pub use detector::{Detector, NoResult};
+pub use judge::{Impression, Judge, Pairs, Verdict, judge};
 pub use roc::{DetectorRoc, roc_of};

@@ -67,9 +67,7 @@ fn cut(photograph: &RgbImage) -> Vec<RgbImage> {
 
 /// LSB replacement: the last bit of a share `rate` of the samples becomes a random one.
 pub fn lsb_replacement(picture: &RgbImage, rate: f64, seed: u64) -> RgbImage {
-    change(picture, rate, seed, |sample, rng| {
-        (sample & !1) | u8::from(rng.random::<bool>())
-    })
+    super::control::replace_bits(picture, rate, seed)
 }
 
 /// LSB matching: a share `rate` of the samples gets a random last bit by adding or subtracting 1.

@@ -132,7 +132,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             };
             weights.into_iter().map(of_weight).collect()
         }
-        Kind::Elevation | Kind::Security => Vec::new(),
+        Kind::Elevation | Kind::Security | Kind::Trade => Vec::new(),
     }
 }
 

@@ -3,6 +3,7 @@ mod cases;
 mod elevation;
 mod figures;
 mod security;
+mod trade;
 
 use super::paper::ABLATION_BITS;
 use super::selection::{Pair, Selection};
@@ -36,11 +37,13 @@ pub enum Kind {
     Formats,
     /// What detectors without a key see.
     Security,
+    /// Time against success against likeness, over settings of the embedding.
+    Trade,
 }
 
 impl Kind {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Kind; 11] = [
+    pub const ALL: [Kind; 12] = [
         Kind::Capacity,
         Kind::Robustness,
         Kind::Trained,
@@ -52,6 +55,7 @@ impl Kind {
         Kind::Elevation,
         Kind::Formats,
         Kind::Security,
+        Kind::Trade,
     ];
 
     /// What it is called on a command line and between markers, such as "capacity".
@@ -68,6 +72,7 @@ impl Kind {
             Kind::Elevation => "elevation",
             Kind::Formats => "formats",
             Kind::Security => "security",
+            Kind::Trade => "trade",
         }
     }
 
@@ -90,6 +95,7 @@ impl Kind {
             Kind::Elevation => "Accuracy by elevation of the view",
             Kind::Formats => "Other formats, and back",
             Kind::Security => "What detectors without a key see",
+            Kind::Trade => "Time against success against likeness",
         }
     }
 }
@@ -180,6 +186,7 @@ pub fn report(kind: Kind, selection: &Selection<'_>, options: &Options) -> Resul
     match kind {
         Kind::Elevation => elevation::fill(&mut report, selection, options)?,
         Kind::Security => security::fill(&mut report, selection)?,
+        Kind::Trade => trade::fill(&mut report, selection)?,
         _ => {}
     }
     for section in cases::sections(kind, selection, options) {

@@ -1,10 +1,13 @@
 //! What detectors without a key see: area under the ROC curve, and the curve.
 use super::{Plot, Report};
 use crate::error::Result;
+use crate::report::names::CONTROL;
 use crate::report::plot::{Axes, Line, Point, lines};
 use crate::report::record::Detection;
 use crate::report::selection::Selection;
 use crate::report::table::{Cell, Row, Table};
+use crate::statistics::Roc;
+use crate::steganalysis::Judge;
 
 /// Corners of the ROC curve: shares of clean and of marked scores at or above each threshold, from the highest down.
 /// Equal scores share a corner, and corners in the middle of a straight step are left out.
@@ -31,12 +34,31 @@ fn roc(clean: &[f64], marked: &[f64]) -> Vec<(f64, f64)> {
     corners
 }
 
-fn row(detection: &Detection) -> Row {
+/// Share of false alarms at which the share of found marks is told.
+const FALSE_ALARMS: f64 = 0.05;
+/// Area from which on a positive control fired; not of its interval, which few scenes make wide whatever they show.
+const FIRES: f64 = 0.8;
+
+const COLUMNS: [&str; 9] = [
+    "detector",
+    "bits",
+    "scenes",
+    "marks",
+    "clean pictures",
+    "marked pictures",
+    "area under the ROC curve",
+    "interval over",
+    "found at 5 % false alarms (%)",
+];
+
+fn row(label: &str, bits: Option<u32>, detection: &Detection) -> Result<Row> {
     let mut scenes = detection.scenes.clone();
     scenes.sort();
     scenes.dedup();
-    Row::new(vec![
-        Cell::text(&detection.detector),
+    let roc = Roc::new(&detection.marked, &detection.clean, 0.95)?;
+    Ok(Row::new(vec![
+        Cell::text(label),
+        bits.map_or(Cell::NotMeasured, |bits| Cell::Count(bits.into())),
         Cell::text(scenes.join(", ")),
         Cell::Count(detection.marks.len() as u64),
         Cell::Count(detection.clean.len() as u64),
@@ -47,44 +69,112 @@ fn row(detection: &Detection) -> Row {
             decimals: 3,
             identical: 0,
         },
-    ])
+        Cell::text(match detection.clusters {
+            Some(scenes) => format!("{scenes} scenes"),
+            None => "pictures".into(),
+        }),
+        Cell::number(100.0 * roc.true_positive_rate_at(FALSE_ALARMS), 1),
+    ]))
+}
+
+/// A detection with what rows and lines are made of.
+struct Told<'a> {
+    /// The detector, without the prefix of controls.
+    name: &'a str,
+    bits: Option<u32>,
+    detection: &'a Detection,
+}
+
+/// Of each detector and length the detection of most marks, then of most pictures; in the order of [`Judge::ALL`], others
+/// after those. Controls or marks.
+fn told<'a>(selection: &Selection<'a>, controls: bool) -> Vec<Told<'a>> {
+    let mut told: Vec<Told<'a>> = Vec::new();
+    for detection in selection.detections() {
+        let name = match detection.detector.strip_prefix(CONTROL) {
+            Some(name) if controls => name,
+            None if !controls => detection.detector.as_str(),
+            _ => continue,
+        };
+        let first = detection.marks.first().and_then(|mark| selection.records().mark(mark));
+        let one = Told {
+            name,
+            bits: first.map(|mark| mark.embedding.bits),
+            detection,
+        };
+        let size = |told: &Told<'_>| (told.detection.marks.len(), told.detection.clean.len());
+        match told
+            .iter_mut()
+            .find(|other| (other.name, other.bits) == (one.name, one.bits))
+        {
+            Some(known) if size(known) >= size(&one) => {}
+            Some(known) => *known = one,
+            None => told.push(one),
+        }
+    }
+    let place = |name: &str| Judge::ALL.iter().position(|judge| judge.to_string() == name);
+    told.sort_by_key(|one| (one.bits, place(one.name).unwrap_or(usize::MAX)));
+    told
 }
 
 pub(super) fn fill(report: &mut Report, selection: &Selection<'_>) -> Result<()> {
-    let detections = selection.detections();
-    let mut rows: Vec<Row> = detections.iter().copied().map(row).collect();
-    if rows.is_empty() {
-        report.missing.push("detectors: not measured".into());
-        let mut cells = vec![Cell::text("any detector"), Cell::NotMeasured];
-        cells.extend([Cell::Count(0), Cell::Count(0), Cell::Count(0), Cell::NotMeasured]);
-        rows.push(Row::new(cells));
-    }
-    let left_out = selection.records().detections().len() - detections.len();
+    let marks = told(selection, false);
+    let controls = told(selection, true);
+    let left_out = selection.records().detections().len() - marks.len() - controls.len();
     if left_out > 0 {
         report
             .notes
-            .push(format!("{left_out} detections of other marks are left out"));
+            .push(format!("{left_out} detections of other or of fewer marks are left out"));
     }
-    let columns = [
-        "detector",
-        "scenes",
-        "marks",
-        "clean pictures",
-        "marked pictures",
-        "area under the ROC curve",
-    ];
-    report.tables.push(Table {
-        title: report.title.clone(),
-        columns: columns.map(String::from).to_vec(),
-        rows,
-        notes: vec!["An area of 0.5 is guessing; in brackets 95 % intervals.".into()],
-    });
-    let curve = |detection: &&Detection| Line {
-        name: format!("{} ({:.3})", detection.detector, detection.auc),
-        points: points(roc(&detection.clean, &detection.marked)),
+    section(report, &marks, "", report.title.clone(), AREA)?;
+    section(
+        report,
+        &controls,
+        CONTROL,
+        "Positive control: replaced bits instead of marks".into(),
+        SHOULD,
+    )?;
+    for control in controls.iter().filter(|one| one.detection.auc < FIRES) {
+        report.notes.push(format!(
+            "the control of {} did not fire ({:.3}): that it finds no marks in these pictures means nothing",
+            control.name, control.detection.auc
+        ));
+    }
+    Ok(())
+}
+
+const AREA: &str = "An area of 0.5 is guessing, 1 is certainty; in brackets 95 % intervals (Obuchowski 1997), over scenes \
+    where there are several: views of one scene are not independent. Over pictures (DeLong 1988) they are too short. The \
+    learned detector judges each scene by what it learned from pairs of all others.";
+const SHOULD: &str = "The same unmarked pictures, against themselves with the last bits of half of their samples \
+    replaced. A detector that does not fire here has nothing to say above.";
+
+/// A table and its curves.
+fn section(report: &mut Report, told: &[Told<'_>], prefix: &str, title: String, note: &str) -> Result<()> {
+    let mut rows = told
+        .iter()
+        .map(|one| row(one.name, one.bits, one.detection))
+        .collect::<Result<Vec<_>>>()?;
+    for judge in Judge::ALL.map(|judge| judge.to_string()) {
+        if told.iter().any(|one| one.name == judge) {
+            continue;
+        }
+        let why = if judge == Judge::Learned.to_string() && !told.is_empty() {
+            "; it judges scenes by others, so it needs marks of two, and eight pairs of pictures"
+        } else {
+            ""
+        };
+        report.missing.push(format!("{prefix}{judge}: not measured{why}"));
+        let mut cells = vec![Cell::text(judge), Cell::NotMeasured, Cell::Empty];
+        cells.extend([Cell::Count(0), Cell::Count(0), Cell::Count(0)]);
+        cells.extend([Cell::NotMeasured, Cell::Empty, Cell::NotMeasured]);
+        rows.push(Row::new(cells));
+    }
+    let curve = |one: &Told<'_>| Line {
+        name: format!("{} ({:.3})", one.name, one.detection.auc),
+        points: points(roc(&one.detection.clean, &one.detection.marked)),
         dots: false,
     };
-    let mut all: Vec<Line> = detections.iter().map(curve).collect();
+    let mut all: Vec<Line> = told.iter().map(curve).collect();
     all.push(Line {
         name: "guessing (0.5)".into(),
         points: points(vec![(0.0, 0.0), (1.0, 1.0)]),
@@ -96,8 +186,14 @@ pub(super) fn fill(report: &mut Report, selection: &Selection<'_>) -> Result<()>
         y: "share of marked pictures found",
     };
     report.plots.push(Plot {
-        caption: "ROC curves of detectors without a key".into(),
+        caption: format!("{title}: ROC curves"),
         svg: lines(axes, &all)?,
+    });
+    report.tables.push(Table {
+        title,
+        columns: COLUMNS.map(String::from).to_vec(),
+        rows,
+        notes: vec![note.into()],
     });
     Ok(())
 }

@@ -126,11 +126,55 @@ fn security_and_elevation() {
         .iter()
         .map(ToString::to_string)
         .collect();
-    assert_eq!(cells, ["chi-square", "lego", "1", "2", "2", "0.750 (0.200 to 0.980)"]);
-    assert!(security.missing.is_empty());
+    let expected = [
+        "chi-square",
+        "16",
+        "lego",
+        "1",
+        "2",
+        "2",
+        "0.750 (0.200 to 0.980)",
+        "pictures",
+        "50.0",
+    ];
+    assert_eq!(cells, expected);
+    // Five other detectors, and six that have no control.
+    assert_eq!(security.missing.len(), 11);
+    assert!(
+        security
+            .missing
+            .iter()
+            .any(|m| m.starts_with("learned: not measured; it judges"))
+    );
     let elevation = made(Kind::Elevation, &records);
     assert_eq!(elevation.missing.len(), 12);
     assert_eq!(elevation.tables[0].rows[0].cells[0].to_string(), "-90° to -75°");
+}
+
+#[test]
+fn security_tells_the_largest_detection_and_controls_that_do_not_fire() {
+    let marks = [mark("lego", 16, STANDARD, 1), mark("ship", 16, STANDARD, 1)];
+    let mut all: Vec<Record> = marks.iter().cloned().map(Record::Mark).collect();
+    let mut both = detection(&marks);
+    both.clusters = Some(2);
+    let mut control = both.clone();
+    control.detector = "control:chi-square".into();
+    all.extend([detection(&marks[..1]), both, control].map(Record::Detection));
+    let records = records(all);
+    let report = made(Kind::Security, &records);
+    let firsts: Vec<[String; 2]> = report
+        .tables
+        .iter()
+        .map(|table| [2, 7].map(|column| table.rows[0].cells[column].to_string()))
+        .collect();
+    assert_eq!(firsts, [["lego, ship", "2 scenes"]; 2]);
+    assert_eq!(report.missing.len(), 10);
+    let notes = report.notes.join("\n");
+    assert!(
+        notes.contains("control of chi-square did not fire") && notes.contains("1 detections of other"),
+        "{notes}"
+    );
+    assert_eq!(report.plots.len(), 2);
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod json;
 mod markdown;
 mod markers;
 mod picture;
+mod svg;
 mod whole;
 
 pub use csv::{to_csv, write_csv};
@@ -13,6 +14,7 @@ pub use html::{to_html, write_html};
 pub use json::{to_json, write_json};
 pub use markdown::{to_markdown, write_markdown};
 pub use markers::{replace_between, replace_in_file};
+pub use svg::{to_svg, write_svg};
 
 #[cfg(test)]
 mod tests;

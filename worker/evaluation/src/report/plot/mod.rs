@@ -3,10 +3,12 @@ mod bars;
 mod canvas;
 mod lines;
 mod scatter;
+mod trade;
 
 pub use bars::{Bar, bars};
 pub use lines::{Line, Point, lines};
 pub use scatter::{Dot, front, scatter};
+pub use trade::{Compromise, trade};
 
 /// What a plot's axes are called.
 #[derive(Debug, Clone, Copy)]

@@ -89,7 +89,7 @@ pub fn scatter(names: Axes<'_>, shade_name: &str, dots: &[Dot]) -> Result<String
     })
 }
 
-fn shade_legend(area: &Area<'_>, name: &str, low: f64, high: f64) -> Result<()> {
+pub(super) fn shade_legend(area: &Area<'_>, name: &str, low: f64, high: f64) -> Result<()> {
     const STEPS: i32 = 32;
     let left = WIDTH as i32 / 2;
     for step in 0..STEPS {
@@ -106,7 +106,7 @@ fn shade_legend(area: &Area<'_>, name: &str, low: f64, high: f64) -> Result<()> 
 }
 
 /// From violet over green to yellow, by lightness (viridis, without its ends that vanish on black and white).
-fn shaded(share: f64) -> RGBColor {
+pub(super) fn shaded(share: f64) -> RGBColor {
     const STOPS: [(f64, f64, f64); 4] = [
         (94.0, 60.0, 153.0),
         (49.0, 104.0, 142.0),

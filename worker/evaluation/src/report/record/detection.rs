@@ -15,6 +15,9 @@ pub struct Detection {
     pub marks: Vec<Id>,
     /// Seed of the detector and of the choice of pictures.
     pub seed: u64,
+    /// Views of each mark that were judged, if that was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub views: Option<u32>,
     /// Scores of clean pictures, at least one; a higher score says "marked".
     pub clean: Vec<f64>,
     /// Scores of marked pictures, at least one.
@@ -23,12 +26,15 @@ pub struct Detection {
     pub auc: f64,
     /// 95 % interval of the area, 0..=1.
     pub auc_interval: [f64; 2],
+    /// How many scenes the interval is over; `None` if it is over pictures, and so too short.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clusters: Option<u32>,
 }
 
 impl Detection {
     /// Its identity; the order of scenes and marks does not matter.
     pub fn id(&self) -> Id {
-        detection_id(&self.detector, &self.scenes, &self.marks, self.seed)
+        detection_id(&self.detector, &self.scenes, &self.marks, self.seed, self.views)
     }
 
     pub(super) fn check(&self) -> Result<()> {
@@ -46,6 +52,12 @@ impl Detection {
             finite("scores", *score)?;
         }
         let [low, high] = self.auc_interval;
+        if self.views == Some(0) || self.clusters.is_some_and(|clusters| clusters < 2) {
+            return bad(
+                "clusters",
+                format!("{:?} scenes, {:?} views", self.clusters, self.views),
+            );
+        }
         share("auc", self.auc)?;
         share("auc_interval", low)?;
         share("auc_interval", high)?;
@@ -57,17 +69,20 @@ impl Detection {
 }
 
 /// The identity of a detection; known before it is made.
-pub fn detection_id(detector: &str, scenes: &[String], marks: &[Id], seed: u64) -> Id {
+pub fn detection_id(detector: &str, scenes: &[String], marks: &[Id], seed: u64, views: Option<u32>) -> Id {
     let mut scenes: Vec<&str> = scenes.iter().map(String::as_str).collect();
     let mut marks: Vec<&str> = marks.iter().map(Id::as_str).collect();
     scenes.sort_unstable();
     marks.sort_unstable();
-    Identity::of("detection")
+    let identity = Identity::of("detection")
         .text(detector)
         .texts(scenes.into_iter())
         .texts(marks.into_iter())
-        .number(seed)
-        .id()
+        .number(seed);
+    match views {
+        Some(views) => identity.number(views.into()).id(),
+        None => identity.id(),
+    }
 }
 
 #[cfg(test)]
@@ -85,16 +100,20 @@ mod tests {
         assert_eq!(first.id(), other.id());
         other.seed += 1;
         assert_ne!(first.id(), other.id());
+        let mut more = first.clone();
+        more.views = Some(20);
+        assert_ne!(first.id(), more.id());
     }
 
     #[test]
     fn impossible_detections_are_refused() {
         let marks = [mark("lego", 16, "standard", 1)];
         detection(&marks).check().unwrap();
-        let changes: [Change<Detection>; 5] = [
+        let changes: [Change<Detection>; 6] = [
             ("marks", |d| d.marks.clear()),
             ("clean", |d| d.clean.clear()),
             ("scores", |d| d.marked.push(f64::INFINITY)),
+            ("clusters", |d| d.clusters = Some(1)),
             ("auc", |d| d.auc = 1.5),
             ("auc_interval", |d| d.auc_interval = [0.9, 0.1]),
         ];

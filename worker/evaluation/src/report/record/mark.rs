@@ -1,6 +1,7 @@
 //! One embedding: what was asked for, and how it went.
 use super::check::{amount, bad, finite, maybe, named, share};
 use super::id::{Id, Identity};
+use super::timing::Timing;
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path, PathBuf};
@@ -112,6 +113,9 @@ pub struct Mark {
     pub unmarked_accuracy: Option<f64>,
     /// A PNG that shows what the mark changed; relative to the folder of the store.
     pub difference_picture: Option<PathBuf>,
+    /// Where and when the seconds were measured, if that was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<Timing>,
 }
 
 impl Mark {
@@ -132,6 +136,9 @@ impl Mark {
         maybe("key_seconds", self.key_seconds, amount)?;
         maybe("decoder_accuracy", self.decoder_accuracy, share)?;
         maybe("unmarked_accuracy", self.unmarked_accuracy, share)?;
+        if let Some(timing) = &self.timing {
+            timing.check()?;
+        }
         if let Some(path) = &self.difference_picture
             && !is_inside(path)
         {

@@ -6,11 +6,13 @@ mod detection;
 mod id;
 mod mark;
 mod reading;
+mod timing;
 
 pub use detection::{Detection, detection_id};
 pub use id::Id;
 pub use mark::{Embedding, Mark};
 pub use reading::{Reading, reading_id};
+pub use timing::Timing;
 
 use crate::error::Result;
 use serde::{Deserialize, Serialize};

@@ -37,18 +37,7 @@ pub struct Classifier {
 /// # Errors
 /// Lists or pairs of different sizes, fewer pairs than [`MIN_PAIRS`], or a picture smaller than [`MIN_SIDE`].
 pub fn train(clean: &[RgbImage], marked: &[RgbImage], seed: u64) -> Result<Classifier> {
-    if clean.len() != marked.len() {
-        return Err(bad(
-            "marked",
-            format!("{} pictures for {} clean ones", marked.len(), clean.len()),
-        ));
-    }
-    if clean.len() < MIN_PAIRS {
-        return Err(bad(
-            "clean",
-            format!("{} pairs are fewer than {MIN_PAIRS}", clean.len()),
-        ));
-    }
+    check_pairs(clean.len(), marked.len())?;
     for (row, (clean, marked)) in clean.iter().zip(marked).enumerate() {
         if clean.dimensions() != marked.dimensions() {
             let (sizes, others) = (marked.dimensions(), clean.dimensions());
@@ -71,12 +60,50 @@ pub fn train(clean: &[RgbImage], marked: &[RgbImage], seed: u64) -> Result<Class
     })
 }
 
+/// What is looked at of a picture: all that training and judging need of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features(Vec<f64>);
+
+impl Features {
+    /// Of a picture; those of one smaller than [`MIN_SIDE`] are of little use.
+    pub fn of(picture: &RgbImage) -> Self {
+        Self(features::of(picture))
+    }
+}
+
+/// As [`train`], from features: for those who train several times on the same pictures.
+///
+/// # Errors
+/// Lists of different sizes, or fewer pairs than [`MIN_PAIRS`].
+pub fn train_on(clean: &[&Features], marked: &[&Features], seed: u64) -> Result<Classifier> {
+    check_pairs(clean.len(), marked.len())?;
+    let rows = |all: &[&Features]| -> Vec<Vec<f64>> { all.iter().map(|one| one.0.clone()).collect() };
+    Ok(Classifier {
+        ensemble: Ensemble::train(&rows(clean), &rows(marked), seed),
+    })
+}
+
+fn check_pairs(clean: usize, marked: usize) -> Result<()> {
+    if clean != marked {
+        return Err(bad("marked", format!("{marked} pictures for {clean} clean ones")));
+    }
+    if clean < MIN_PAIRS {
+        return Err(bad("clean", format!("{clean} pairs are fewer than {MIN_PAIRS}")));
+    }
+    Ok(())
+}
+
 impl Classifier {
     /// How much a picture looks marked: above 0 like those that were, below like those that were not, in standard
     /// deviations of a single discriminant. Finite for every picture; one of fewer than four pixels a side has nothing
     /// to count, and gets what a picture without any neighbours would.
     pub fn score(&self, picture: &RgbImage) -> f64 {
         self.ensemble.score(&features::of(picture))
+    }
+
+    /// [`score`](Self::score) of the picture that these are the features of.
+    pub fn score_of(&self, features: &Features) -> f64 {
+        self.ensemble.score(&features.0)
     }
 
     /// Of several pictures, in their order.
