@@ -8,8 +8,8 @@ use guardsplat_proto::v1::key_service_server::KeyService;
 use guardsplat_proto::v1::{
     Artifact, CancelJobRequest, CreateJobRequest, DeleteArtifactRequest, DownloadArtifactRequest,
     DownloadArtifactResponse, GetArtifactRequest, GetJobRequest, GetKeyRequest, Job, Key, ListJobsRequest,
-    ListJobsResponse, ListKeysRequest, ListKeysResponse, UploadArtifactRequest, WatchJobRequest, WatchJobResponse,
-    download_artifact_response, upload_artifact_request,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest,
+    WatchJobResponse, download_artifact_response, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -245,5 +245,9 @@ impl KeyService for Fake {
             keys: keys[from..to].to_vec(),
             next_page_token: if to < keys.len() { to.to_string() } else { String::new() },
         }))
+    }
+
+    async fn update_key_state(&self, _: Request<UpdateKeyStateRequest>) -> Result<Response<Key>, Status> {
+        Err(Status::unimplemented("no test changes a key's state"))
     }
 }
