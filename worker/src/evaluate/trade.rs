@@ -26,13 +26,22 @@ const CHANGES: [(&str, &str); 17] = [
     ("size-224", r#"{"size": 224}"#),
     ("half-weights", r#"{"half_weights": true}"#),
     (
-        "descent",
-        r#"{"descent": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 0.05, "momentum": 0.8}}"#,
+        "adam",
+        r#"{"descent": null, "lambda": {"l1": 0.8, "l2": 0, "ssim": 0.2}}"#,
     ),
-    ("rate-flat", r#"{"adam": {"final_rate": 1}}"#),
-    ("rate-to-0", r#"{"adam": {"final_rate": 0}}"#),
-    // Settings have no such field yet: until they do, this is left out.
-    ("distorted", r#"{"robust_to": "all"}"#),
+    (
+        "rate-flat",
+        r#"{"descent": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 1, "momentum": 0.8}}"#,
+    ),
+    (
+        "rate-to-0",
+        r#"{"descent": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 0, "momentum": 0.8}}"#,
+    ),
+    (
+        "distorted",
+        r#"{"robust_to": ["crop", "scaling", "rotation", "brightness", "contrast", "jpeg", "noise", "blur", "mask",
+            "8bit", "combined", "sh-noise", "sh-truncation", "spz", "sog", "pruning"]}"#,
+    ),
 ];
 
 /// Settings with a name.
@@ -178,6 +187,7 @@ fn bad(reason: String) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use guardsplat_distortion::RobustTo;
 
     fn names(variants: &[Variant]) -> Vec<&str> {
         variants.iter().map(|one| one.name.as_str()).collect()
@@ -200,10 +210,9 @@ mod tests {
                 one.name
             );
         }
-        // Left out until settings have the field, and then no longer.
-        let field = serde_json::to_value(base).unwrap().get("robust_to").is_some();
-        assert_eq!(names(&all).contains(&"distorted"), field);
-        assert_eq!(all.len(), 3 + CHANGES.len() - usize::from(!field));
+        assert_eq!(all.len(), 3 + CHANGES.len());
+        let distorted = all.iter().find(|one| one.name == "distorted").unwrap();
+        assert_eq!(distorted.settings.robust_to, RobustTo::all());
     }
 
     #[test]
