@@ -1,22 +1,23 @@
 //! The page of reports: well-formed, nothing but text from texts, and all that a reader needs.
 #[path = "../examples/samples/mod.rs"]
 mod samples;
+mod tree;
 
 use guardsplat_evidence::{Evidence, Reason, sign};
-use scraper::{ElementRef, Html, Selector};
+use tree::{Element, Page};
 
-fn page(evidence: &Evidence) -> (String, Html) {
+fn page(evidence: &Evidence) -> (String, Page) {
     let html = sign(evidence, &samples::key()).unwrap().html;
-    let page = Html::parse_document(&html);
+    let page = Page::parse(&html);
     (html, page)
 }
 
-fn all<'a>(page: &'a Html, selector: &str) -> Vec<ElementRef<'a>> {
-    page.select(&Selector::parse(selector).unwrap()).collect()
+fn all<'a>(page: &'a Page, selector: &str) -> Vec<Element<'a>> {
+    page.select(selector)
 }
 
-fn text(page: &Html, selector: &str) -> String {
-    let texts = all(page, selector).into_iter().flat_map(|e| e.text());
+fn text(page: &Page, selector: &str) -> String {
+    let texts = all(page, selector).into_iter().map(|e| e.text());
     texts
         .collect::<String>()
         .split_whitespace()
@@ -34,27 +35,24 @@ fn every_page_is_well_formed_and_accessible() {
         assert_eq!(all(&page, "main").len(), 1, "{name}");
         let mut level = 1;
         for heading in all(&page, "h1, h2, h3, h4") {
-            let next: u32 = heading.value().name()[1..].parse().unwrap();
+            let next: u32 = heading.name()[1..].parse().unwrap();
             assert!(next <= level + 1, "{name}: h{next} after h{level}");
             level = next;
         }
         for table in all(&page, "table") {
-            assert!(
-                table.select(&Selector::parse("caption").unwrap()).next().is_some(),
-                "{name}"
-            );
+            assert!(!table.select("caption").is_empty(), "{name}");
         }
         for cell in all(&page, "th") {
-            assert!(cell.value().attr("scope").is_some(), "{name}");
+            assert!(cell.attr("scope").is_some(), "{name}");
         }
         for picture in all(&page, "img") {
-            assert!(picture.value().attr("alt").is_some_and(|alt| alt.len() > 10), "{name}");
+            assert!(picture.attr("alt").is_some_and(|alt| alt.len() > 10), "{name}");
         }
         for svg in all(&page, "svg") {
-            let hidden = svg.value().attr("aria-hidden") == Some("true");
-            assert!(hidden || svg.value().attr("aria-labelledby").is_some(), "{name}");
+            let hidden = svg.attr("aria-hidden") == Some("true");
+            assert!(hidden || svg.attr("aria-labelledby").is_some(), "{name}");
         }
-        let mut ids: Vec<_> = all(&page, "[id]").iter().map(|e| e.value().id().unwrap()).collect();
+        let mut ids: Vec<_> = all(&page, "[id]").iter().map(|e| e.attr("id").unwrap()).collect();
         let count = ids.len();
         ids.sort_unstable();
         ids.dedup();
@@ -66,7 +64,7 @@ fn every_page_is_well_formed_and_accessible() {
 fn nothing_comes_from_outside_and_nothing_runs() {
     for (name, evidence) in samples::all() {
         let (_, page) = page(&evidence);
-        for element in page.tree.values().filter_map(|node| node.as_element()) {
+        for element in page.elements() {
             let tag = element.name();
             assert!(
                 !["iframe", "object", "embed", "link", "form", "base", "a"].contains(&tag),
@@ -86,9 +84,8 @@ fn nothing_comes_from_outside_and_nothing_runs() {
         }
         let scripts = all(&page, "script");
         assert_eq!(scripts.len(), 1, "{name}");
-        assert_eq!(scripts[0].value().attr("type"), Some("application/json"), "{name}");
+        assert_eq!(scripts[0].attr("type"), Some("application/json"), "{name}");
         let policy = all(&page, "meta[http-equiv='Content-Security-Policy']")[0]
-            .value()
             .attr("content")
             .unwrap();
         assert!(
@@ -205,9 +202,55 @@ fn each_verdict_says_what_it_is_and_what_it_is_not() {
 fn a_page_without_signature_or_pictures_says_so() {
     let evidence = samples::matching();
     let bare = Evidence::from_json(evidence.to_json().unwrap().as_bytes()).unwrap();
-    let page = Html::parse_document(&bare.to_html().unwrap());
+    let page = Page::parse(&bare.to_html().unwrap());
     assert!(page.errors.is_empty());
     assert!(text(&page, "main").contains("Nobody signed this report"));
     assert!(all(&page, "img").is_empty());
     assert!(text(&page, "figcaption").contains("not part of this page"));
+}
+
+#[test]
+fn the_tree_of_these_tests_reads_pages_as_browsers_do() {
+    let page = Page::parse(
+        "<!DOCTYPE html><title>t</title><h2 id=a>One<!-- no --> &lt;</h2>\
+         <div class='x y'><p id=b data-k='v'>two<b id=c>three</b></p></div><p id=d>four</p>",
+    );
+    assert!(page.errors.is_empty(), "{:?}", page.errors);
+    let ids = |selector: &str| {
+        let found = page.select(selector);
+        found.iter().filter_map(|e| e.attr("id")).collect::<String>()
+    };
+    for (selector, found) in [
+        ("*", "abcd"),
+        ("p", "bd"),
+        ("b, h2", "ac"),
+        ("[id]", "abcd"),
+        ("[data-k='v']", "b"),
+        ("[data-k='w']", ""),
+        (".x *", "bc"),
+        ("div.y.x > *", "b"),
+        ("div.z > *", ""),
+        ("body b", "c"),
+        ("body > b", ""),
+        ("h2 ~ p", "d"),
+        ("p ~ h2", ""),
+        ("h2 ~ div > p b", "c"),
+    ] {
+        assert_eq!(ids(selector), found, "{selector}");
+    }
+    assert_eq!(text(&page, "body"), "One <twothreefour");
+    assert_eq!(page.select("div")[0].select("p, h2").len(), 1);
+    // Text among a table's rows goes in front of the table; that and the end tag of nothing are told.
+    let bad = Page::parse("<!DOCTYPE html><table>a<tr><td>c</table></i>");
+    assert_eq!(text(&bad, "body"), "ac");
+    assert!(bad.errors.len() >= 2, "{:?}", bad.errors);
+    assert!(!Page::parse("<p>no doctype").errors.is_empty());
+    for unknown in [
+        "", "p >", "> p", "p > ~ b", "p:hover", "p>b", "p + b", "#a", "[a=v]", "..a",
+    ] {
+        assert!(
+            std::panic::catch_unwind(|| Page::parse("").select(unknown).len()).is_err(),
+            "{unknown}"
+        );
+    }
 }
