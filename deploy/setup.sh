@@ -44,6 +44,8 @@ setup_tests() {
     command -v npm >/dev/null || missing+=(npm)
     command -v c++ >/dev/null || missing+=(g++)
     type -P kill >/dev/null || missing+=(procps)
+    # Pages of evidence are looked at in a browser.
+    type -P chromium >/dev/null || missing+=(chromium)
     # The interpreter may be there without what makes an environment of its own.
     python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
     if [ "${#missing[@]}" -gt 0 ] && ! install_packages "${missing[@]}"; then
