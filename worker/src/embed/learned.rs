@@ -78,10 +78,16 @@ impl Learned {
         colours
     }
 
-    /// Gaussians that the written file shows in other colours than before.
-    pub fn changed(&self) -> usize {
-        let slots = self.changes().values.chunks_exact(self.learnable.columns());
-        slots.filter(|slot| slot.iter().any(|v| *v != 0.0)).count()
+    /// Gaussians that the written file shows in other colours than before. A change that is lost in the rounding of a
+    /// much larger coefficient is none.
+    pub fn changed(&self, original: &Sh) -> usize {
+        let (columns, stride) = (self.learnable.columns(), original.per_gaussian());
+        let slots = self.changes().values.chunks_exact(columns).zip(self.learnable.rows());
+        let differs = |(values, row): &(&[f32], &u32)| {
+            let coefficients = &original.coefficients[**row as usize * stride..];
+            values.iter().zip(coefficients).any(|(v, c)| c + v != *c)
+        };
+        slots.filter(differs).count()
     }
 }
 
@@ -104,7 +110,11 @@ mod tests {
             .collect();
         assert_eq!(different, [12]);
         assert_eq!(colours.coefficients[12], original.coefficients[12] + 0.5);
-        assert_eq!(learned.changed(), 1);
+        assert_eq!(learned.changed(original), 1);
+        // Lost beside a coefficient of usual size.
+        learned.values[3] = original.coefficients[36].abs() * 1e-9;
+        assert!(learned.values[3] > 0.0);
+        assert_eq!(learned.changed(original), 1);
         assert_eq!(learned.changes().values, learned.values);
     }
 }

@@ -115,7 +115,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         memory,
         seen: optimised.learned.learnable.rows().len(),
         covering_views: optimised.covering_views,
-        changed: optimised.learned.changed(),
+        changed: optimised.learned.changed(&scene.gaussians.sh),
     })
 }
 

@@ -62,7 +62,7 @@ fn failed(server: &Server) -> (Reason, bool, String) {
 
 fn completed(server: &Server) -> Done {
     match server.next(&mut Vec::new()) {
-        Event::Completed(done) => done,
+        Event::Completed(done) => *done,
         other => panic!("{other:?}"),
     }
 }
@@ -96,7 +96,10 @@ fn jobs_give_what_the_offline_commands_give() {
     server.break_download();
     server.submit(Spec::Embed(embed(&scene)));
     let mut progress = Vec::new();
-    let Event::Completed(Done::EmbedResult(marked)) = server.next(&mut progress) else {
+    let Event::Completed(done) = server.next(&mut progress) else {
+        panic!("{}", worker.log())
+    };
+    let Done::EmbedResult(marked) = *done else {
         panic!("{}", worker.log())
     };
     assert!(

@@ -21,7 +21,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 #[derive(Clone, Debug)]
 pub enum Event {
     Reported(Progress),
-    Completed(Done),
+    Completed(Box<Done>),
     Failed(FailJobRequest),
     Released,
 }
@@ -320,7 +320,7 @@ impl WorkerService for Service {
     ) -> Result<Response<CompleteJobResponse>, Status> {
         let request = request.into_inner();
         self.0.check(&request.name, &request.lease_token)?;
-        self.0.say(Event::Completed(request.result.unwrap()));
+        self.0.say(Event::Completed(Box::new(request.result.unwrap())));
         Ok(Response::new(Default::default()))
     }
 

@@ -85,7 +85,8 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
     assert_eq!(ledger.get_owner(made.id).await.unwrap(), Some(expected));
     let key = make_key(&*ledger, at(0)).await.1.id;
     assert_eq!(ledger.head().await.unwrap(), None);
-    let artifact = Some(upload(&*ledger, at(1)).await);
+    let upload = upload(&*ledger, at(1)).await;
+    let artifact = Some(upload);
     let new = NewAsset {
         artifact,
         ..new_asset(made.id, key)
@@ -119,7 +120,7 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
     assert_eq!((said.sha256, said.nonce_hash), ([3; 32], [4; 32]));
     assert_eq!(chain(&*ledger).await, [signed]);
     // The artifact may go: the hash was taken.
-    ledger.delete_artifact(artifact.unwrap(), at(3)).await.unwrap();
+    ledger.delete_artifact(upload, at(3)).await.unwrap();
     for nowhere in [made.id, key] {
         assert_eq!(ledger.get_asset(nowhere).await.unwrap(), None);
         assert_eq!(ledger.get_commitment(nowhere).await.unwrap(), None);
@@ -128,7 +129,8 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
 
 pub(crate) async fn the_same_request_registers_once(factory: &dyn Factory) {
     let ledger = factory.open().await;
-    let request_id = Some(Uuid::new_v4());
+    let request = Uuid::new_v4();
+    let request_id = Some(request);
     let owner = |display_name: &str| NewOwner {
         request_id,
         display_name: display_name.into(),
@@ -143,12 +145,9 @@ pub(crate) async fn the_same_request_registers_once(factory: &dyn Factory) {
         request_id,
         ..new_asset(first.id, key)
     };
-    assert_eq!(ledger.find_asset_request(request_id.unwrap()).await.unwrap(), None);
+    assert_eq!(ledger.find_asset_request(request).await.unwrap(), None);
     let made = register(&*ledger, asset(), at(2)).await;
-    assert_eq!(
-        ledger.find_asset_request(request_id.unwrap()).await.unwrap(),
-        Some(made.clone())
-    );
+    assert_eq!(ledger.find_asset_request(request).await.unwrap(), Some(made.clone()));
     assert_eq!(register(&*ledger, asset(), at(3)).await, made);
     let others: [fn(&mut NewAsset); 4] = [
         |new| new.sha256[31] ^= 1,
