@@ -196,6 +196,10 @@ fn what_does_not_fit_the_key_is_refused() {
             embed("--key k.key --message c0ffee42 --preset best"),
             &["best", "draft, standard or paper"],
         ),
+        (
+            embed("--key k.key --message c0ffee42 --robust-to jpeg,magic"),
+            &["--robust-to", "magic", "crop, scaling"],
+        ),
         (embed("--key k.key --message c0ffee42 --device cuda"), &["--device"]),
         (embed("--key k.key --message c0ffee42 --size 8"), &["size", "16"]),
         (

@@ -205,6 +205,29 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
 }
 
 #[test]
+fn what_a_mark_is_to_stand_changes_its_training_and_nothing_else() {
+    let ((folder, input), engine) = (scene_file(), engine());
+    let at = |name: &str| folder.path().join(name);
+    let robust_to = |list: &str| Settings {
+        robust_to: list.parse().unwrap(),
+        ..settings()
+    };
+    let run = |name: &str, list: &str| {
+        let outcome = run(&engine, &input, &at(name), &robust_to(list), false).unwrap();
+        assert!(outcome.changed > 100, "{list}");
+        std::fs::read(at(name)).unwrap()
+    };
+    let plain = run("none.ply", "none");
+    assert!(plain == run("again.ply", "none"));
+    // Of pictures, of scenes, and both.
+    let lists = ["jpeg,rotation,noise,crop", "sh-truncation,pruning,sh-noise,spz", "all"];
+    for list in lists {
+        let robust = run("robust.ply", list);
+        assert!(robust != plain && robust == run("again.ply", list), "{list}");
+    }
+}
+
+#[test]
 fn gaussians_that_no_view_sees_keep_their_colours() {
     let (engine, mut scene) = (engine(), small_scene());
     for row in [0, 17, 599] {
