@@ -248,7 +248,7 @@ impl Preset {
                     ..stop
                 }),
                 target: Target {
-                    bit_accuracy: 0.95,
+                    bit_accuracy: 0.9,
                     psnr_db: 37.0,
                     message: true,
                 },
