@@ -226,7 +226,7 @@ impl Preset {
                 message_views: 5,
             },
             target: Target {
-                bit_accuracy: 0.98,
+                bit_accuracy: 0.95,
                 psnr_db: 39.0,
                 message: true,
             },
