@@ -17,8 +17,8 @@ const PRUNED: f32 = 0.25;
 /// Standard deviations that rounding to 8 bits (constant coefficients, over 1 / 0.15 of their unit) and to 5 and 4 bits
 /// (all others, over two units) leaves in SPZ: a step over the root of 12.
 const SPZ: [f32; 2] = [1.0 / (255.0 * 0.15) / 3.464, 0.018];
-/// As of SPZ, for SOG: 256 levels for constant coefficients, and a palette for the others. Measured on pod and playbot
-/// to lie near this; a palette fits smooth scenes better.
+/// As of SPZ, for SOG: 256 levels for constant coefficients, and a palette for the others. Of the size of SPZ's; how far a
+/// palette is off depends on the scene, and was not measured.
 const SOG: [f32; 2] = [0.005, 0.03];
 /// The square of the constant spherical harmonic: with (n + 1)^2 of these, the mean square of all up to degree n.
 const MEAN_SQUARE: f32 = 0.079_577_47;

@@ -15,7 +15,7 @@ use crate::picture::Picture;
 use crate::quality::{Ssim, batch, unbatch};
 
 /// What rotated pictures show in their corners.
-const CORNERS: [f32; 3] = [1.0; 3];
+pub(super) const CORNERS: [f32; 3] = [1.0; 3];
 
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {

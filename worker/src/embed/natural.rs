@@ -4,6 +4,7 @@ use guardsplat_distortion::{Layer, RobustTo};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::loss::CORNERS;
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
@@ -22,8 +23,6 @@ const SCENES: u64 = 16;
 const VIEWS: u64 = 8;
 /// Gaussians of a scene; enough for views without holes.
 const GAUSSIANS: usize = 20_000;
-/// What rotated pictures show in their corners.
-const GROUND: [f32; 3] = [1.0; 3];
 /// The seed of the first scene; users begin at 0, and their own sample scene should not be among these.
 const FIRST_SEED: u64 = 0x6e61_7475_7265;
 
@@ -93,7 +92,7 @@ pub fn features(
         };
         extend(pictures.clone())?;
         if distorted {
-            extend(layer.apply(pictures, GROUND, &mut rng))?;
+            extend(layer.apply(pictures, CORNERS, &mut rng))?;
         }
         read_pictures += waiting.len();
         waiting.clear();
