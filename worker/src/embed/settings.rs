@@ -1,4 +1,4 @@
-//! Every number of an embedding, and the presets that choose them.
+//! Every number of an embedding.
 use guardsplat_distortion::{Layer, Ranges, RobustTo};
 use serde::{Deserialize, Serialize};
 
@@ -132,161 +132,6 @@ pub struct Settings {
     pub target: Target,
 }
 
-/// A named choice of all settings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Preset {
-    /// Half a minute on two CPU cores; a weaker mark.
-    Draft,
-    /// What the figures in the documentation were made with.
-    #[default]
-    Standard,
-    /// Steps, views, sizes and weights as the GuardSplat paper has them.
-    Paper,
-}
-
-impl std::str::FromStr for Preset {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "draft" => Ok(Self::Draft),
-            "standard" => Ok(Self::Standard),
-            "paper" => Ok(Self::Paper),
-            other => Err(Error::BadOption {
-                field: "preset",
-                reason: format!("{other:?} is not a preset, must be draft, standard or paper"),
-            }),
-        }
-    }
-}
-
-impl Preset {
-    /// What it is called.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Draft => "draft",
-            Self::Standard => "standard",
-            Self::Paper => "paper",
-        }
-    }
-
-    /// The table of presets.
-    pub fn settings(self) -> Settings {
-        let standard = Settings {
-            seed: 0,
-            steps: 240,
-            views_per_step: 8,
-            fresh_per_step: 4,
-            views: None,
-            pool_views: 150,
-            pool_mebibytes: 1024,
-            half_weights: false,
-            size: 160,
-            enlarged: 3.0,
-            black_backgrounds: 0.1,
-            lambda: Lambdas {
-                reconstruction: 1.0,
-                l1: 0.0,
-                l2: 33.0,
-                ssim: 0.0,
-                lpips: 0.0,
-                message: 0.05,
-                temperature: 8.0,
-                // The balance below holds the PSNR; a penalty besides would keep marks of large scenes from being made.
-                offset_dc: 0.0,
-                offset_rest: 0.0,
-            },
-            adam: AdamOptions {
-                rate_dc: 0.014,
-                rate_rest: 0.0012,
-                final_rate: 0.1,
-                sparse: true,
-                ..AdamOptions::default()
-            },
-            descent: Some(DescentOptions::default()),
-            balance: Some(Balance {
-                target_psnr_db: 40.4,
-                ..Balance::default()
-            }),
-            augmentation: Augmentation::default(),
-            robust_to: RobustTo::none(),
-            distortions: Ranges::default(),
-            early_stop: Some(EarlyStop {
-                every: 25,
-                views: 8,
-                min_steps: 100,
-                bit_accuracy: 0.998,
-                margin: 8.0,
-                psnr_db: 40.1,
-                patience: 2,
-            }),
-            verify: Verify {
-                views: 20,
-                size: None,
-                message_views: 5,
-            },
-            target: Target {
-                bit_accuracy: 0.95,
-                psnr_db: 39.0,
-                message: true,
-            },
-        };
-        match self {
-            Self::Standard => standard,
-            Self::Draft => Settings {
-                steps: 80,
-                pool_views: 100,
-                balance: Some(Balance {
-                    target_psnr_db: 39.4,
-                    ..Balance::default()
-                }),
-                early_stop: standard.early_stop.map(|stop| EarlyStop {
-                    min_steps: 50,
-                    bit_accuracy: 0.99,
-                    margin: 4.0,
-                    psnr_db: 38.5,
-                    ..stop
-                }),
-                target: Target {
-                    bit_accuracy: 0.9,
-                    psnr_db: 37.0,
-                    message: true,
-                },
-                ..standard
-            },
-            Self::Paper => Settings {
-                steps: 1300,
-                views_per_step: 16,
-                fresh_per_step: 16,
-                size: 224,
-                enlarged: 1.0,
-                black_backgrounds: 0.0,
-                lambda: Lambdas {
-                    l1: 0.8,
-                    l2: 0.0,
-                    ssim: 0.2,
-                    lpips: 1.0,
-                    message: 0.03,
-                    temperature: 1.0,
-                    offset_dc: 10.0,
-                    offset_rest: 10.0,
-                    ..standard.lambda
-                },
-                adam: AdamOptions::default(),
-                descent: None,
-                balance: None,
-                augmentation: Augmentation {
-                    brightness: 0.0,
-                    scale: 0.0,
-                    shift: 0.0,
-                },
-                early_stop: None,
-                ..standard
-            },
-        }
-    }
-}
-
 impl Settings {
     /// These settings with the fields of a JSON object in place of their own; for experiments.
     ///
@@ -400,6 +245,7 @@ fn merge(base: &mut serde_json::Value, changes: serde_json::Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::embed::Preset;
 
     #[test]
     fn presets_are_valid_and_grow() {
