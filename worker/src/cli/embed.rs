@@ -44,8 +44,7 @@ pub struct Arguments {
     #[command(flatten)]
     budget: Budget,
     /// What the mark is trained to stand, names with commas, all or none: crop, scaling, rotation, brightness, contrast,
-    /// jpeg, noise, blur, mask, 8bit, combined; sh-noise, sh-truncation, spz, sog, pruning. The key should be made for
-    /// the same
+    /// jpeg, noise, blur, mask, 8bit, combined; sh-noise, sh-truncation, spz, sog, pruning. sh-truncation unless given
     #[arg(long, value_name = "LIST")]
     robust_to: Option<RobustTo>,
     /// Side of training views and of those of the verification, in pixels

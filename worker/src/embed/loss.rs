@@ -3,25 +3,22 @@
 //! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
 //! of a step.
 use burn::tensor::{Tensor, TensorData};
-use guardsplat_distortion::Layer;
 use rand_chacha::ChaCha8Rng;
 
 use super::progress::Terms;
 use super::settings::Settings;
+use super::shown::Shown;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
 use crate::quality::{Ssim, batch, unbatch};
 
-/// What rotated pictures show in their corners.
-pub(super) const CORNERS: [f32; 3] = [1.0; 3];
-
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {
     engine: &'a Engine,
     settings: Settings,
-    distortions: Layer,
+    shown: Shown,
     targets: Vec<f32>,
     ssim: Ssim,
 }
@@ -42,7 +39,7 @@ impl<'a> Loss<'a> {
         Self {
             engine,
             settings: *settings,
-            distortions: settings.layer(),
+            shown: Shown::new(settings, engine),
             targets: message.targets().collect(),
             ssim: Ssim::new(side, side, &engine.compute.device),
         }
@@ -84,12 +81,7 @@ impl<'a> Loss<'a> {
             None => None,
         };
         let seen = self.settings.augmentation.apply(marked, rng);
-        let seen = if self.settings.robust_to.of_pictures().next().is_some() {
-            self.distortions.apply(seen, CORNERS, rng)
-        } else {
-            seen
-        };
-        let logits = self.engine.logits(seen);
+        let logits = self.shown.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, device);

@@ -18,6 +18,7 @@ mod pool;
 mod preset;
 mod progress;
 mod settings;
+mod shown;
 mod timing;
 mod verify;
 

@@ -4,7 +4,7 @@ use guardsplat_distortion::{Layer, RobustTo};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::loss::CORNERS;
+use super::shown::CORNERS;
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};

@@ -13,6 +13,8 @@ const GEOMETRY: u64 = 11;
 /// Pictures of a step, as large as those that CLIP sees, that differentiation keeps for each view: L1, SSIM with its
 /// five windowed means, and the augmentation. Measured: a step of 16 views takes 62 MB more than one of 8 at 160 px.
 const KEPT_PICTURES: u64 = 18;
+/// Pictures of the size at which they are distorted that differentiation keeps for each view.
+const KEPT_DISTORTED: u64 = 18;
 /// Bytes of a Gaussian while a view is prepared: projected by chunks, put together, sorted.
 const PREPARING: u64 = 150;
 
@@ -152,7 +154,12 @@ pub fn needs(scene: SceneSize, view: ViewSize, settings: &Settings, models: Mode
     let held_out = settings.early_stop.map_or(0.0, |stop| stop.views as f64) * (view.visible + pixels * view.pixel);
     let drawn = 2.0 * 12.0 * drawn_pixels(settings) * settings.views_per_step as f64;
     let picture = 12 * u64::from(settings.size).pow(2);
-    let differentiating = drawn as u64 + settings.views_per_step as u64 * KEPT_PICTURES * picture;
+    let mut kept_pictures = settings.views_per_step as u64 * KEPT_PICTURES * picture;
+    if settings.robust_to.of_pictures().next().is_some() {
+        let large = 12 * u64::from(settings.distorted_size.max(settings.size)).pow(2);
+        kept_pictures += settings.views_per_step as u64 * KEPT_DISTORTED * large;
+    }
+    let differentiating = drawn as u64 + kept_pictures;
     let preparing = threads * PREPARING * scene.gaussians;
     let optimising = Memory {
         models: models.learning,

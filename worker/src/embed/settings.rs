@@ -124,6 +124,9 @@ pub struct Settings {
     pub robust_to: RobustTo,
     /// How strong the distortions of pictures are.
     pub distortions: Ranges,
+    /// Side in pixels to which a training view is enlarged before its picture is distorted, where that is more than its
+    /// own: squares of JPEG and grains of noise are as large, against the scene, as in pictures of that side.
+    pub distorted_size: u32,
     /// When to stop before the last step.
     pub early_stop: Option<EarlyStop>,
     /// How the result is verified.
@@ -177,6 +180,7 @@ impl Settings {
         }
         count("pool_views", self.pool_views, 1_000_000)?;
         within("size", f64::from(self.size), 16.0, 4096.0)?;
+        within("distorted_size", f64::from(self.distorted_size), 16.0, 4096.0)?;
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         let l = &self.lambda;

@@ -2,6 +2,7 @@
 //!
 //! [`plan`] says what an experiment needs, [`trial`] what is done to a mark before it is read, [`run`] does what is not in
 //! the store yet, and has detectors judge marks where that is asked for. What comes of it is told by [`guardsplat_evaluation::report`].
+mod guessed;
 mod machine;
 mod mark;
 mod plan;

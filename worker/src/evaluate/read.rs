@@ -2,11 +2,13 @@
 use std::collections::BTreeMap;
 
 use guardsplat_evaluation::attack::Attack;
+use guardsplat_evaluation::report::names;
 use guardsplat_evaluation::report::record::{Id, Reading as Record};
 use image::RgbImage;
 
+use super::guessed::cross_chosen;
 use crate::error::{Error, Result};
-use crate::extract::{Engine, Reading};
+use crate::extract::{Engine, Reading, read_guesses};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{mean_psnr, psnr};
@@ -49,6 +51,8 @@ pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64)
 pub(super) struct Views {
     pub cameras: Vec<Placed>,
     pub images: Vec<RgbImage>,
+    /// Whether somebody else made pictures of them, so that their tones may have been changed.
+    pub strange: bool,
 }
 
 impl Views {
@@ -60,6 +64,7 @@ impl Views {
         Ok(Self {
             cameras: cameras.to_vec(),
             images,
+            strange: false,
         })
     }
 
@@ -67,12 +72,16 @@ impl Views {
         Ok(self.images.iter().map(to_picture).collect())
     }
 
-    /// Logits of all views.
-    pub fn read(&self, engine: &Engine) -> Result<Reading> {
+    /// Logits of all views; of pictures that somebody else made, under what is guessed to have been done to them.
+    pub fn read(&self, engine: &Engine, message: &Message) -> Result<Reading> {
         let mut logits = Vec::with_capacity(self.images.len());
         // One at a time: large pictures of all views need not be there as floats.
         for image in &self.images {
-            logits.extend(engine.read_logits(&[to_picture(image)])?);
+            let picture = to_picture(image);
+            match self.strange {
+                true => logits.push(cross_chosen(&read_guesses(engine, &picture)?, message)),
+                false => logits.extend(engine.read_logits(&[picture])?),
+            }
         }
         Reading::new(logits)
     }
@@ -86,6 +95,7 @@ impl Views {
         Ok(Self {
             cameras: self.cameras.clone(),
             images,
+            strange: attack.to_string() != names::NONE,
         })
     }
 
@@ -98,7 +108,7 @@ impl Views {
         attack: &str,
         before: &Views,
     ) -> Result<Record> {
-        let reading = self.read(engine)?;
+        let reading = self.read(engine, message)?;
         let right = reading
             .views
             .iter()

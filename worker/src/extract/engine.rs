@@ -5,13 +5,14 @@ use std::sync::OnceLock;
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
-use crate::clip::Clip;
+use crate::clip::config::VisionTower;
+use crate::clip::{Clip, resize};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::memory::Limits;
 use crate::message::{Key, Reader};
 use crate::picture::Picture;
-use crate::quality::{Lpips, batch};
+use crate::quality::{Lpips, batch, unbatch};
 use crate::scene::Gaussians;
 use crate::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
 use crate::stop::Stop;
@@ -163,6 +164,21 @@ impl Engine {
             }
         }
         Ok(rows)
+    }
+
+    /// Whether CLIP reads exact colours, as the shipped one does: then tones that were changed must be undone.
+    pub fn reads_exact_colours(&self) -> bool {
+        matches!(self.clip.config.vision.tower, VisionTower::Statistics { .. })
+    }
+
+    /// A picture at the side that CLIP takes in.
+    ///
+    /// # Errors
+    /// A picture without pixels, or a failing device.
+    pub fn resized(&self, picture: &Picture) -> Result<Picture> {
+        let side = self.clip.config.vision.image_size;
+        let pictures = resize(batch(&[picture], &self.compute.device)?, side, side);
+        Ok(unbatch(pictures)?.swap_remove(0))
     }
 
     /// Values of a tensor on the host.

@@ -3,12 +3,14 @@ mod engine;
 mod kind;
 mod pictures;
 mod reading;
+mod restore;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use reading::{Comparison, Reading};
+pub use restore::{Guess, Tone, guesses, read_guesses};
 
 use crate::error::Result;
 use crate::picture::Picture;

@@ -1,0 +1,105 @@
+//! The ground behind a scene, where a picture shows it all around: noise, compression and changed tones leave it neither
+//! black nor white any more, and then it weighs more in a reading than the scene does.
+use crate::picture::Picture;
+
+/// Distance from the ground's colour up to which a pixel is ground, and from which on it is none.
+const DISTANCE: [f32; 2] = [0.06, 0.12];
+/// Share of the border that must be ground.
+const SHARE: f32 = 0.5;
+/// A ground is black or white when it is no further off than this.
+const CLEAN: f32 = 0.002;
+
+/// The picture with its ground made white; `None` where its border is not of one colour, or is white or black already.
+pub(super) fn whitened(picture: &Picture) -> Option<Picture> {
+    let border = border(picture);
+    let colour: [f32; 3] = std::array::from_fn(|c| median(border.iter().map(|p| p[c]).collect()));
+    let distance = |pixel: &[f32; 3]| {
+        let differences = pixel.iter().zip(colour).map(|(v, c)| (v - c).abs());
+        differences.fold(0.0, f32::max)
+    };
+    let of_ground = border.iter().filter(|p| distance(p) <= DISTANCE[0]).count();
+    if border.is_empty() || (of_ground as f32) < SHARE * border.len() as f32 {
+        return None;
+    }
+    let clean = |level: f32| {
+        let off = |pixel: &[f32; 3]| pixel.iter().any(|v| (v - level).abs() > CLEAN);
+        border.iter().filter(|p| distance(p) <= DISTANCE[0]).all(|p| !off(p))
+    };
+    if clean(0.0) || clean(1.0) {
+        return None;
+    }
+    let [near, far] = DISTANCE;
+    let pixels = picture.pixels.as_chunks::<3>().0.iter().flat_map(|pixel| {
+        let scene = ((distance(pixel) - near) / (far - near)).clamp(0.0, 1.0);
+        pixel.map(|v| v * scene + 1.0 - scene)
+    });
+    Some(Picture {
+        pixels: pixels.collect(),
+        ..*picture
+    })
+}
+
+/// The outermost pixels.
+fn border(picture: &Picture) -> Vec<[f32; 3]> {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    let pixels = picture.pixels.as_chunks::<3>().0.iter().enumerate();
+    let outermost = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        x == 0 || y == 0 || x + 1 == width || y + 1 == height
+    };
+    pixels.filter(|(i, _)| outermost(*i)).map(|(_, p)| *p).collect()
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of varied colours on a ground, with waves of this height on the ground.
+    fn disc(ground: f32, waves: f32) -> Picture {
+        let side = 32;
+        let pixels = (0..side * side).flat_map(|i| {
+            let (x, y) = (i % side, i / side);
+            let inside = (x as f32 - 15.5).hypot(y as f32 - 15.5) < 10.0;
+            let wave = waves * (i as f32 * 1.7).sin();
+            match inside {
+                true => [0.5, 0.3 + 0.01 * x as f32, 0.2],
+                false => [ground + wave; 3],
+            }
+        });
+        Picture {
+            width: side,
+            height: side,
+            pixels: pixels.collect(),
+        }
+    }
+
+    #[test]
+    fn a_ground_with_noise_becomes_white_and_the_scene_stays() {
+        let clean = disc(1.0, 0.0);
+        for (ground, waves) in [(0.8, 0.0), (0.96, 0.02), (0.02, 0.02)] {
+            assert_eq!(whitened(&disc(ground, waves)).unwrap(), clean, "{ground} {waves}");
+        }
+    }
+
+    #[test]
+    fn pictures_without_a_ground_and_clean_grounds_are_left_alone() {
+        for level in [0.0, 1.0] {
+            assert_eq!(whitened(&disc(level, 0.0)), None);
+        }
+        assert_eq!(whitened(&disc(0.5, 0.4)), None);
+        let none = Picture {
+            width: 0,
+            height: 0,
+            pixels: vec![],
+        };
+        assert_eq!(whitened(&none), None);
+    }
+}

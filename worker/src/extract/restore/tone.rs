@@ -1,0 +1,120 @@
+//! What is done to the tones of pictures, and how it is undone.
+use serde::Serialize;
+
+use crate::picture::Picture;
+
+/// Weights of red, green and blue in a pixel's grey (ITU-R BT.601).
+const GREY: [f32; 3] = [0.299, 0.587, 0.114];
+
+/// Something that was done to all pixels of a picture alike.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tone {
+    /// Values were multiplied by this.
+    Brightness(f32),
+    /// Values in [0, 1] were raised to this power.
+    Gamma(f32),
+    /// The distance of values from the picture's mean grey was multiplied by this.
+    Contrast(f32),
+    /// The distance of a pixel's values from its grey was multiplied by this.
+    Saturation(f32),
+}
+
+/// Tones that are looked for, by their kind: what makes one of a factor, how far factors reach either way, and the ratio
+/// of one to the next. A mark is read when the factor is right to a twentieth.
+pub(super) const KINDS: [(fn(f32) -> Tone, f32, f32); 4] = [
+    (Tone::Brightness, 2.2, 1.07),
+    (Tone::Gamma, 2.2, 1.1),
+    (Tone::Contrast, 2.2, 1.1),
+    (Tone::Saturation, 2.0, 1.15),
+];
+
+impl Tone {
+    /// The picture before this was done to it, values cut to [0, 1]; what was cut when it was done stays cut.
+    pub(super) fn undone(self, picture: &Picture) -> Picture {
+        let pixels = match self {
+            Self::Brightness(factor) => each(picture, |v| v / factor),
+            Self::Gamma(exponent) => each(picture, |v| v.max(0.0).powf(1.0 / exponent)),
+            Self::Contrast(factor) => {
+                let greys = picture.pixels.as_chunks::<3>().0.iter().map(|p| f64::from(grey(p)));
+                let count = (picture.pixels.len() / 3).max(1);
+                let mean = (greys.sum::<f64>() / count as f64) as f32;
+                each(picture, |v| mean + (v - mean) / factor)
+            }
+            Self::Saturation(factor) => picture
+                .pixels
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .flat_map(|pixel| {
+                    let grey = grey(pixel);
+                    pixel.map(|v| (grey + (v - grey) / factor).clamp(0.0, 1.0))
+                })
+                .collect(),
+        };
+        Picture { pixels, ..*picture }
+    }
+}
+
+/// All factors of all kinds.
+pub(super) fn all() -> Vec<Tone> {
+    let mut all = Vec::new();
+    for (tone, reach, ratio) in KINDS {
+        let steps = (reach.ln() / ratio.ln()).ceil() as i32;
+        all.extend((-steps..=steps).filter(|i| *i != 0).map(|i| tone(ratio.powi(i))));
+    }
+    all
+}
+
+fn each(picture: &Picture, change: impl Fn(f32) -> f32) -> Vec<f32> {
+    picture.pixels.iter().map(|v| change(*v).clamp(0.0, 1.0)).collect()
+}
+
+fn grey(pixel: &[f32; 3]) -> f32 {
+    pixel.iter().zip(GREY).map(|(v, w)| v * w).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture() -> Picture {
+        Picture {
+            width: 4,
+            height: 2,
+            pixels: (0..24).map(|i| 0.3 + 0.4 * (i as f32 * 0.37).sin().abs()).collect(),
+        }
+    }
+
+    #[test]
+    fn what_was_done_is_undone() {
+        let before = picture();
+        for (tone, ..) in KINDS {
+            // Undoing the inverse is doing it.
+            let done = tone(1.4).undone(&before);
+            assert_ne!(done, before, "{:?}", tone(1.4));
+            let after = tone(1.0 / 1.4).undone(&done);
+            for (a, b) in after.pixels.iter().zip(&before.pixels) {
+                assert!((a - b).abs() < 1e-5, "{:?}: {a} {b}", tone(1.4));
+            }
+        }
+    }
+
+    #[test]
+    fn factors_reach_twice_and_half() {
+        for (tone, ..) in KINDS {
+            let of_kind = |t: &&Tone| std::mem::discriminant(*t) == std::mem::discriminant(&tone(1.0));
+            let all = all();
+            let found = |f: f32| all.iter().filter(of_kind).any(|t| *t == tone(f));
+            assert!(!found(1.0));
+            let (least, most) = all
+                .iter()
+                .filter(of_kind)
+                .fold((f32::MAX, 0.0_f32), |(least, most), t| {
+                    let (Tone::Brightness(f) | Tone::Gamma(f) | Tone::Contrast(f) | Tone::Saturation(f)) = t;
+                    (least.min(*f), most.max(*f))
+                });
+            assert!(least <= 0.5 && most >= 2.0, "{least} {most}");
+        }
+    }
+}
