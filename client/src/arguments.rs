@@ -20,9 +20,11 @@ pub struct Arguments {
 
 const EXAMPLE: &str = "\
 From nothing to a verdict:
-  guardsplat key create --bits 32 --display-name website
-  guardsplat embed scene.ply -o marked.ply --key website --message c0ffee42
-  guardsplat verify marked.ply --key website --message c0ffee42
+  guardsplat key create --bits 64 --display-name website
+  guardsplat owner create studio
+  guardsplat asset create scene.ply --owner studio --key website
+  guardsplat embed scene.ply -o marked.ply --key website --asset assets/ID
+  guardsplat verify suspect.ply --key website --search
 
 The configuration file may set `server` and `timeout`; flags and GUARDSPLAT_SERVER go before it.";
 
@@ -53,11 +55,12 @@ pub enum Command {
     /// Keys: secrets that messages are written and read with; they stay with the server
     #[command(subcommand)]
     Key(commands::key::Command),
-    /// Has a scene marked with a message and fetches it
+    /// Has a scene marked, with an asset's codeword or a raw message, and fetches it
     ///
     /// Exits with 3 when the mark misses what its preset promises; then nothing is written unless --force is given.
     Embed(commands::embed::Arguments),
-    /// Reads the message of a scene, or of pictures of one
+    /// Tests a claim on a scene or on pictures of one: that they carry the mark of an asset, of an owner, or of anything
+    /// that is registered; or reads a raw message
     ///
     /// Exits with 0 for a match, 2 for no match, and 3 when nothing can be decided.
     Verify(commands::verify::Arguments),
@@ -67,6 +70,15 @@ pub enum Command {
     /// Scenes and pictures that the server keeps
     #[command(subcommand)]
     Artifact(commands::artifact::Command),
+    /// Whose originals are registered
+    #[command(subcommand)]
+    Owner(commands::owner::Command),
+    /// Originals that are registered
+    #[command(subcommand)]
+    Asset(commands::asset::Command),
+    /// Signed evidence that jobs with an asset or a claim leave
+    #[command(subcommand)]
+    Report(commands::report::Command),
     /// Prints a script that completes commands and options in a shell
     Completions(commands::completions::Arguments),
 }
@@ -120,6 +132,19 @@ mod tests {
             "embed IN --key K --message 0 --no-wait --request-id 5f0c54a6-6b0d-4d6f-9a80-6a7a0b1f4f11",
             "embed IN -o OUT --key K --message 0 --cancel-on-interrupt",
             "verify A B C --key K --message 0 --views 5 --size 64 --seed 3 --ignore-bad-rows",
+            "embed IN -o OUT --key K --asset A",
+            "verify A --key K --asset A --json",
+            "verify A --key K --owner O",
+            "verify A --key K --search",
+            "owner create N",
+            "owner list",
+            "owner show O",
+            "asset create F --owner O --key K --display-name N",
+            "asset list --owner O --key K --limit 3",
+            "asset show A",
+            "report open J -o F",
+            "report check F --public-key P",
+            "report key",
             "jobs list --state queued --state running --limit 5",
             "jobs get J",
             "jobs watch J --cursor C",
@@ -138,6 +163,19 @@ mod tests {
         let wrong = |line: &str| parse(line).err().unwrap().to_string();
         assert!(wrong("embed IN --key K --message 0").contains("--output"));
         assert!(wrong("verify --key K").contains("PATH"));
+        assert!(wrong("embed IN -o O --key K").contains("--asset"));
+        assert!(wrong("embed IN -o O --key K --asset A --message 0").contains("--message"));
+        for two in [
+            "--asset A --owner O",
+            "--owner O --search",
+            "--search --message 0",
+            "--asset A --message 0",
+        ] {
+            assert!(
+                wrong(&format!("verify S --key K {two}")).contains("cannot be used"),
+                "{two}"
+            );
+        }
         assert!(wrong("verify A --key K --views 0").contains("1..=10000"));
         assert!(wrong("key create --bits 151").contains("1..=150"));
         assert!(wrong("embed IN -o O --key K --message 0 --size 8").contains("16..=4096"));

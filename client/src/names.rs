@@ -1,4 +1,4 @@
-//! Names of jobs, artifacts and keys as people type them.
+//! Names of jobs, artifacts, keys, owners and assets as people type them.
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
@@ -23,6 +23,19 @@ pub fn artifact(text: &str) -> Result<String> {
 pub fn artifact_or_file(text: &str) -> Option<String> {
     text.strip_prefix("artifacts/")?;
     whole("artifacts", text)
+}
+
+/// `assets/ID`, from that or from the id alone.
+pub fn asset(text: &str) -> Result<String> {
+    whole("assets", text).ok_or_else(|| Error::BadOption {
+        field: "ASSET",
+        reason: format!("`{text}` is not the name of an asset, which is assets/ and an id"),
+    })
+}
+
+/// `owners/ID`, from that or from the id alone; `None` is for what may be a display name.
+pub fn owner(text: &str) -> Option<String> {
+    whole("owners", text)
 }
 
 /// `keys/ID`, from that or from the id alone; `None` is for what may be a display name.
@@ -68,6 +81,8 @@ mod tests {
             assert!(error.contains("jobs/ and an id"), "{error}");
         }
         assert!(artifact("x").is_err());
+        assert!(asset(&format!("keys/{ID}")).is_err() && asset(ID).is_ok());
+        assert_eq!((owner("Studio Nord"), owner(ID)), (None, Some(format!("owners/{ID}"))));
         assert_eq!(key("website"), None);
     }
 

@@ -82,7 +82,7 @@ pub enum Error {
         wanted: &'static str,
     },
     /// A key whose messages can hold no more payload numbers.
-    #[error("{name} has given out all {limit} payload numbers that its messages can hold; make a key with more bits")]
+    #[error("{name} has given out all {limit} payload numbers that its messages can hold; make another key")]
     PayloadsUsedUp {
         /// The key's full name.
         name: String,

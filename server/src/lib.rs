@@ -4,6 +4,7 @@ pub mod artifacts;
 pub mod embedded;
 pub mod error;
 pub mod ledger;
+pub mod marks;
 pub mod notary;
 pub mod run;
 pub mod secrets;

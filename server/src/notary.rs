@@ -1,4 +1,4 @@
-//! What commitments are signed with, and the nonces that they hide: secrets that lie in the ledger sealed under the
+//! What commitments and evidence are signed with, and the nonces that they hide: secrets that lie in the ledger sealed under the
 //! master key, each for its own place.
 use std::sync::Arc;
 
@@ -13,9 +13,19 @@ use crate::secrets::{self, MasterKey, SecretResult};
 const SIGNING_KEY: &str = "signing key";
 
 /// The service as the one who signs.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Notary {
     signing: Arc<SigningKey>,
+    /// The same key, as reports are signed with it.
+    reports: Arc<guardsplat_evidence::SigningKey>,
+}
+
+impl std::fmt::Debug for Notary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Notary")
+            .field("signing", &self.signing)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Notary {
@@ -37,9 +47,16 @@ impl Notary {
         if signing.public_key().to_bytes() != kept.public_key {
             return Err(broken("its public key is another one"));
         }
+        let seed = <&[u8; SEED_BYTES]>::try_from(seed.expose_secret()).map_err(broken)?;
         Ok(Self {
             signing: Arc::new(signing),
+            reports: Arc::new(guardsplat_evidence::SigningKey::from_bytes(seed)),
         })
+    }
+
+    /// What evidence is signed with: the same key, over texts that no commitment begins with.
+    pub fn report_key(&self) -> &guardsplat_evidence::SigningKey {
+        &self.reports
     }
 
     /// What commitments are signed with.

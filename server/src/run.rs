@@ -158,6 +158,7 @@ fn limits(settings: &Settings) -> Limits {
         max_queued: settings.max_queued_jobs,
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
+        false_positive_rate: settings.false_positive_rate,
         abandoned_after: settings.abandoned_after(),
     }
 }

@@ -14,6 +14,7 @@ use crate::create::{create_with, leave, missed_target, no_result, succeeded, wai
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::kind::Kind;
+use crate::names;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
 use crate::transfer::{Destination, download};
@@ -51,9 +52,18 @@ pub struct Arguments {
     /// The key: keys/ID, its id, or its display name where no other key has the same
     #[arg(long, value_name = "KEY")]
     key: String,
-    /// The message in hexadecimal, as many bits as the key has
+    /// The asset that IN is the original of, assets/ID or its id: what is embedded is its codeword, and the job leaves
+    /// signed evidence
+    #[arg(
+        long,
+        value_name = "ASSET",
+        required_unless_present = "message",
+        conflicts_with = "message"
+    )]
+    asset: Option<String>,
+    /// A raw message in hexadecimal, as many bits as the key has
     #[arg(long, value_name = "HEX")]
-    message: String,
+    message: Option<String>,
     /// How much work is spent
     #[arg(long, value_enum, default_value = "standard")]
     preset: Preset,
@@ -107,9 +117,17 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         check_format(path, arguments.output.as_deref())?;
     }
     let key = key::find(context, &arguments.key).await?;
-    let message = key::message(&key, &arguments.message)?;
+    let asset = arguments.asset.as_deref().map(names::asset).transpose()?;
+    let message = arguments.message.as_deref().map(|given| key::message(&key, given));
+    let message = message.transpose()?;
     let inputs = suspects::send(context, &[input]).await?;
-    let spec = spec(arguments, &key, message, &inputs);
+    let spec = spec(
+        arguments,
+        &key,
+        message.unwrap_or_default(),
+        asset.unwrap_or_default(),
+        &inputs,
+    );
     let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {
         leave(context, &job);
@@ -134,12 +152,13 @@ fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
     })
 }
 
-fn spec(arguments: &Arguments, key: &Key, message: String, inputs: &suspects::Inputs) -> Spec {
+fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs: &suspects::Inputs) -> Spec {
     let mut spec = EmbedSpec {
         // One input was given, and one name came back.
         scene: inputs.names.first().cloned().unwrap_or_default(),
         key: key.name.clone(),
         message,
+        asset,
         seed: arguments.seed,
         size: arguments.size.unwrap_or_default(),
         force: arguments.force,

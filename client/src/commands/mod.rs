@@ -1,9 +1,12 @@
 //! The commands, one a file.
 pub mod artifact;
+pub mod asset;
 pub mod completions;
 pub mod embed;
 pub mod jobs;
 pub mod key;
+pub mod owner;
+pub mod report;
 pub mod suspects;
 pub mod verify;
 
@@ -20,6 +23,9 @@ pub async fn run(context: &Context, command: Command) -> Result<Exit> {
         Command::Verify(arguments) => verify::run(context, &arguments).await,
         Command::Jobs(command) => jobs::run(context, &command).await,
         Command::Artifact(command) => artifact::run(context, &command).await,
+        Command::Owner(command) => owner::run(context, &command).await,
+        Command::Asset(command) => asset::run(context, &command).await,
+        Command::Report(command) => report::run(context, &command).await,
         Command::Completions(arguments) => Ok(completions::run(&arguments)),
     }
 }

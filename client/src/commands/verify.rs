@@ -4,11 +4,12 @@ use guardsplat_proto::v1::VerifySpec;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use serde::Serialize;
 
-use super::{key, suspects};
+use super::{key, owner, suspects};
 use crate::arguments::Submission;
 use crate::context::Context;
 use crate::create::{create_with, leave, no_result, succeeded, wait};
 use crate::error::Result;
+use crate::names;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::VerifyReport;
 
@@ -22,9 +23,8 @@ pub struct Arguments {
     /// The key: keys/ID, its id, or its display name where no other key has the same
     #[arg(long, value_name = "KEY")]
     key: String,
-    /// The message to compare with, in hexadecimal; without it nothing is decided
-    #[arg(long, value_name = "HEX")]
-    message: Option<String>,
+    #[command(flatten)]
+    claim: Claim,
     /// Views that a scene is read from; 20 unless given
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: Option<u32>,
@@ -41,6 +41,24 @@ pub struct Arguments {
     submission: Submission,
 }
 
+/// What is claimed; without any of these nothing is decided.
+#[derive(Args)]
+#[group(multiple = false)]
+struct Claim {
+    /// The claim that this asset's mark is there: assets/ID, or the id alone
+    #[arg(long, value_name = "ASSET")]
+    asset: Option<String>,
+    /// The claim that the mark of one of this owner's assets is there: owners/ID, its id, or its display name
+    #[arg(long, value_name = "OWNER")]
+    owner: Option<String>,
+    /// Searches all assets of the key for the one whose mark is there
+    #[arg(long)]
+    search: bool,
+    /// A raw message to compare with, in hexadecimal
+    #[arg(long, value_name = "HEX")]
+    message: Option<String>,
+}
+
 #[derive(Serialize)]
 struct Report<'a> {
     job: &'a str,
@@ -53,13 +71,22 @@ struct Report<'a> {
 pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     let found = suspects::find(&arguments.paths)?;
     let key = key::find(context, &arguments.key).await?;
-    let message = arguments.message.as_deref().map(|given| key::message(&key, given));
+    let claim = &arguments.claim;
+    let message = claim.message.as_deref().map(|given| key::message(&key, given));
     let message = message.transpose()?;
+    let asset = claim.asset.as_deref().map(names::asset).transpose()?;
+    let owner = match &claim.owner {
+        Some(given) => owner::find(context, given).await?.name,
+        None => String::new(),
+    };
     let inputs = suspects::send(context, &found).await?;
     let spec = Spec::Verify(VerifySpec {
         suspects: inputs.names.clone(),
         key: key.name.clone(),
         message: message.unwrap_or_default(),
+        asset: asset.unwrap_or_default(),
+        owner,
+        search: claim.search,
         views: arguments.views.unwrap_or_default(),
         size: arguments.size.unwrap_or_default(),
         seed: arguments.seed,

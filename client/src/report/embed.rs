@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 use serde::Serialize;
 
-use super::{rows_ignored, seconds};
+use super::{rows_ignored, seconds, some};
 use crate::output::printable;
 
 /// What came of a job that marked a scene.
@@ -12,7 +12,8 @@ pub struct EmbedReport {
     comparison: String,
     bit_accuracy: f64,
     bit_accuracy_worst_view: f64,
-    message: String,
+    /// Null for an asset, whose word stays secret.
+    message: Option<String>,
     message_recovered: bool,
     /// Null when the views are identical.
     psnr_db: Option<f64>,
@@ -27,6 +28,8 @@ pub struct EmbedReport {
     gaussians: u64,
     changed_gaussians: u64,
     ignored_rows: u64,
+    evidence_html: Option<String>,
+    evidence_json: Option<String>,
     target_missed: Vec<String>,
 }
 
@@ -37,7 +40,7 @@ impl From<&EmbedResult> for EmbedReport {
             comparison: result.comparison.clone(),
             bit_accuracy: result.bit_accuracy,
             bit_accuracy_worst_view: result.bit_accuracy_worst_view,
-            message: result.message.clone(),
+            message: some(&result.message),
             message_recovered: result.message_recovered,
             psnr_db: result.psnr_db,
             identical: result.psnr_db.is_none(),
@@ -51,6 +54,8 @@ impl From<&EmbedResult> for EmbedReport {
             gaussians: result.gaussians,
             changed_gaussians: result.changed_gaussians,
             ignored_rows: result.ignored_rows,
+            evidence_html: some(&result.evidence_html),
+            evidence_json: some(&result.evidence_json),
             target_missed: result.target_missed.clone(),
         }
     }
@@ -65,11 +70,14 @@ impl EmbedReport {
     /// For people.
     pub fn line(&self) -> String {
         let psnr = self.psnr_db.map_or("identical".into(), |db| format!("{db:.2} dB"));
+        let message = match &self.message {
+            Some(message) => format!("message {}", printable(message)),
+            None => "codeword".into(),
+        };
         format!(
-            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
+            "bits {:.2} % (worst view {:.2} %), {message} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
             100.0 * self.bit_accuracy,
             100.0 * self.bit_accuracy_worst_view,
-            printable(&self.message),
             if self.message_recovered {
                 "recovered"
             } else {
@@ -79,6 +87,11 @@ impl EmbedReport {
             self.steps,
             self.seconds,
             printable(&self.device)
-        ) + &rows_ignored(self.ignored_rows)
+        ) + &self
+            .evidence_html
+            .as_ref()
+            .map(|name| format!("\nevidence: {name}"))
+            .unwrap_or_default()
+            + &rows_ignored(self.ignored_rows)
     }
 }

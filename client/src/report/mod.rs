@@ -3,12 +3,14 @@ mod artifact;
 mod embed;
 mod job;
 mod key;
+mod registry;
 mod verify;
 
 pub use artifact::ArtifactReport;
 pub use embed::EmbedReport;
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};
+pub use registry::{AssetReport, OwnerReport};
 pub use verify::VerifyReport;
 
 /// A value of an enum as a word: `STATE_QUEUED` without `STATE_` is `queued`.

@@ -16,12 +16,22 @@ pub struct VerifyReport {
     needed_bits: Option<u32>,
     bits: u32,
     views: u32,
-    /// The message read.
-    message: String,
+    /// The message read; null for a claim, of which only the evidence has it.
+    message: Option<String>,
     bit_accuracy: Option<f64>,
     bit_accuracy_worst_view: Option<f64>,
     mean_abs_logit: f64,
     view_agreement: f64,
+    hypotheses: Option<u64>,
+    framings: Option<u32>,
+    assets: Option<u64>,
+    framing: Option<String>,
+    asset: Option<String>,
+    owner: Option<String>,
+    payload_number: Option<i64>,
+    corrected_bits: Option<u32>,
+    evidence_html: Option<String>,
+    evidence_json: Option<String>,
     reason: Option<String>,
     ignored_rows: u64,
     seconds: f64,
@@ -41,11 +51,22 @@ impl From<&VerifyResult> for VerifyReport {
             needed_bits: result.needed_bits,
             bits: result.bits,
             views: result.views,
-            message: result.message.clone(),
+            message: some(&result.message),
             bit_accuracy: result.bit_accuracy,
             bit_accuracy_worst_view: result.bit_accuracy_worst_view,
             mean_abs_logit: result.mean_abs_logit,
             view_agreement: result.view_agreement,
+            hypotheses: result.hypotheses,
+            // Of a raw message these two are not counted.
+            framings: result.hypotheses.map(|_| result.framings),
+            assets: result.hypotheses.map(|_| result.assets),
+            framing: some(&result.framing),
+            asset: some(&result.asset),
+            owner: some(&result.owner),
+            payload_number: result.payload_number,
+            corrected_bits: result.corrected_bits,
+            evidence_html: some(&result.evidence_html),
+            evidence_json: some(&result.evidence_json),
             reason: some(&result.reason),
             ignored_rows: result.ignored_rows,
             seconds: seconds(result.duration),
@@ -54,7 +75,7 @@ impl From<&VerifyResult> for VerifyReport {
             exit: match result.verdict() {
                 Verdict::Match => Exit::Done,
                 Verdict::NoMatch => Exit::NoMatch,
-                Verdict::Inconclusive | Verdict::Unspecified => Exit::Inconclusive,
+                Verdict::Inconclusive | Verdict::UnknownKey | Verdict::Unspecified => Exit::Inconclusive,
             },
         }
     }
@@ -69,9 +90,12 @@ impl VerifyReport {
     /// For people.
     pub fn lines(&self) -> String {
         let verdict = self.verdict.replace('_', " ");
+        if let Some(hypotheses) = self.hypotheses {
+            return self.claim(&verdict, hypotheses);
+        }
         let read = format!(
             "read {} from {} views; views agree on {:.1} % of bits, mean logit {:.2}",
-            printable(&self.message),
+            printable(self.message.as_deref().unwrap_or_default()),
             self.views,
             100.0 * self.view_agreement,
             self.mean_abs_logit
@@ -92,6 +116,40 @@ impl VerifyReport {
         }
         text + &rows_ignored(self.ignored_rows)
     }
+
+    /// Of a claim: whose mark it is, and what was tried to find it.
+    fn claim(&self, verdict: &str, hypotheses: u64) -> String {
+        let mut text = verdict.to_owned();
+        if let (Some(asset), Some(owner)) = (&self.asset, &self.owner) {
+            text += &format!(" with {} of {}", printable(asset), printable(owner));
+        }
+        if let (Some(matched), Some(p), Some(threshold)) = (self.matched_bits, self.p_value, self.threshold) {
+            let corrected = self.corrected_bits.map(|bits| format!(", {bits} corrected"));
+            text += &format!(
+                ": {matched} of {} bits{}, p = {p:.2e} (threshold {threshold:e}) after {}: {}, {}; {}, best \
+                 {}",
+                self.bits,
+                corrected.unwrap_or_default(),
+                counted(hypotheses, "hypothesis", "hypotheses"),
+                counted(self.framings.unwrap_or_default().into(), "framing", "framings"),
+                counted(self.assets.unwrap_or_default(), "asset", "assets"),
+                counted(self.views.into(), "view", "views"),
+                printable(self.framing.as_deref().unwrap_or_default())
+            );
+        }
+        if let Some(reason) = &self.reason {
+            text = format!("{text}\n{}", printable(reason));
+        }
+        if let Some(evidence) = &self.evidence_html {
+            text += &format!("\nevidence: {evidence}");
+        }
+        text + &rows_ignored(self.ignored_rows)
+    }
+}
+
+/// A number with its noun.
+fn counted(number: u64, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
 }
 
 #[cfg(test)]
@@ -109,6 +167,7 @@ mod tests {
         assert_eq!(exit(Verdict::Match), ("match".into(), 0));
         assert_eq!(exit(Verdict::NoMatch), ("no_match".into(), 2));
         assert_eq!(exit(Verdict::Inconclusive), ("inconclusive".into(), 3));
+        assert_eq!(exit(Verdict::UnknownKey), ("unknown_key".into(), 3));
         assert_eq!(exit(Verdict::Unspecified).1, 3);
     }
 

@@ -7,7 +7,8 @@ use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec, State as JobState};
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
-use guardsplat_proto::v1::{Artifact, CreateJobRequest, EmbedResult, Failure, Job, Key, WatchJobRequest};
+use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
+use guardsplat_proto::v1::{Artifact, Asset, CreateJobRequest, EmbedResult, Failure, Job, Key, Owner, WatchJobRequest};
 use sha2::{Digest, Sha256};
 use tonic::Status;
 use tonic::transport::Server;
@@ -53,6 +54,12 @@ pub struct State {
     pub cancelled: Vec<String>,
     /// Keys, newest first.
     pub keys: Vec<Key>,
+    /// Owners, newest first.
+    pub owners: Vec<Owner>,
+    /// All that was to be registered.
+    pub registered: Vec<Asset>,
+    /// The public key, in hexadecimal.
+    pub public_key: String,
 
     /// What the next watch streams do.
     pub watch: VecDeque<Vec<Step>>,
@@ -106,7 +113,8 @@ impl Fake {
                 Server::builder()
                     .add_service(ArtifactServiceServer::new(fake.clone()))
                     .add_service(JobServiceServer::new(fake.clone()))
-                    .add_service(KeyServiceServer::new(fake))
+                    .add_service(KeyServiceServer::new(fake.clone()))
+                    .add_service(RegistryServiceServer::new(fake))
                     .serve_with_incoming(incoming)
                     .await
                     .unwrap();

@@ -1,4 +1,5 @@
 //! The client as a user runs it, against a server that does what each test says.
+mod claims;
 mod embed;
 mod errors;
 mod fake;

@@ -1,15 +1,19 @@
-//! The three services that clients use, over the state of the tests.
+//! The four services that clients use, over the state of the tests.
 use std::pin::Pin;
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactService;
 use guardsplat_proto::v1::job::State as JobState;
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::key_service_server::KeyService;
+use guardsplat_proto::v1::registry_service_server::RegistryService;
 use guardsplat_proto::v1::{
-    Artifact, CancelJobRequest, CreateJobRequest, DeleteArtifactRequest, DownloadArtifactRequest,
-    DownloadArtifactResponse, GetArtifactRequest, GetJobRequest, GetKeyRequest, Job, Key, ListJobsRequest,
-    ListJobsResponse, ListKeysRequest, ListKeysResponse, UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest,
-    WatchJobResponse, download_artifact_response, upload_artifact_request,
+    Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
+    DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
+    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetJobRequest,
+    GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job, Key, ListAssetsRequest, ListAssetsResponse,
+    ListCommitmentsRequest, ListCommitmentsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
+    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, UpdateKeyStateRequest,
+    UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -249,5 +253,80 @@ impl KeyService for Fake {
 
     async fn update_key_state(&self, _: Request<UpdateKeyStateRequest>) -> Result<Response<Key>, Status> {
         Err(Status::unimplemented("no test changes a key's state"))
+    }
+}
+
+#[tonic::async_trait]
+impl RegistryService for Fake {
+    async fn create_owner(&self, request: Request<CreateOwnerRequest>) -> Result<Response<Owner>, Status> {
+        let mut owner = request.into_inner().owner.unwrap();
+        owner.name = format!("owners/{}", Uuid::new_v4());
+        self.state().owners.insert(0, owner.clone());
+        Ok(Response::new(owner))
+    }
+
+    async fn get_owner(&self, request: Request<GetOwnerRequest>) -> Result<Response<Owner>, Status> {
+        let name = request.into_inner().name;
+        let owner = self.state().owners.iter().find(|owner| owner.name == name).cloned();
+        owner.map(Response::new).ok_or_else(|| not_found(&name))
+    }
+
+    async fn list_owners(&self, _: Request<ListOwnersRequest>) -> Result<Response<ListOwnersResponse>, Status> {
+        Ok(Response::new(ListOwnersResponse {
+            owners: self.state().owners.clone(),
+            next_page_token: String::new(),
+        }))
+    }
+
+    async fn create_asset(&self, request: Request<CreateAssetRequest>) -> Result<Response<Asset>, Status> {
+        let mut asset = request.into_inner().asset.unwrap();
+        asset.name = format!("assets/{}", Uuid::new_v4());
+        self.state().registered.push(asset.clone());
+        Ok(Response::new(asset))
+    }
+
+    async fn get_asset(&self, request: Request<GetAssetRequest>) -> Result<Response<Asset>, Status> {
+        let name = request.into_inner().name;
+        let asset = self.state().registered.iter().find(|asset| asset.name == name).cloned();
+        asset.map(Response::new).ok_or_else(|| not_found(&name))
+    }
+
+    async fn list_assets(&self, request: Request<ListAssetsRequest>) -> Result<Response<ListAssetsResponse>, Status> {
+        let ListAssetsRequest { owner, key, .. } = request.into_inner();
+        let wanted =
+            |asset: &&Asset| (owner.is_empty() || asset.owner == owner) && (key.is_empty() || asset.key == key);
+        Ok(Response::new(ListAssetsResponse {
+            assets: self.state().registered.iter().rev().filter(wanted).cloned().collect(),
+            next_page_token: String::new(),
+        }))
+    }
+
+    async fn get_commitment(&self, _: Request<GetCommitmentRequest>) -> Result<Response<Commitment>, Status> {
+        Err(Status::unimplemented("no client asks for it"))
+    }
+
+    async fn list_commitments(
+        &self,
+        _: Request<ListCommitmentsRequest>,
+    ) -> Result<Response<ListCommitmentsResponse>, Status> {
+        Err(Status::unimplemented("no client asks for it"))
+    }
+
+    async fn get_head(&self, _: Request<GetHeadRequest>) -> Result<Response<Commitment>, Status> {
+        Err(Status::unimplemented("no client asks for it"))
+    }
+
+    async fn export_commitment(
+        &self,
+        _: Request<ExportCommitmentRequest>,
+    ) -> Result<Response<ExportCommitmentResponse>, Status> {
+        Err(Status::unimplemented("no client asks for it"))
+    }
+
+    async fn get_public_key(&self, _: Request<GetPublicKeyRequest>) -> Result<Response<PublicKey>, Status> {
+        Ok(Response::new(PublicKey {
+            hex: self.state().public_key.clone(),
+            pem: "-----BEGIN PUBLIC KEY-----".into(),
+        }))
     }
 }

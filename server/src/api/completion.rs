@@ -1,6 +1,6 @@
 //! Checks what a worker says came out of a job, before it becomes the job's result.
 use guardsplat_proto::v1::complete_job_request::Result as Output;
-use guardsplat_proto::v1::{EmbedResult, KeyOutput, KeyResult, KeySpec, VerifyResult};
+use guardsplat_proto::v1::{CompleteJobRequest, EmbedResult, KeyOutput, KeyResult, KeySpec, VerifyResult};
 use prost::Message as _;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
@@ -23,9 +23,9 @@ struct Outcome {
 }
 
 /// Checks what came out of `job`, as far as that can be said without the ledger.
-pub fn check(job: &JobRow, output: Option<Output>) -> Result<Completion> {
-    let fingerprint = fingerprint(output.as_ref());
-    let Outcome { result, outputs, key } = match (job.kind, output) {
+pub fn check(job: &JobRow, told: CompleteJobRequest) -> Result<Completion> {
+    let fingerprint = fingerprint(&told);
+    let Outcome { result, outputs, key } = match (job.kind, told.result) {
         (JobKind::Embed, Some(Output::EmbedResult(result))) => embed(&result)?,
         (JobKind::Verify, Some(Output::VerifyResult(result))) => verify(&result)?,
         (JobKind::CreateKey, Some(Output::KeyOutput(output))) => key(job, output)?,
@@ -55,12 +55,11 @@ pub fn check(job: &JobRow, output: Option<Output>) -> Result<Completion> {
 }
 
 /// SHA-256 of what the worker said; not of the result, in which a key has a name that is drawn anew every time.
-fn fingerprint(output: Option<&Output>) -> [u8; 32] {
-    let mut bytes = Vec::new();
-    if let Some(output) = output {
-        output.encode(&mut bytes);
-    }
-    Sha256::digest(bytes).into()
+fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
+    let mut told = told.clone();
+    // Which attempt it is, the ledger looks at.
+    told.lease_token.clear();
+    Sha256::digest(told.encode_to_vec()).into()
 }
 
 fn embed(result: &EmbedResult) -> Result<Outcome> {

@@ -69,6 +69,9 @@ impl Api {
             {
                 return Err(error);
             }
+            if let Some(claim) = &submission.claim {
+                self.check_claim(claim, &key, &submission).await?;
+            }
         }
         self.admit(&submission).await?;
         let fingerprint = self.fingerprint(&submission).await?;

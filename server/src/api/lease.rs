@@ -2,7 +2,10 @@
 use std::time::Duration;
 
 use futures::stream::{self, BoxStream, StreamExt};
-use guardsplat_proto::v1::{DownloadKeyResponse, EmbedSpec, LeaseJobRequest, LeaseJobResponse, VerifySpec, failure};
+use guardsplat_proto::v1::job::Spec;
+use guardsplat_proto::v1::{
+    DownloadKeyResponse, EmbedSpec, Job, LeaseJobRequest, LeaseJobResponse, VerifySpec, failure,
+};
 use secrecy::ExposeSecret;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
@@ -35,8 +38,15 @@ impl Api {
         loop {
             listener.check_running()?;
             if let Some(lease) = self.claim(&worker).await? {
+                let job = match self.for_worker(&lease).await {
+                    Ok(job) => job,
+                    Err(error) => {
+                        self.not_given(&lease, &error).await?;
+                        continue;
+                    }
+                };
                 return Ok(LeaseJobResponse {
-                    job: Some(convert::job(lease.job)?),
+                    job: Some(job),
                     lease_token: lease.token,
                     lease_duration: Some(clock::proto_duration(self.limits().lease)),
                 });
@@ -47,6 +57,33 @@ impl Api {
             }
             listener.wait(For::Work, left.min(LOOK_AGAIN)).await?;
         }
+    }
+
+    /// A job as its worker is told it: with the word to embed, where that is an asset's.
+    async fn for_worker(&self, lease: &Lease) -> Result<Job> {
+        let mut job = convert::job(lease.job.clone())?;
+        if let Some(Spec::Embed(spec)) = &mut job.spec
+            && let Some(word) = self.word_of(spec).await?
+        {
+            spec.message = word;
+        }
+        Ok(job)
+    }
+
+    /// Ends an attempt that could not begin.
+    async fn not_given(&self, lease: &Lease, error: &Error) -> Result<()> {
+        let id = lease.job.id;
+        tracing::error!(job = %id, error = %chain(error), "could not be given to a worker");
+        let failure = Failure {
+            reason: failure::Reason::Internal.into(),
+            message: error.to_string(),
+        };
+        let failed = self
+            .ledger()
+            .fail(id, &lease.token, Some(failure), true, false, clock::now());
+        failed.await?;
+        self.attempt_over(id);
+        Ok(())
     }
 
     /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
@@ -130,7 +167,7 @@ impl Api {
     }
 }
 
-fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
+pub(super) fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
     let name = match job.kind {
         JobKind::Embed => convert::decode::<EmbedSpec>(&job.spec)?.key,
         JobKind::Verify => convert::decode::<VerifySpec>(&job.spec)?.key,

@@ -19,10 +19,12 @@ use crate::secrets::MasterKey;
 mod admission;
 mod artifacts;
 mod changes;
+mod claims;
 mod clock;
 mod completion;
 mod convert;
 mod deadline;
+mod evidence;
 mod explained;
 mod fingerprint;
 mod housekeeping;
@@ -70,6 +72,8 @@ pub struct Limits {
     pub max_job_memory: Option<u64>,
     /// An upload of which nothing arrives for so long is broken off.
     pub upload_idle: Duration,
+    /// How often a claim may be said to match by chance, above 0 and below 1.
+    pub false_positive_rate: f64,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
 }
@@ -82,6 +86,7 @@ impl Default for Limits {
             max_queued: 10_000,
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
+            false_positive_rate: 1e-6,
             abandoned_after: Duration::from_secs(24 * 60 * 60),
         }
     }

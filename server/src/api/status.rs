@@ -93,6 +93,9 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         Error::RequestIdReused { .. } => {
             details.set_bad_request(vec![FieldViolation::new("request_id", error.to_string())]);
         }
+        Error::PayloadsUsedUp { .. } => {
+            details.set_bad_request(vec![FieldViolation::new("asset.key", error.to_string())]);
+        }
         Error::NotFound { kind, name } => {
             details.set_resource_info(format!("guardsplat.v1/{kind}"), name, "", error.to_string());
         }

@@ -7,6 +7,7 @@ use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec
 use prost::Message as _;
 use uuid::Uuid;
 
+use super::claims::{self, Claim};
 use super::fingerprint;
 use super::message::MAX_BITS;
 use super::names::Kind;
@@ -35,6 +36,8 @@ pub struct Submission {
     pub key: Option<KeyId>,
     /// A message that has to fit the key, and the field it was given in.
     pub message: Option<(&'static str, String)>,
+    /// Whose mark it writes or looks for.
+    pub claim: Option<Claim>,
     /// Names the request.
     pub request_id: Option<Uuid>,
     /// SHA-256 of what was asked for, but for the artifacts, which [`fingerprint::whole`] adds.
@@ -69,7 +72,12 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     };
     problems.finish()?;
     let (kind, spec, wanted) = checked.ok_or_else(|| Error::invalid("job.spec", "names something that is invalid"))?;
-    let Wanted { inputs, key, message } = wanted;
+    let Wanted {
+        inputs,
+        key,
+        message,
+        claim,
+    } = wanted;
     Ok(Submission {
         display_name: job.display_name,
         kind,
@@ -77,6 +85,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
         inputs,
         key,
         message,
+        claim,
         request_id,
         asked,
     })
@@ -88,23 +97,35 @@ struct Wanted {
     inputs: Vec<ArtifactId>,
     key: Option<KeyId>,
     message: Option<(&'static str, String)>,
+    claim: Option<Claim>,
 }
 
 fn embed(spec: &EmbedSpec, problems: &mut Problems) -> Result<Option<Wanted>> {
     let scene = problems.take(Kind::Artifact.parse("job.embed.scene", &spec.scene))?;
     let key = problems.take(Kind::Key.parse("job.embed.key", &spec.key))?;
-    problems.check(!spec.message.is_empty(), "job.embed.message", "is missing");
+    let claim = problems.take(claims::of_embed(spec))?.flatten();
+    problems.check(
+        !spec.message.is_empty() || !spec.asset.is_empty(),
+        "job.embed.message",
+        "is missing, one of message and asset must be set",
+    );
+    problems.check(
+        spec.message.is_empty() || spec.asset.is_empty(),
+        "job.embed.message",
+        "must be empty where an asset is given, which has a message of its own",
+    );
     problems.check(
         Preset::try_from(spec.preset).is_ok(),
         "job.embed.preset",
         "is no preset that this server knows",
     );
     side("job.embed.size", spec.size, problems);
-    let message = Some(("job.embed.message", spec.message.clone()));
+    let message = (!spec.message.is_empty()).then(|| ("job.embed.message", spec.message.clone()));
     Ok(scene.map(|scene| Wanted {
         inputs: vec![scene],
         key,
         message,
+        claim,
     }))
 }
 
@@ -138,8 +159,14 @@ fn verify(spec: &VerifySpec, problems: &mut Problems) -> Result<Option<Wanted>> 
         "must be 1 to 10000, or 0 for 20",
     );
     side("job.verify.size", spec.size, problems);
+    let claim = problems.take(claims::of_verify(spec))?.flatten();
     let message = (!spec.message.is_empty()).then(|| ("job.verify.message", spec.message.clone()));
-    Ok(Some(Wanted { inputs, key, message }))
+    Ok(Some(Wanted {
+        inputs,
+        key,
+        message,
+        claim,
+    }))
 }
 
 fn create_key(spec: &KeySpec, problems: &mut Problems) {

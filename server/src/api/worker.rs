@@ -11,6 +11,7 @@ use guardsplat_proto::v1::{
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::claims::Told;
 use super::names::Kind;
 use super::problems::Problems;
 use super::upload::Incoming;
@@ -55,16 +56,25 @@ impl WorkerService for Api {
         &self,
         request: Request<CompleteJobRequest>,
     ) -> Result<Response<CompleteJobResponse>, Status> {
-        let CompleteJobRequest {
-            name,
-            lease_token,
-            result,
-        } = request.into_inner();
-        let id = Kind::Job.parse("name", &name)?;
+        let mut request = request.into_inner();
+        let id = Kind::Job.parse("name", &request.name)?;
+        let lease_token = request.lease_token.clone();
         // Whether the lease holds is looked at when the result is written: a worker whose answer was lost says it again.
         let job = self.ledger().get_job(id).await.map_err(Error::from)?;
         let job = job.ok_or_else(|| Kind::Job.not_found(id))?;
-        let completion = completion::check(&job, result)?;
+        let mut completion = completion::check(&job, request.clone())?;
+        let told = Told {
+            readings: std::mem::take(&mut request.readings),
+            engine: request.engine,
+        };
+        // A job that is over was concluded before, and is only to be answered in the same way.
+        if !job.state.is_over() {
+            match self.conclude(&job, &lease_token, &told, &mut completion).await {
+                // Another call may have been faster; whether it said the same is looked at next.
+                Ok(()) | Err(Error::LeaseLost { .. }) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
         let done = self.ledger().complete(id, &lease_token, completion, clock::now());
         done.await.map_err(Error::from)?;
         self.attempt_over(id);

@@ -214,6 +214,9 @@ pub trait Ledger: Send + Sync + 'static {
     /// Assets of a key by payload number, those with higher ones than `after`. [`candidates::of_key`] reads all.
     async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>>;
 
+    /// One asset as a search has it.
+    async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>>;
+
     /// One commitment.
     async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>>;
 

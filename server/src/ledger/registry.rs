@@ -1,8 +1,10 @@
 //! What the registry keeps: owners, assets, the states of keys, and the sealed signing key, without any wire format.
+use guardsplat_codeword::Layout;
 use guardsplat_commitment::Hash;
 use uuid::Uuid;
 
 use super::types::{ArtifactId, KeyId};
+use crate::marks::CODE;
 
 /// Name of an owner.
 pub type OwnerId = Uuid;
@@ -122,6 +124,8 @@ pub struct AssetFilter {
 pub struct Candidate {
     /// Its name.
     pub asset: AssetId,
+    /// Whose it is.
+    pub owner: OwnerId,
     /// Its number among the assets of its key.
     pub payload: i64,
     /// Its nonce and blinding, sealed.
@@ -137,9 +141,10 @@ pub struct SealedSigningKey {
     pub sealed: Vec<u8>,
 }
 
-/// How many numbers the messages of a key can hold: all but zero, and at most 2^62 - 1.
+/// How many numbers the messages of a key can hold: all but zero, and no more than the codeword of a mark has room for.
 pub fn payloads(bits: u32) -> i64 {
-    (1_i64 << bits.min(62)) - 1
+    let room = i64::from(Layout::of(CODE).largest_number());
+    room.min((1_i64 << bits.min(62)) - 1)
 }
 
 #[cfg(test)]
@@ -158,10 +163,10 @@ mod tests {
     }
 
     #[test]
-    fn short_messages_hold_few_numbers() {
+    fn short_messages_hold_few_numbers_and_long_ones_what_a_codeword_does() {
         assert_eq!(
-            [1, 8, 62, 63, 150].map(payloads),
-            [1, 255, (1 << 62) - 1, (1 << 62) - 1, (1 << 62) - 1]
+            [1, 8, 23, 24, 64, 150].map(payloads),
+            [1, 255, (1 << 23) - 1, (1 << 24) - 1, (1 << 24) - 1, (1 << 24) - 1]
         );
     }
 }

@@ -56,6 +56,9 @@ pub struct Flags {
     /// File of the master key, 64 hexadecimal digits [default: master.key in the data folder, made at the first start]
     #[arg(long, value_name = "FILE")]
     pub master_key_file: Option<PathBuf>,
+    /// How often a claim on a scene without the mark may be said to match, 1e-30 to 0.1 [default: 1e-6]
+    #[arg(long, value_name = "RATE")]
+    pub false_positive_rate: Option<f64>,
     /// Seconds that work may take to end when the server stops [default: 20]
     #[arg(long, value_name = "SECONDS")]
     pub stop_seconds: Option<u64>,
@@ -86,6 +89,7 @@ impl Flags {
             worker_binary,
             worker_device,
             master_key_file,
+            false_positive_rate,
             stop_seconds,
             log_format,
             log_filter,
@@ -103,6 +107,7 @@ impl Flags {
         set(&mut settings.worker_binary, worker_binary.map(Some));
         set(&mut settings.worker_device, worker_device);
         set(&mut settings.master_key_file, master_key_file.map(Some));
+        set(&mut settings.false_positive_rate, false_positive_rate);
         set(&mut settings.stop_seconds, stop_seconds);
         set(&mut settings.log_format, log_format);
         set(&mut settings.log_filter, log_filter);

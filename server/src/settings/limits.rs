@@ -30,6 +30,13 @@ impl Settings {
                 });
             }
         }
+        // NaN is outside of every range.
+        if !(1e-30..=0.1).contains(&self.false_positive_rate) {
+            return Err(SettingsError::Invalid {
+                field: "false_positive_rate",
+                reason: format!("{:e} is not between 1e-30 and 0.1", self.false_positive_rate),
+            });
+        }
         not_empty("data_dir", &self.data_dir)?;
         for (field, path) in [
             ("worker_binary", &self.worker_binary),

@@ -45,6 +45,8 @@ pub struct Settings {
     pub worker_device: WorkerDevice,
     /// File of the master key.
     pub master_key_file: Option<PathBuf>,
+    /// How often a claim may be said to match by chance.
+    pub false_positive_rate: f64,
     /// Seconds that work may take to end when the server stops.
     pub stop_seconds: u64,
     /// How log lines are written.
@@ -105,6 +107,7 @@ impl Default for Settings {
             worker_binary: None,
             worker_device: WorkerDevice::Auto,
             master_key_file: None,
+            false_positive_rate: 1e-6,
             stop_seconds: 20,
             log_format: LogFormat::Text,
             log_filter: "info".into(),

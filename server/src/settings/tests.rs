@@ -76,6 +76,7 @@ fn every_setting_can_be_set_everywhere() {
         ("worker_binary", "/bin/worker"),
         ("worker_device", "wgpu"),
         ("master_key_file", "/key"),
+        ("false_positive_rate", "1e-9"),
         ("stop_seconds", "10"),
         ("log_format", "json"),
         ("log_filter", "debug,h2=warn"),
@@ -191,6 +192,10 @@ fn bad_values_are_told_with_setting_and_limit() {
         error("", &[("GUARDSPLAT_MAX_JOB_MEMORY_MEBIBYTES", "16777217")], &[]),
         "setting max_job_memory_mebibytes: 16777217 is not between 0 and 16777216"
     );
+    for rate in ["0.0", "0.5", "-1e-6", "nan"] {
+        let text = error(&format!("false_positive_rate = {rate}"), &[], &[]);
+        assert!(text.ends_with("is not between 1e-30 and 0.1"), "{text}");
+    }
     assert_eq!(error("data_dir = \"\"", &[], &[]), "setting data_dir: an empty path");
     assert!(error("log_filter = \"info,=[\"", &[], &[]).starts_with("setting log_filter: "));
     for (file, field) in [

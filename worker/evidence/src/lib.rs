@@ -16,7 +16,6 @@ mod picture;
 mod recompute;
 mod sign;
 mod stranger;
-mod tail;
 mod tried;
 mod validate;
 mod verification;

@@ -1,8 +1,8 @@
 //! What of a report follows from other parts of it, computed again.
 use crate::evidence::Evidence;
 use crate::picture::{Picture, View};
-use crate::tail;
 use crate::verification::{Decision, Reason, Verification};
+use guardsplat_codeword::chance;
 use std::fmt::Debug;
 
 /// One thing that was computed again.
@@ -47,7 +47,7 @@ impl Verification {
             fresh.p_single,
         ));
         // From what is stated, since one wrong number is one finding.
-        let p_value = tail::corrected(decision.p_single, decision.hypotheses);
+        let p_value = chance::any_of(decision.p_single, decision.hypotheses);
         findings.push(Finding::number("p-value", decision.p_value, p_value));
         findings.push(Finding::of("needed bits", decision.needed, fresh.needed));
         // To decide nothing is always allowed, with a reason that no number contradicts.

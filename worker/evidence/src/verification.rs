@@ -1,6 +1,6 @@
 //! What a reading found: the verdict, the numbers behind it, and whose message it is.
-use crate::tail;
 use crate::tried::Tried;
+use guardsplat_codeword::chance;
 use serde::{Deserialize, Serialize};
 
 /// The outcome of reading a suspect, or of reading back what was just marked.
@@ -79,18 +79,19 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// The numbers that follow from `matched` of `bits` after so many hypotheses.
+    /// The numbers that follow from `matched` of `bits` after so many hypotheses; of impossible ones, that nothing is
+    /// shown.
     pub fn new(bits: u32, matched: u32, corrected: Option<u32>, hypotheses: u64, threshold: f64) -> Self {
-        let p_single = tail::at_least(matched, bits);
+        let p_single = chance::tail(bits, matched).unwrap_or(1.0);
         Self {
             bits,
             matched,
             corrected,
             hypotheses,
             p_single,
-            p_value: tail::corrected(p_single, hypotheses),
+            p_value: chance::any_of(p_single, hypotheses),
             threshold,
-            needed: tail::needed(bits, hypotheses, threshold),
+            needed: chance::least_matches(bits, threshold, hypotheses).unwrap_or(None),
         }
     }
 

@@ -16,6 +16,8 @@ const KEPT_PAIRS: usize = 5;
 pub struct Verification {
     /// How the views compare with the message.
     pub comparison: Comparison,
+    /// What was read of all views.
+    pub reading: Reading,
     /// What was read from the first few views.
     pub message: Message,
     /// Whether that is the whole message.
@@ -61,6 +63,7 @@ pub fn verify(
     let read = reading.of_first(settings.verify.message_views)?.message()?;
     Ok(Verification {
         comparison: reading.compare(message)?,
+        reading,
         message_recovered: read == *message,
         message: read,
         quality,

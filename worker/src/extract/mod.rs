@@ -1,5 +1,6 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
+mod framing;
 mod kind;
 mod pictures;
 mod reading;
@@ -7,6 +8,7 @@ mod restore;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
+pub use framing::{Framing, without_borders};
 pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use reading::{Comparison, Reading};

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::progress::Stage;
-use guardsplat_proto::v1::{Job, complete_job_request};
+use guardsplat_proto::v1::{FramedReading, Job, complete_job_request};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::stop::Stop;
 
@@ -15,6 +15,23 @@ use super::lease::{Lease, Reporter};
 use super::server::Server;
 use super::transfer::{self, Content};
 use super::{embedding, new_key, verifying};
+
+/// What came out of an attempt.
+pub struct Outcome {
+    /// For the job's owner.
+    pub result: complete_job_request::Result,
+    /// For the server, which decides claims.
+    pub readings: Vec<FramedReading>,
+}
+
+impl From<complete_job_request::Result> for Outcome {
+    fn from(result: complete_job_request::Result) -> Self {
+        Self {
+            result,
+            readings: Vec::new(),
+        }
+    }
+}
 
 /// An attempt under way.
 pub struct Attempt<'a> {
@@ -49,7 +66,7 @@ impl Attempt<'_> {
         self.lease.complete(result).await
     }
 
-    async fn compute_and_store(&mut self, job: &Job) -> Result<complete_job_request::Result> {
+    async fn compute_and_store(&mut self, job: &Job) -> Result<Outcome> {
         match &job.spec {
             Some(Spec::Embed(spec)) => embedding::carry_out(self, spec).await,
             Some(Spec::Verify(spec)) => verifying::carry_out(self, spec).await,

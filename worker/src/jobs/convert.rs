@@ -8,7 +8,7 @@ use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{self as api};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::embed::{self, NewKey, Outcome, Preset, Settings};
-use guardsplat_worker::extract::DEFAULT_VIEWS;
+use guardsplat_worker::extract::{DEFAULT_VIEWS, Framing, Reading};
 use guardsplat_worker::message::training::Progress as Training;
 use guardsplat_worker::message::{Key, Verdict};
 use guardsplat_worker::scene::{BadRows, Ignored};
@@ -130,6 +130,17 @@ pub fn verify_result(found: Findings) -> api::VerifyResult {
         reason: found.reason.unwrap_or_default(),
         ignored_rows: found.ignored_rows as u64,
         ..api::VerifyResult::default()
+    }
+}
+
+/// What was read in one framing.
+pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
+    api::FramedReading {
+        quarter_turns: framing.quarter_turns.into(),
+        mirrored: framing.mirrored,
+        trimmed: framing.trimmed,
+        views: reading.views.len() as u32,
+        logits: reading.summed.clone(),
     }
 }
 

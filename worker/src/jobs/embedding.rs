@@ -5,11 +5,12 @@ use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{EmbedResult, EmbedSpec};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::embed::{Job, Outcome, embed};
+use guardsplat_worker::extract::Framing;
 use guardsplat_worker::message::Key;
 use guardsplat_worker::quality::{PictureFormat, encode_picture};
 use guardsplat_worker::scene::BadRows;
 
-use super::attempt::Attempt;
+use super::attempt::{Attempt, Outcome as Finished};
 use super::convert;
 use super::error::{Error, Result};
 use super::transfer::Content;
@@ -25,12 +26,14 @@ struct Marked {
 }
 
 /// Fetches scene and key, marks, stores the marked scene and a picture of what changed.
-pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Done> {
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Finished> {
     let settings = convert::settings(spec)?;
     let input = attempt.download(&[&spec.scene]).await?.swap_remove(0);
     let key_file = attempt.download_key().await?;
     // Its format, and so its name, is known when it is there.
     let output = attempt.folder.join("marked");
+    // The word of an asset is not told, nor what is read in its place.
+    let secret = !spec.asset.is_empty();
     let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
     let bad_rows = BadRows::ignored_if(spec.ignore_bad_rows);
     let marked_file = Content::File(output.clone());
@@ -49,11 +52,17 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
             force,
             bad_rows,
         };
-        let outcome = embed(engine, &job, &mut |progress| {
+        let mut outcome = embed(engine, &job, &mut |progress| {
             if let Some(progress) = convert::embedding_progress(&progress) {
                 reporter.tell(progress);
             }
         })?;
+        if secret {
+            let read = outcome.verification.message.to_string();
+            for missed in &mut outcome.missed {
+                *missed = missed.replace(&read, "otherwise");
+            }
+        }
         if !outcome.written {
             return Err(Error::TargetMissed(outcome.missed.join(", ")));
         }
@@ -74,12 +83,18 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Do
     let marked_name = format!("marked.{}", marked.outcome.format.extension());
     let scene = attempt.upload(&marked_name, marked_file, false).await?;
     let comparison = attempt.upload(sheet::NAME, Content::Bytes(marked.sheet), false).await?;
-    Ok(Done::EmbedResult(EmbedResult {
+    // What was read back of all views, for the evidence of an asset.
+    let readings = vec![convert::framed(
+        Framing::default(),
+        &marked.outcome.verification.reading,
+    )];
+    let result = Done::EmbedResult(EmbedResult {
         scene,
         comparison,
         duration: convert::duration(marked.duration),
         device: marked.device,
         clip: marked.clip,
         ..convert::embed_result(&marked.outcome)
-    }))
+    });
+    Ok(Finished { result, readings })
 }

@@ -3,11 +3,11 @@ use std::time::Duration;
 
 use guardsplat_proto::v1::{
     CompleteJobRequest, FailJobRequest, Failure, Job, LeaseJobResponse, Progress, ReleaseJobRequest, ReportJobRequest,
-    complete_job_request,
 };
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
 
+use super::attempt::Outcome;
 use super::error::{Error, Result};
 use super::server::{Server, persist, within};
 
@@ -15,6 +15,10 @@ use super::server::{Server, persist, within};
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// How long a call of a few bytes may take.
 const CALL: Duration = Duration::from_secs(10);
+/// How long a server may take to decide a claim, for which it may search many assets.
+const DECIDE: Duration = Duration::from_secs(120);
+/// What reports say computed.
+const ENGINE: &str = concat!("guardsplat-worker ", env!("CARGO_PKG_VERSION"));
 
 /// A leased job.
 pub struct Lease {
@@ -121,15 +125,17 @@ impl Lease {
     }
 
     /// The job is done.
-    pub async fn complete(&self, result: complete_job_request::Result) -> Result<()> {
+    pub async fn complete(&self, outcome: Outcome) -> Result<()> {
         let request = CompleteJobRequest {
             name: self.job.clone(),
             lease_token: self.token.clone(),
-            result: Some(result),
+            result: Some(outcome.result),
+            readings: outcome.readings,
+            engine: ENGINE.into(),
         };
         let call = "complete the job";
         persist(call, async || {
-            within(CALL, call, self.server.worker().complete_job(request.clone())).await
+            within(DECIDE, call, self.server.worker().complete_job(request.clone())).await
         })
         .await?;
         Ok(())

@@ -6,7 +6,7 @@ use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{KeyOutput, KeyResult, KeySpec};
 use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
 
-use super::attempt::Attempt;
+use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::Result;
 use super::transfer::Content;
@@ -21,7 +21,7 @@ struct Made {
 }
 
 /// Makes the key and stores it.
-pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done> {
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outcome> {
     let options = KeyOptions {
         bits: spec.bits as usize,
         bits_per_token: None,
@@ -46,7 +46,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done
     let key_file = attempt
         .upload("guardsplat.key", Content::Bytes(made.file), true)
         .await?;
-    Ok(Done::KeyOutput(KeyOutput {
+    let result = Done::KeyOutput(KeyOutput {
         key_file,
         key: Some(convert::key(&made.key)),
         result: Some(KeyResult {
@@ -56,5 +56,6 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Done
             duration: convert::duration(made.duration),
             device: made.device,
         }),
-    }))
+    });
+    Ok(result.into())
 }

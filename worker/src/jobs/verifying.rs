@@ -3,25 +3,26 @@ use std::time::{Duration, Instant};
 
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::progress::Stage;
-use guardsplat_proto::v1::{VerifyResult, VerifySpec};
-use guardsplat_worker::extract::{MAX_PICTURES, find_source};
+use guardsplat_proto::v1::{FramedReading, VerifyResult, VerifySpec};
+use guardsplat_worker::extract::{Framing, MAX_PICTURES, find_source};
 use guardsplat_worker::message::Key;
 
-use super::attempt::Attempt;
+use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::work::findings::{Findings, read};
+use crate::work::findings::{Findings, read, read_framed};
 
-/// A reading that was compared.
+/// A reading that was compared, or is for the server to decide on.
 struct Verified {
     findings: Findings,
+    readings: Vec<FramedReading>,
     device: String,
     clip: String,
     duration: Duration,
 }
 
 /// Fetches suspects and key, reads and compares.
-pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<Done> {
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<Outcome> {
     let views = convert::views(spec)?;
     if spec.suspects.is_empty() || spec.suspects.len() > MAX_PICTURES {
         let count = spec.suspects.len();
@@ -33,6 +34,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<D
     let paths = attempt.download(&names).await?;
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
+    let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
     let work = attempt.compute(move |bench, stop, reporter| {
         let start = Instant::now();
         let source = find_source(&paths)?;
@@ -43,22 +45,42 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<D
         let message = message.map(|text| key.message(&text)).transpose()?;
         let device = bench.device().to_owned();
         let engine = bench.engine(&name, &key, stop)?;
-        let (reading, ignored) = read(engine, &source, &views, |done, total| {
-            reporter.tell(convert::stage(Stage::Reading, done, total));
-        })?;
+        let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
+        let (framed, ignored) = match claim {
+            true => read_framed(engine, &source, &views, progress)?,
+            false => {
+                let (reading, ignored) = read(engine, &source, &views, progress)?;
+                (vec![(Framing::default(), reading)], ignored)
+            }
+        };
+        // As given comes first.
+        let reading = framed.first().map(|(_, reading)| reading);
+        let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
         let comparison = message.map(|message| reading.compare(&message)).transpose()?;
         Ok(Verified {
-            findings: Findings::new(&reading, comparison.as_ref(), ignored.as_ref())?,
+            findings: Findings::new(reading, comparison.as_ref(), ignored.as_ref())?,
+            // Of a raw message all is said in the findings.
+            readings: match claim {
+                true => framed
+                    .iter()
+                    .map(|(framing, reading)| convert::framed(*framing, reading))
+                    .collect(),
+                false => Vec::new(),
+            },
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),
         })
     });
     let verified = work.await?;
-    Ok(Done::VerifyResult(VerifyResult {
+    let result = Done::VerifyResult(VerifyResult {
         duration: convert::duration(verified.duration),
         device: verified.device,
         clip: verified.clip,
         ..convert::verify_result(verified.findings)
-    }))
+    });
+    Ok(Outcome {
+        result,
+        readings: verified.readings,
+    })
 }

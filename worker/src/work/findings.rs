@@ -1,7 +1,9 @@
 //! What a verification finds: reads a scene or pictures, and says whether the message is there.
 use guardsplat_worker::Result;
 use guardsplat_worker::admission::{self, picture_bytes};
-use guardsplat_worker::extract::{Comparison, Engine, Reading, Source, default_size, read_scene};
+use guardsplat_worker::extract::{
+    Comparison, Engine, Framing, Reading, Source, default_size, read_scene, without_borders,
+};
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Verdict;
 use guardsplat_worker::quality::read_picture;
@@ -69,6 +71,46 @@ pub fn read(
             Ok((Reading::new(read)?, None))
         }
     }
+}
+
+/// A reading in each framing, as given first, and rows of a scene that were ignored.
+pub type Framed = (Vec<(Framing, Reading)>, Option<Ignored>);
+
+/// As [`read`], in every framing that pictures may be in; a scene is rendered as it is, and has one only. Framings
+/// without borders are there only if some picture has any: others would be the same once more.
+pub fn read_framed(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Framed> {
+    let Source::Pictures(paths) = source else {
+        let (reading, ignored) = read(engine, source, views, progress)?;
+        return Ok((vec![(Framing::default(), reading)], ignored));
+    };
+    let framings: Vec<Framing> = [false, true].into_iter().flat_map(Framing::laid).collect();
+    let laid = framings.len() / 2;
+    let mut logits: Vec<Vec<Vec<f32>>> = vec![Vec::with_capacity(paths.len()); framings.len()];
+    let mut borders = false;
+    for (index, path) in paths.iter().enumerate() {
+        let picture = read_picture(path, views.background)?;
+        let trimmed = without_borders(&picture);
+        borders |= trimmed.is_some();
+        // One at a time: a large picture need not fit in memory eight times.
+        for (place, framing) in framings.iter().enumerate() {
+            let read = match (&trimmed, framing.trimmed) {
+                (Some(trimmed), true) => engine.read_logits(&[framing.lay(trimmed)])?,
+                (None, true) => vec![logits[place - laid][index].clone()],
+                (_, false) => engine.read_logits(&[framing.lay(&picture)])?,
+            };
+            logits[place].extend(read);
+        }
+        progress(index + 1, paths.len());
+    }
+    let read = framings.into_iter().zip(logits);
+    let tried = read.filter(|(framing, _)| borders || !framing.trimmed);
+    let readings = tried.map(|(framing, logits)| Ok((framing, Reading::new(logits)?)));
+    Ok((readings.collect::<Result<_>>()?, None))
 }
 
 /// The outcome, with the names of the program's JSON.

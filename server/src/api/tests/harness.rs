@@ -194,6 +194,7 @@ impl Server {
             name: job.into(),
             lease_token: token.into(),
             result: Some(result),
+            ..CompleteJobRequest::default()
         };
         self.worker.clone().complete_job(request).await.map(|_| ())
     }

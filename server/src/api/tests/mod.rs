@@ -1,6 +1,7 @@
 //! The API over a real socket, with a real ledger and a real folder, called through generated clients.
 mod admission;
 mod artifacts;
+mod claims;
 mod harness;
 mod housekeeping;
 mod jobs;

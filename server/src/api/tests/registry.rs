@@ -16,7 +16,7 @@ use crate::api::Limits;
 use crate::ledger::Ledger;
 use crate::notary;
 
-async fn create_owner(server: &Server, display_name: &str, request_id: &str) -> Result<Owner, Status> {
+pub(super) async fn create_owner(server: &Server, display_name: &str, request_id: &str) -> Result<Owner, Status> {
     let owner = Owner {
         display_name: display_name.into(),
         ..Owner::default()
@@ -29,7 +29,7 @@ async fn create_owner(server: &Server, display_name: &str, request_id: &str) -> 
     Ok(answer.into_inner())
 }
 
-async fn create_asset(server: &Server, asset: Asset, request_id: &str) -> Result<Asset, Status> {
+pub(super) async fn create_asset(server: &Server, asset: Asset, request_id: &str) -> Result<Asset, Status> {
     let request = CreateAssetRequest {
         asset: Some(asset),
         request_id: request_id.into(),
@@ -38,7 +38,7 @@ async fn create_asset(server: &Server, asset: Asset, request_id: &str) -> Result
     Ok(answer.into_inner())
 }
 
-fn asset(owner: &str, key: &str, original: Original) -> Asset {
+pub(super) fn asset(owner: &str, key: &str, original: Original) -> Asset {
     Asset {
         owner: owner.into(),
         display_name: "robot".into(),
@@ -69,7 +69,7 @@ async fn export(server: &Server, name: &str) -> Result<Document, Status> {
     Ok(Document::from_json(&answer.into_inner().document).unwrap())
 }
 
-async fn public_key(server: &Server) -> PublicKey {
+pub(super) async fn public_key(server: &Server) -> PublicKey {
     let answer = server.registry.clone().get_public_key(GetPublicKeyRequest {}).await;
     let told = answer.unwrap().into_inner();
     let key = PublicKey::from_hex(&told.hex).unwrap();
@@ -352,6 +352,7 @@ async fn payload_numbers_run_out() {
     create_asset(&server, asset(&owner, &key, hash(1)), "").await.unwrap();
     let second = create_asset(&server, asset(&owner, &key, hash(2)), "").await;
     let details = refused(second, Code::ResourceExhausted, "PAYLOADS_USED_UP");
+    assert_eq!(details.bad_request().unwrap().field_violations[0].field, "asset.key");
     let metadata = &details.error_info().unwrap().metadata;
     assert_eq!(
         (metadata["name"].as_str(), metadata["limit"].as_str()),

@@ -137,6 +137,7 @@ async fn results_are_checked() {
         name: name.clone(),
         lease_token: token.clone(),
         result: None,
+        ..CompleteJobRequest::default()
     };
     assert_eq!(invalid(server.worker.clone().complete_job(nothing).await), ["result"]);
     assert_eq!(

@@ -325,13 +325,18 @@ pub(crate) async fn a_search_sees_every_asset_of_its_key_once(factory: &dyn Fact
     let seen: Vec<_> = candidates::of_key(&*ledger, key).try_collect().await.unwrap();
     assert_eq!(seen.len(), 7);
     for (seen, wanted) in seen.iter().zip(&wanted) {
-        assert_eq!((seen.asset, seen.payload), (wanted.id, wanted.payload));
+        assert_eq!(
+            (seen.asset, seen.owner, seen.payload),
+            (wanted.id, wanted.owner, wanted.payload)
+        );
         assert_eq!(seen.sealed_nonce, wanted.id.as_bytes());
+        assert_eq!(ledger.candidate(wanted.id).await.unwrap().as_ref(), Some(seen));
     }
     let page = ledger.candidates(key, 2, 3).await.unwrap();
     assert_eq!(page, seen[2..5]);
     assert_eq!(ledger.candidates(key, 7, 3).await.unwrap(), []);
     assert_eq!(ledger.candidates(owner, 0, 3).await.unwrap(), []);
+    assert_eq!(ledger.candidate(owner).await.unwrap(), None);
 }
 
 pub(crate) async fn keys_are_retired_and_revoked_for_good(factory: &dyn Factory) {

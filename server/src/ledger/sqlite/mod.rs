@@ -251,6 +251,10 @@ impl Ledger for SqliteLedger {
         registry::candidates(&mut *self.readers.acquire().await?, key, after, limit).await
     }
 
+    async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>> {
+        registry::candidate(&mut *self.readers.acquire().await?, asset).await
+    }
+
     async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>> {
         commitments::get(&mut *self.readers.acquire().await?, id).await
     }

@@ -43,8 +43,7 @@ pub(super) const OF_BOTH: &str = assets!(
 );
 
 /// A page of what a search among a key's assets needs.
-pub(super) const CANDIDATES: &str =
-    "SELECT id, payload, sealed_nonce FROM assets WHERE key_id = ?1 AND payload > ?2 ORDER BY payload LIMIT ?3";
+pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE key_id = ?1 AND payload > ?2 ORDER BY payload LIMIT ?3";
 
 /// The highest payload number of a key.
 pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = ?1 ORDER BY payload DESC LIMIT 1";
@@ -206,14 +205,22 @@ pub(super) async fn candidates(
 ) -> Result<Vec<Candidate>> {
     let query = sqlx::query(CANDIDATES).bind(key.as_bytes().as_slice());
     let found = query.bind(after).bind(limit).fetch_all(db).await?;
-    let candidate = |row: &SqliteRow| {
-        Ok(Candidate {
-            asset: rows::id(row, "id")?,
-            payload: row.try_get("payload")?,
-            sealed_nonce: row.try_get("sealed_nonce")?,
-        })
-    };
-    found.iter().map(candidate).collect()
+    found.iter().map(candidate_of).collect()
+}
+
+pub(super) async fn candidate(db: &mut SqliteConnection, asset: AssetId) -> Result<Option<Candidate>> {
+    let query = sqlx::query("SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE id = ?1");
+    let found = query.bind(asset.as_bytes().as_slice()).fetch_optional(db).await?;
+    found.as_ref().map(candidate_of).transpose()
+}
+
+fn candidate_of(row: &SqliteRow) -> Result<Candidate> {
+    Ok(Candidate {
+        asset: rows::id(row, "id")?,
+        owner: rows::id(row, "owner_id")?,
+        payload: row.try_get("payload")?,
+        sealed_nonce: row.try_get("sealed_nonce")?,
+    })
 }
 
 fn owner(row: &SqliteRow) -> Result<OwnerRow> {

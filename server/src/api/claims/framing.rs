@@ -1,0 +1,124 @@
+//! Framings as workers tell of them: checked, and named for people.
+use std::collections::HashSet;
+
+use guardsplat_codeword::Framing;
+use guardsplat_evidence as evidence;
+use guardsplat_proto::v1::FramedReading;
+
+use crate::api::problems::Problems;
+use crate::error::Result;
+
+/// Most framings: four turns, mirrored or not, with borders or without.
+const MOST: usize = 16;
+
+/// What was read in each framing, checked against the bits of the key.
+pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
+    let mut problems = Problems::default();
+    if readings.len() > MOST {
+        let reason = format!("has {} entries, at most {MOST} are taken", readings.len());
+        problems.add("readings", reason);
+    }
+    let mut seen = HashSet::new();
+    for (i, reading) in readings.iter().take(MOST).enumerate() {
+        let field = |name: &str| format!("readings[{i}].{name}");
+        let turns = reading.quarter_turns;
+        problems.check(turns < 4, &field("quarter_turns"), "must be 0 to 3");
+        problems.check(reading.views > 0, &field("views"), "must be at least 1");
+        if reading.logits.len() != bits as usize {
+            let reason = format!("has {} values, the key has {bits} bits", reading.logits.len());
+            problems.add(field("logits"), reason);
+        }
+        if !seen.insert((turns, reading.mirrored, reading.trimmed)) {
+            problems.add(format!("readings[{i}]"), "is in the same framing as another one");
+        }
+    }
+    problems.finish()?;
+    let framing = |reading: &FramedReading| Framing {
+        name: name(reading),
+        views: reading.views,
+        logits: reading.logits.clone(),
+    };
+    Ok(readings.iter().map(framing).collect())
+}
+
+/// What was done to the pictures, in words.
+fn name(reading: &FramedReading) -> String {
+    let mut done = Vec::new();
+    if reading.quarter_turns > 0 {
+        done.push(format!("turned by {} degrees", 90 * reading.quarter_turns));
+    }
+    if reading.mirrored {
+        done.push("mirrored".to_owned());
+    }
+    if reading.trimmed {
+        done.push("without borders".to_owned());
+    }
+    match done.is_empty() {
+        true => "as given".into(),
+        false => done.join(", "),
+    }
+}
+
+/// The same by kinds, for the report: as much as was done counts under what changes most.
+pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
+    use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn};
+    let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
+        (true, ..) => Crop,
+        (_, true, _) => Mirrored,
+        (_, _, 0) => AsGiven,
+        _ => QuarterTurn,
+    };
+    let count = |wanted| readings.iter().filter(|reading| kind(reading) == wanted).count() as u32;
+    let each = [AsGiven, QuarterTurn, Mirrored, Crop].map(|kind| evidence::Framing {
+        kind,
+        variants: count(kind),
+        pooled: false,
+    });
+    each.into_iter().filter(|framing| framing.variants > 0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+
+    fn reading(quarter_turns: u32, mirrored: bool, trimmed: bool) -> FramedReading {
+        FramedReading {
+            quarter_turns,
+            mirrored,
+            trimmed,
+            views: 1,
+            logits: vec![1.0; 64],
+        }
+    }
+
+    fn all() -> Vec<FramedReading> {
+        let each = (0..16).map(|i| reading(i % 4, i & 4 > 0, i & 8 > 0));
+        each.collect()
+    }
+
+    #[test]
+    fn every_framing_has_a_name_and_counts_once() {
+        let names: HashSet<_> = checked(&all(), 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names.len(), 16);
+        assert!(names.contains("as given") && names.contains("turned by 270 degrees, mirrored, without borders"));
+        let counts: Vec<_> = kinds(&all()).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 3, 4, 8]);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_told_by_field() {
+        let mut wrong = reading(4, false, false);
+        wrong.views = 0;
+        wrong.logits.pop();
+        let readings = [reading(0, false, false), wrong, reading(0, false, false)];
+        let Err(Error::Invalid(violations)) = checked(&readings, 64) else {
+            panic!("was taken")
+        };
+        let fields: Vec<_> = violations.iter().map(|v| v.field.as_str()).collect();
+        let second = ["quarter_turns", "views", "logits"].map(|name| format!("readings[1].{name}"));
+        assert_eq!(fields[..3], second);
+        assert_eq!(fields[3..], ["readings[2]"]);
+        assert!(checked(&[all(), all()].concat(), 64).is_err());
+    }
+}

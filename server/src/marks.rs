@@ -1,0 +1,94 @@
+//! What assets are marked with: the codeword of a payload under the pad of the asset's own secret.
+//!
+//! Nonce and blinding, which the ledger keeps sealed and a commitment holds the hash of, decide the pad. So it was
+//! settled when the original was registered, nobody who reads a scene first can choose an asset to fit, and whoever is
+//! shown both can compute the word again. Formulas are in `docs/registry.md`.
+use guardsplat_codeword::{Code, Layout, Mark, Payload, Whitening, WordLength};
+use guardsplat_commitment::Opening;
+use secrecy::zeroize::Zeroizing;
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+use crate::ledger::{Candidate, KeyId};
+use crate::notary;
+use crate::secrets::MasterKey;
+
+/// The code of all marks: 2 bits of version, 10 of the key and 24 of the payload number in 64.
+pub const CODE: Code = Code::Bch36;
+
+/// Bits that a key must have for its assets to be marked.
+pub fn bits() -> u32 {
+    WordLength::CODED.bits()
+}
+
+/// The payload of a number of a key. Keys have no numbers: theirs is taken from the hash of their id, which is enough,
+/// since nothing is looked up by it.
+///
+/// # Errors
+/// `Internal` for numbers that no asset is given.
+pub fn payload(key: KeyId, number: i64) -> Result<Payload> {
+    let number = u32::try_from(number).map_err(|error| Error::internal("making a codeword", error))?;
+    let [a, b, c, d, ..]: [u8; 32] = Sha256::digest(key.as_bytes()).into();
+    let tag = u32::from_be_bytes([a, b, c, d]) >> (32 - Layout::of(CODE).key);
+    Ok(Payload { key: tag, number })
+}
+
+/// The word that an asset of a key is marked with, and its pad.
+///
+/// # Errors
+/// Those of opening the nonce; `Internal` for a payload that the code has no room for.
+pub fn mark(master: &MasterKey, key: KeyId, asset: &Candidate) -> Result<Mark> {
+    let opening = notary::open_nonce(master, asset.asset, &asset.sealed_nonce)?;
+    let secret = whitening_secret(&opening);
+    let whitening = Whitening {
+        secret: &secret,
+        asset: asset.asset.as_bytes(),
+        nonce: opening.nonce(),
+    };
+    let payload = payload(key, asset.payload)?;
+    guardsplat_codeword::mark(CODE, payload, &whitening).map_err(|error| Error::internal("making a codeword", error))
+}
+
+/// SHA-256 of a prefix and the blinding: another value than the commitment's hash is made of, should one ever get out.
+fn whitening_secret(opening: &Opening) -> Zeroizing<[u8; 32]> {
+    let mut hash = Sha256::new_with_prefix(b"guardsplat whitening secret\0");
+    hash.update(opening.blinding());
+    Zeroizing::new(hash.finalize().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use uuid::Uuid;
+
+    use super::*;
+
+    fn candidate(master: &MasterKey, payload: i64) -> Candidate {
+        let asset = Uuid::now_v7();
+        Candidate {
+            asset,
+            owner: Uuid::now_v7(),
+            payload,
+            sealed_nonce: notary::new_nonce(master, asset).unwrap().sealed,
+        }
+    }
+
+    #[test]
+    fn the_word_says_key_and_number_under_a_pad_of_the_asset_alone() {
+        let (master, key) = (MasterKey::generate().unwrap(), Uuid::now_v7());
+        let [one, two] = [7, 7].map(|number| candidate(&master, number));
+        let [a, b] = [&one, &two].map(|asset| mark(&master, key, asset).unwrap());
+        assert_eq!(mark(&master, key, &one).unwrap(), a);
+        let read = CODE.decode(&a.word.xor(&a.pad).unwrap()).unwrap().unwrap();
+        assert_eq!(read.corrected_bits, 0);
+        assert_eq!(
+            Payload::unpack(CODE, read.information).unwrap(),
+            payload(key, 7).unwrap()
+        );
+        // The same number of the same key, and nothing in common.
+        assert_eq!(a.word.xor(&a.pad).unwrap(), b.word.xor(&b.pad).unwrap());
+        assert_ne!(a.pad, b.pad);
+        assert!(mark(&master, key, &candidate(&master, 1 << 24)).is_err());
+        assert!(mark(&master, key, &candidate(&master, -1)).is_err());
+        assert!(mark(&MasterKey::generate().unwrap(), key, &one).is_err());
+    }
+}
