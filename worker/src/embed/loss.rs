@@ -89,7 +89,7 @@ impl<'a> Loss<'a> {
         } else {
             seen
         };
-        let logits = self.engine.logits(seen);
+        let logits = self.engine.logits(seen)?;
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, device);
