@@ -64,6 +64,70 @@ fn reports_tell_what_was_measured_and_what_was_not() {
     assert_eq!(String::from_utf8(bench.read("results/report.html")).unwrap(), html);
 }
 
+/// Random weights of the learned codec: as many as the published ones, and as small as those of a network.
+fn codec() -> Vec<u8> {
+    const N: usize = 128;
+    const M: usize = 192;
+    let mut tensors = vec![("entropy_bottleneck.quantiles".to_string(), vec![M, 1, 3])];
+    for (name, channels) in [("g_a", [3, N, N, N, M]), ("g_s", [M, N, N, N, 3])] {
+        for (i, pair) in channels.windows(2).enumerate() {
+            let (inputs, outputs) = (pair[0], pair[1]);
+            let kernel = if name == "g_a" {
+                [outputs, inputs]
+            } else {
+                [inputs, outputs]
+            };
+            let at = 2 * i;
+            tensors.push((format!("{name}.{at}.weight"), vec![kernel[0], kernel[1], 5, 5]));
+            tensors.push((format!("{name}.{at}.bias"), vec![outputs]));
+            if i < 3 {
+                tensors.push((format!("{name}.{}.beta", at + 1), vec![outputs]));
+                tensors.push((format!("{name}.{}.gamma", at + 1), vec![outputs, outputs]));
+            }
+        }
+    }
+    let (mut header, mut values) = (serde_json::Map::new(), Vec::new());
+    let mut state = 1_u32;
+    for (name, shape) in tensors {
+        let start = values.len();
+        for _ in 0..shape.iter().product() {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let unit = (state >> 8) as f32 / (1 << 24) as f32;
+            values.extend((0.1 * (unit - 0.4)).to_le_bytes());
+        }
+        let entry = serde_json::json!({"dtype": "F32", "shape": shape, "data_offsets": [start, values.len()]});
+        header.insert(name, entry);
+    }
+    let header = Value::Object(header).to_string();
+    [&(header.len() as u64).to_le_bytes(), header.as_bytes(), &values].concat()
+}
+
+#[test]
+fn the_learned_codec_attacks_where_its_weights_are_given() {
+    let bench = bench();
+    let line = "evaluate results --scenes one.ply --experiments robustness --bits 16 --seeds 1 --settings hasty.json \
+        --size 32 --views 2 --device cpu";
+    let missing = || {
+        let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+        report[0]["missing"].to_string()
+    };
+    bench.exits(line, 0);
+    let before = records(&bench).len();
+    assert!(missing().contains("vae:3: not measured: no weights"), "{}", missing());
+
+    bench.write("codec.safetensors", codec());
+    bench.exits(&format!("{line} --vae codec.safetensors"), 0);
+    let records = records(&bench);
+    assert_eq!(records.len(), before + 1);
+    let reading = records[before].to_string();
+    assert!(reading.contains("vae:3"), "{reading}");
+    assert!(!missing().contains("vae:3"), "{}", missing());
+
+    bench.write("codec.safetensors", &codec()[..9000]);
+    bench.refuses(&format!("{line} --vae codec.safetensors"), &["vae", "safetensors"]);
+    bench.refuses(&format!("{line} --vae none"), &["none"]);
+}
+
 const SECURITY: &str = "evaluate results --scenes one.ply two.ply --experiments security --bits 16 --seeds 1 \
     --settings hasty.json --size 48 --views 8 --device cpu";
 

@@ -91,6 +91,9 @@ pub enum Error {
     /// Judging marks failed.
     #[error(transparent)]
     Evaluation(guardsplat_evaluation::Error),
+    /// The convolutional decoder could not be trained or used.
+    #[error("convolutional decoder: {0}")]
+    Hidden(guardsplat_hidden::Error),
     /// Somebody asked for the end ([`crate::stop::Stop`]).
     #[error("stopped before it was done; nothing was written")]
     Stopped,
@@ -110,6 +113,25 @@ impl From<guardsplat_scene::Error> for Error {
         match error {
             Scene::Io { path, source } => Self::Io { path, source },
             Scene::BadScene { path, reason } => Self::BadScene { path, reason },
+        }
+    }
+}
+
+impl From<guardsplat_hidden::Error> for Error {
+    fn from(error: guardsplat_hidden::Error) -> Self {
+        use guardsplat_hidden::Error as Hidden;
+        match error {
+            Hidden::Stopped => Self::Stopped,
+            Hidden::OutOfRange {
+                field,
+                value,
+                low,
+                high,
+            } => Self::BadOption {
+                field,
+                reason: format!("{value} is outside {low} to {high}"),
+            },
+            other => Self::Hidden(other),
         }
     }
 }

@@ -21,6 +21,8 @@ use guardsplat_worker::{Error, Result};
 
 #[path = "engine/cli.rs"]
 mod cli;
+#[path = "engine/extractors.rs"]
+mod extractors;
 #[path = "engine/stopping.rs"]
 mod stopping;
 #[path = "support/tiny.rs"]

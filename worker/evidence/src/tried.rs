@@ -40,6 +40,8 @@ pub enum FramingKind {
     Mirrored,
     /// Made larger or smaller.
     Scaling,
+    /// Brightness, gamma, contrast or saturation changed back.
+    Tone,
 }
 
 impl Tried {

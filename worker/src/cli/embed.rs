@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{Job, Outcome, Preset, Progress, Settings, Verification, embed};
+use guardsplat_worker::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::Key;
 use guardsplat_worker::quality::{Quality, write_picture};
@@ -47,6 +47,12 @@ pub struct Arguments {
     /// jpeg, noise, blur, mask, 8bit, combined; sh-noise, sh-truncation, spz, sog, pruning. sh-truncation unless given
     #[arg(long, value_name = "LIST")]
     robust_to: Option<RobustTo>,
+    /// Which coefficients of colours are learned: sh or all, constant (dc), or all others (rest). Geometry never changes
+    #[arg(long, value_name = "WHAT", default_value = "all")]
+    learn: Learn,
+    /// Trains on views on a circle at this elevation in degrees, as the paper's public code does, instead of over the sphere
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    ring: Option<f32>,
     /// Side of training views and of those of the verification, in pixels
     #[arg(long, value_name = "PX")]
     size: Option<u32>,
@@ -150,7 +156,10 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
     if let Some(robust_to) = arguments.robust_to {
         settings.robust_to = robust_to;
     }
-    chosen(settings, arguments.seed, arguments.size)
+    if let Some(elevation) = arguments.ring {
+        settings.ring = Some(Ring { elevation });
+    }
+    chosen(settings.learning(arguments.learn), arguments.seed, arguments.size)
 }
 
 fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {

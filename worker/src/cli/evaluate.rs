@@ -3,13 +3,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use guardsplat_distortion::RobustTo;
+use guardsplat_distortion::{RobustTo, Vae};
 use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
+use guardsplat_evaluation::report::names::VAE;
 use guardsplat_evaluation::report::output;
 use guardsplat_evaluation::report::selection::Selection;
 use guardsplat_evaluation::report::store::Store;
 use guardsplat_worker::device::{Compute, DeviceChoice, open};
-use guardsplat_worker::embed::{self, Preset, Settings};
+use guardsplat_worker::embed::{self, HIDDEN, HiddenKeyOptions, Preset, Settings, create_hidden_key};
 use guardsplat_worker::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
 use guardsplat_worker::extract::Engine;
 use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
@@ -17,7 +18,7 @@ use guardsplat_worker::stop::Stop;
 use guardsplat_worker::{Error, Result};
 
 use super::display::Display;
-use super::{Budget, Exit, print_line};
+use super::{Budget, Exit, Extractor, print_line};
 use crate::work::{keys, load};
 
 #[derive(Args)]
@@ -57,9 +58,16 @@ pub struct Arguments {
     /// Held-out views of each mark
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: u32,
+    /// What reads pictures: clip, or hidden for convolutional decoders, one trained for each length and seed
+    #[arg(long, value_enum, default_value = "clip")]
+    extractor: Extractor,
     /// A CLIP that was added with `models add`, instead of the shipped one
     #[arg(long)]
     clip: Option<String>,
+    /// Weights of the learned codec that the paper attacks with, as a safetensors file: CompressAI's bmshj2018-factorized,
+    /// quality 3. Without them that attack is not measured
+    #[arg(long, value_name = "FILE")]
+    vae: Option<PathBuf>,
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
@@ -84,8 +92,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         });
     }
     // What is refused leaves no folder behind.
+    let mut tools = None;
     if !arguments.report_only {
         check(arguments)?;
+        let compute = open(arguments.device)?;
+        let vae = vae(arguments, &compute)?;
+        tools = Some((compute, vae));
     } else if !arguments.folder.is_dir() {
         return Err(Error::BadOption {
             field: "DIR",
@@ -93,8 +105,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         });
     }
     let mut store = Store::open(&arguments.folder).map_err(Error::Evaluation)?;
-    if !arguments.report_only {
-        measure(arguments, &mut store)?;
+    if let Some((compute, vae)) = tools {
+        measure(arguments, &mut store, compute, vae)?;
     }
     write_reports(arguments, &store)?;
     Ok(Exit::Done)
@@ -104,6 +116,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 /// last scene.
 fn check(arguments: &Arguments) -> Result<()> {
     timed(arguments)?;
+    if let (Extractor::Hidden, Some(name)) = (arguments.extractor, &arguments.clip) {
+        return Err(Error::BadOption {
+            field: "clip",
+            reason: format!("--extractor hidden reads without a CLIP, so {name:?} has no use"),
+        });
+    }
     if arguments.scenes.is_empty() {
         return Err(Error::BadOption {
             field: "scenes",
@@ -116,8 +134,25 @@ fn check(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
-    let compute = open(arguments.device)?;
+/// The learned codec, if its weights were given.
+fn vae(arguments: &Arguments, compute: &Compute) -> Result<Option<Vae>> {
+    let Some(path) = &arguments.vae else {
+        if arguments.experiments.contains(&Kind::Robustness) {
+            eprintln!("note: {VAE} is not measured: no weights (--vae FILE)");
+        }
+        return Ok(None);
+    };
+    match Vae::load(path, &compute.device) {
+        Ok(vae) => Ok(Some(vae)),
+        Err(guardsplat_distortion::Error::Io { path, source }) => Err(Error::Io { path, source }),
+        Err(other) => Err(Error::BadOption {
+            field: "vae",
+            reason: other.to_string(),
+        }),
+    }
+}
+
+fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Option<Vae>) -> Result<()> {
     let trade = Trade {
         // Without the name of the card.
         device: compute.name.split(':').next().unwrap_or_default().into(),
@@ -129,6 +164,7 @@ fn measure(arguments: &Arguments, store: &mut Store) -> Result<()> {
         seeds: arguments.seeds.clone(),
         size: arguments.size,
         views: arguments.views as usize,
+        vae,
     };
     let folder = arguments.folder.join("keys");
     std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
@@ -174,22 +210,43 @@ fn engine(
 ) -> Result<(Engine, Key, Option<f64>)> {
     let clip = arguments.clip.as_deref();
     let start = Instant::now();
-    let path = folder.join(format!("{}-{bits}-{seed}.key", clip.unwrap_or(load::SHIPPED)));
+    let stop = Stop::default();
+    let name = match arguments.extractor {
+        Extractor::Clip => clip.unwrap_or(load::SHIPPED),
+        Extractor::Hidden => HIDDEN,
+    };
+    let hidden = HiddenKeyOptions {
+        bits,
+        seed: Some(seed),
+        steps: None,
+        robust_to: RobustTo::none(),
+    };
+    let path = folder.join(format!("{name}-{bits}-{seed}.key"));
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
-    let (_, identity) = load::clip(clip, &compute, guardsplat_worker::clip::Parts::Image)?;
-    // A key of another CLIP of that name is one of an earlier version.
-    let (key, seconds) = match known.filter(|key| key.clip.hash == identity.hash) {
+    let known = match arguments.extractor {
+        Extractor::Clip => {
+            let (_, identity) = load::clip(clip, &compute, guardsplat_worker::clip::Parts::Image)?;
+            // A key of another CLIP of that name is one of an earlier version.
+            known.filter(|key| key.clip.hash == identity.hash)
+        }
+        Extractor::Hidden => known.filter(|key| key.clip.hash == hidden.recipe()),
+    };
+    let (key, seconds) = match known {
         Some(key) => (key, None),
         None => {
-            let options = KeyOptions {
-                bits,
-                bits_per_token: None,
-                seed: Some(seed),
-                robust_to: RobustTo::none(),
-                training: TrainingOptions::default(),
+            let key = match arguments.extractor {
+                Extractor::Clip => {
+                    let options = KeyOptions {
+                        bits,
+                        bits_per_token: None,
+                        seed: Some(seed),
+                        robust_to: RobustTo::none(),
+                        training: TrainingOptions::default(),
+                    };
+                    keys::create(&options, keys::Kept::default(), clip, &compute, &stop, |_| {})?
+                }
+                Extractor::Hidden => create_hidden_key(&hidden, &compute, &stop, |_, _| {})?,
             };
-            let stop = Stop::default();
-            let key = keys::create(&options, keys::Kept::default(), clip, &compute, &stop, |_| {})?;
             key.write(&path)?;
             (key, Some(start.elapsed().as_secs_f64()))
         }

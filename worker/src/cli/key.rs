@@ -4,16 +4,16 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use guardsplat_distortion::RobustTo;
-use guardsplat_worker::Result;
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::NewKey;
+use guardsplat_worker::device::{Compute, DeviceChoice, open};
+use guardsplat_worker::embed::{HiddenKeyOptions, NewKey, create_hidden_key};
 use guardsplat_worker::message::training::Progress;
-use guardsplat_worker::message::{DecoderKind, KeyOptions, TrainingOptions};
+use guardsplat_worker::message::{DecoderKind, Key, KeyOptions, TrainingOptions};
 use guardsplat_worker::stop::Stop;
+use guardsplat_worker::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Exit, print_json, print_line};
+use super::{Exit, Extractor, print_json, print_line};
 use crate::work::keys;
 
 #[derive(Subcommand)]
@@ -36,6 +36,13 @@ pub struct Create {
     /// The key file
     #[arg(short, long)]
     output: PathBuf,
+    /// What reads pictures: clip, or hidden for a convolutional decoder in the manner of HiDDeN, which is trained for the
+    /// key and needs no CLIP
+    #[arg(long, value_enum, default_value = "clip")]
+    extractor: Extractor,
+    /// Steps of the convolutional decoder's training
+    #[arg(long, hide_short_help = true)]
+    steps: Option<usize>,
     /// A CLIP that was added with `models add`, instead of the shipped one
     #[arg(long)]
     clip: Option<String>,
@@ -60,6 +67,9 @@ pub struct Create {
     /// Noise in the decoder's training, times the natural variation
     #[arg(long, hide_short_help = true, default_value_t = TrainingOptions::default().noise)]
     noise: f32,
+    /// Share of a perceptron's training that repeats the messages that are read worst, 0 to 1
+    #[arg(long, hide_short_help = true, default_value_t = TrainingOptions::default().hard)]
+    hard: f32,
     /// Prints JSON on standard output
     #[arg(long)]
     json: bool,
@@ -80,6 +90,23 @@ pub fn run(command: Command) -> Result<Exit> {
     let Command::Create(arguments) = command;
     let start = Instant::now();
     let compute = open(arguments.device)?;
+    let key = match arguments.extractor {
+        Extractor::Clip => for_clip(&arguments, &compute)?,
+        Extractor::Hidden => hidden(&arguments, &compute)?,
+    };
+    key.write(&arguments.output)?;
+    tell(&arguments, &compute, &key, start)?;
+    Ok(Exit::Done)
+}
+
+/// A key whose messages are read from CLIP's features.
+fn for_clip(arguments: &Create, compute: &Compute) -> Result<Key> {
+    if arguments.steps.is_some() {
+        return Err(Error::BadOption {
+            field: "steps",
+            reason: "they are of the convolutional decoder, --extractor hidden".into(),
+        });
+    }
     let kept = keys::Kept {
         remove: arguments.remove,
         keep: arguments.keep,
@@ -93,6 +120,7 @@ pub fn run(command: Command) -> Result<Exit> {
         training: TrainingOptions {
             unseen: arguments.unseen,
             noise: arguments.noise,
+            hard: arguments.hard,
             ..TrainingOptions::default()
         },
     };
@@ -106,20 +134,48 @@ pub fn run(command: Command) -> Result<Exit> {
         display.set(done, total, String::new);
     };
     let clip = arguments.clip.as_deref();
-    let key = keys::create(
+    keys::create(
         &options,
         kept,
         clip,
-        &compute,
+        compute,
         &Stop::default(),
         |progress| match progress {
             NewKey::Pictures(done, total) => show(0, "pictures", done, total),
             NewKey::Decoder(Progress::Encoding(done, total)) => show(1, "messages", done, total),
             NewKey::Decoder(Progress::Training(done, total)) => show(2, "decoder", done, total),
         },
-    )?;
-    drop(display);
-    key.write(&arguments.output)?;
+    )
+}
+
+/// A key whose messages a convolutional decoder reads.
+fn hidden(arguments: &Create, compute: &Compute) -> Result<Key> {
+    let of_clip = [
+        ("clip", arguments.clip.is_some()),
+        ("decoder", arguments.decoder.is_some()),
+        ("bits-per-token", arguments.bits_per_token.is_some()),
+        ("remove", arguments.remove.is_some()),
+        ("keep", arguments.keep.is_some()),
+    ];
+    if let Some((field, _)) = of_clip.into_iter().find(|(_, given)| *given) {
+        return Err(Error::BadOption {
+            field,
+            reason: "it is of keys that read with a CLIP, not of --extractor hidden".into(),
+        });
+    }
+    let options = HiddenKeyOptions {
+        bits: arguments.bits,
+        seed: arguments.seed,
+        steps: arguments.steps,
+        robust_to: arguments.robust_to,
+    };
+    let mut display = Display::new("decoder");
+    create_hidden_key(&options, compute, &Stop::default(), |done, total| {
+        display.set(done, total, String::new);
+    })
+}
+
+fn tell(arguments: &Create, compute: &Compute, key: &Key, start: Instant) -> Result<()> {
     let report = Report {
         key: key.id(),
         bits: key.bits(),
@@ -136,12 +192,16 @@ pub fn run(command: Command) -> Result<Exit> {
             .accuracy_unseen
             .map_or("unknown".into(), |a| format!("{:.2} %", 100.0 * a));
         print_line(&format!(
-            "key {} of {} bits written to {}; bits of unseen messages read from their texts: {unseen} ({:.0} s)",
+            "key {} of {} bits written to {}; bits of unseen {}: {unseen} ({:.0} s)",
             report.key,
             report.bits,
             arguments.output.display(),
+            match arguments.extractor {
+                Extractor::Clip => "messages read from their texts",
+                Extractor::Hidden => "marked pictures read",
+            },
             report.seconds
         ));
     }
-    Ok(Exit::Done)
+    Ok(())
 }

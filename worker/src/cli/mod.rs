@@ -107,6 +107,15 @@ impl Background {
     }
 }
 
+/// What reads a message from pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Extractor {
+    /// CLIP's features, the key's projection and its decoder.
+    Clip,
+    /// A convolutional decoder that the key holds.
+    Hidden,
+}
+
 /// Runs the command that the process was started with.
 pub fn run() -> ExitCode {
     let arguments = match Arguments::try_parse() {
@@ -199,6 +208,9 @@ mod tests {
     fn the_promised_commands_parse() {
         for line in [
             "key create --bits 32 --seed 7 -o K",
+            "key create --bits 8 --extractor hidden --steps 20 -o K",
+            "embed IN OUT --key K --message 0 --learn dc --ring -12.5",
+            "evaluate DIR --scenes A B --extractor hidden --vae V",
             "embed IN OUT --key K --message 0123abcd --preset draft --seed 1 --device cpu --size 128 --json --memory 2048",
             "embed IN OUT --key K --message 0123abcd --force --report R --ignore-bad-rows",
             "verify A B C --key K --message 0123abcd --json --memory 1 --ignore-bad-rows",

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, print_json, print_line};
-use crate::work::findings::{Findings, Views, read};
+use crate::work::findings::{Findings, Views, read_and_compare};
 use crate::work::load;
 
 #[derive(Args)]
@@ -84,13 +84,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
     let mut display = Display::new("reading");
-    let (reading, ignored) = read(&engine, &source, &views, |done, total| {
+    let compared = read_and_compare(&engine, &source, &views, message.as_ref(), |done, total| {
         display.set(done, total, String::new);
     })?;
     drop(display);
-    let comparison = message.map(|message| reading.compare(&message)).transpose()?;
     let report = Report {
-        findings: Findings::new(&reading, comparison.as_ref(), ignored.as_ref())?,
+        findings: Findings::of(&compared)?,
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,
         clip: &key.clip.name,
@@ -98,7 +97,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         print_json(&report)?;
     } else {
-        tell(&report.findings, comparison.as_ref(), ignored.as_ref());
+        tell(
+            &report.findings,
+            compared.comparison.as_ref(),
+            compared.ignored.as_ref(),
+        );
     }
     Ok(match report.findings.verdict {
         Verdict::Match => Exit::Done,
@@ -132,6 +135,9 @@ fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: Option<&Ign
         ),
         None => format!("{verdict}: {read}"),
     });
+    if let Some(framing) = &report.framing {
+        print_line(&format!("read best of {} ways: {framing}", report.framings));
+    }
     if let Some(reason) = &report.reason {
         print_line(reason);
     }

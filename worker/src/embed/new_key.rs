@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::message::key::Secret;
 use crate::message::tokens::hmac_sha256;
 use crate::message::{
-    CONTEXT, ClipIdentity, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit, train, training,
+    CONTEXT, ClipIdentity, Decoding, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit, train, training,
 };
 use crate::picture::Picture;
 use crate::stop::Stop;
@@ -80,8 +80,10 @@ pub fn create_key(
         seed: options.seed,
         bits_per_token,
         clip: identity,
-        projection,
-        decoder: trained.weights,
+        decoding: Decoding::Clip {
+            projection,
+            decoder: trained.weights,
+        },
         accuracy_unseen: trained.accuracy_unseen,
         accuracy_unseen_noisy: trained.accuracy_unseen_noisy,
     })

@@ -59,7 +59,10 @@ pub fn optimise(
         });
     }
     let gaussians = &scene.gaussians;
-    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+    let mut sampler = ViewSampler::new(gaussians, settings.seed)?;
+    if let Some(ring) = settings.ring {
+        sampler.train_on_ring(ring.elevation.to_radians());
+    }
     let mut held_out = settings
         .early_stop
         .map(|stop| HeldOut::new(engine, gaussians, &sampler, settings, stop))
@@ -254,7 +257,7 @@ mod tests {
     use crate::device::{DeviceChoice, open};
     use crate::embed::{Augmentation, Preset};
     use crate::message::key::Secret;
-    use crate::message::{ClipIdentity, DecoderWeights, Key, Projection};
+    use crate::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
     use crate::sample::sample;
     use rand::RngExt;
 
@@ -278,8 +281,10 @@ mod tests {
                 name: String::new(),
                 hash: String::new(),
             },
-            projection,
-            decoder: DecoderWeights::seeded(16, 4, 1),
+            decoding: Decoding::Clip {
+                projection,
+                decoder: DecoderWeights::seeded(16, 4, 1),
+            },
             accuracy_unseen: None,
             accuracy_unseen_noisy: None,
         };

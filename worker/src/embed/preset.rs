@@ -58,6 +58,7 @@ impl Preset {
             views_per_step: 8,
             fresh_per_step: 4,
             views: None,
+            ring: None,
             pool_views: 150,
             pool_mebibytes: 1024,
             half_weights: false,

@@ -80,6 +80,15 @@ pub struct Target {
     pub message: bool,
 }
 
+/// Training views on a circle around the scene, all at one height and one distance, as in the paper's public code, instead
+/// of over the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ring {
+    /// Degrees above the scene's horizon, -80 to 80.
+    pub elevation: f32,
+}
+
 /// The numbers of an embedding.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,6 +105,10 @@ pub struct Settings {
     /// Most different training views; `None` has fresh ones at every step. Never fewer than it takes to show every
     /// Gaussian that can be seen.
     pub views: Option<usize>,
+    /// Where training views are taken from; `None` has them over the sphere. Held-out views are over the sphere in any case.
+    // Left out of JSON where there is none, so that settings from before it was there have the hash that they had.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ring: Option<Ring>,
     /// Views that are kept for later steps; fresh ones replace the oldest.
     pub pool_views: usize,
     /// Memory for kept views, in MiB; the oldest go first.
@@ -181,6 +194,9 @@ impl Settings {
         count("pool_views", self.pool_views, 1_000_000)?;
         within("size", f64::from(self.size), 16.0, 4096.0)?;
         within("distorted_size", f64::from(self.distorted_size), 16.0, 4096.0)?;
+        if let Some(ring) = &self.ring {
+            within("ring.elevation", f64::from(ring.elevation), -80.0, 80.0)?;
+        }
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         let l = &self.lambda;
@@ -276,10 +292,14 @@ mod tests {
         assert_eq!(changed.early_stop, None);
         assert_eq!(changed.lambda.l1, standard.lambda.l1);
         assert_eq!(changed.target, standard.target);
+        let ring = standard.overridden(r#"{"ring": {"elevation": -12}}"#).unwrap().ring;
+        assert_eq!(ring, Some(Ring { elevation: -12.0 }));
         let reason = |json| standard.overridden(json).unwrap_err().to_string();
         assert!(reason(r#"{"stepz": 7}"#).contains("stepz"));
         assert!(reason("[]").contains("settings"));
         assert!(reason(r#"{"fresh_per_step": 99}"#).contains("99 is outside 0 to 8"));
         assert!(reason(r#"{"size": 4}"#).contains("outside 16"));
+        assert!(reason(r#"{"ring": {"elevation": 90}}"#).contains("90 is outside -80 to 80"));
+        assert!(!serde_json::to_string(&standard).unwrap().contains("ring"));
     }
 }

@@ -29,7 +29,7 @@ impl Shown {
     /// Tones that whoever reads a picture guesses and undoes ([`crate::extract::guesses`]) are left as they are.
     pub fn new(settings: &Settings, engine: &Engine) -> Self {
         let mut layer = settings.layer();
-        if engine.reads_exact_colours() {
+        if engine.extractor.reads_exact_colours() {
             (layer.ranges.brightness, layer.ranges.contrast) = ([1.0; 2], [1.0; 2]);
         }
         Self {
@@ -44,7 +44,7 @@ impl Shown {
     /// Draws outside of their limits, which checked settings rule out.
     pub fn logits(&self, engine: &Engine, pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Result<Tensor<2>> {
         if self.layer.robust_to.of_pictures().next().is_none() {
-            return Ok(engine.logits(pictures));
+            return engine.logits(pictures);
         }
         let draws = self.layer.draw(pictures.dims()[0], rng);
         let (clean, distorted): (Vec<usize>, Vec<usize>) = (0..draws.len()).partition(|&i| draws[i] == Draw::Clean);
@@ -57,7 +57,7 @@ impl Shown {
         };
         let mut parts = Vec::new();
         if !clean.is_empty() {
-            parts.push(engine.logits(some(&clean)));
+            parts.push(engine.logits(some(&clean))?);
         }
         if !distorted.is_empty() {
             let chosen: Vec<Draw> = distorted.iter().map(|&i| draws[i].clone()).collect();
@@ -67,7 +67,7 @@ impl Shown {
                 field: "distortions",
                 reason: e.to_string(),
             })?;
-            parts.push(engine.logits(with_ground(&large, done, &chosen)));
+            parts.push(engine.logits(with_ground(&large, done, &chosen))?);
         }
         // Back in order: where each picture's row is among the parts.
         let mut order = vec![0_i64; draws.len()];
@@ -102,7 +102,7 @@ mod tests {
     use crate::device::{DeviceChoice, open};
     use crate::embed::Preset;
     use crate::message::key::Secret;
-    use crate::message::{ClipIdentity, DecoderWeights, Key, Projection};
+    use crate::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
     use crate::train::{TrainOptions, config, filters};
     use rand::SeedableRng;
 
@@ -130,8 +130,10 @@ mod tests {
             bits_per_token: 1,
             seed: None,
             clip: nobody,
-            projection: Projection::identity(8),
-            decoder: DecoderWeights::seeded(8, 8, 1),
+            decoding: Decoding::Clip {
+                projection: Projection::identity(8),
+                decoder: DecoderWeights::seeded(8, 8, 1),
+            },
             accuracy_unseen: None,
             accuracy_unseen_noisy: None,
         };
@@ -176,7 +178,7 @@ mod tests {
             .collect();
         let pictures = Tensor::<4>::from_data(TensorData::new(values, [6, 3, 64, 64]), &engine.compute.device);
         let host = |t: Tensor<2>| engine.to_host(t).unwrap();
-        let plain = host(engine.logits(pictures.clone()));
+        let plain = host(engine.logits(pictures.clone()).unwrap());
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let draws = shown.layer.draw(6, &mut rng.clone());
         let seen = host(shown.logits(&engine, pictures, &mut rng).unwrap());

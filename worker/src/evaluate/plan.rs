@@ -5,7 +5,7 @@ use guardsplat_evaluation::report::names;
 
 use super::trade::Variant;
 use super::trial::Trial;
-use crate::embed::{DescentOptions, Settings};
+use crate::embed::{Learn, Ring, Settings};
 use crate::error::Result;
 
 /// Bits of most experiments.
@@ -104,13 +104,13 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                     .iter()
                     .map(ToString::to_string)
                     .collect();
-                let attacks: Vec<&str> = attacks.iter().map(String::as_str).collect();
+                let attacks: Vec<&str> = attacks.iter().map(String::as_str).chain([names::VAE]).collect();
                 add(ROBUST_BITS, names::STANDARD, *standard, &attacks)?;
             }
             Kind::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
-                add(BITS, names::DC, learning(standard, 1.0, 0.0), &none)?;
-                add(BITS, names::REST, learning(standard, 0.0, 1.0), &none)?;
+                add(BITS, names::DC, standard.learning(Learn::Dc), &none)?;
+                add(BITS, names::REST, standard.learning(Learn::Rest), &none)?;
             }
             Kind::Losses => {
                 add(BITS, names::STANDARD, *standard, &none)?;
@@ -139,7 +139,12 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                     add(BITS, &format!("{}{weight}", names::LAMBDA_MSG), message, &none)?;
                 }
             }
-            Kind::Elevation => add(BITS, names::STANDARD, *standard, &none)?,
+            Kind::Elevation => {
+                add(BITS, names::STANDARD, *standard, &none)?;
+                let mut ring = *standard;
+                ring.ring = Some(RING);
+                add(BITS, names::RING, ring, &none)?;
+            }
             Kind::Formats => {
                 let mut trials = vec![names::NONE.to_string(), "sh-degree:0".into()];
                 trials.extend(names::FORMATS.map(|format| format!("{}{format}", names::FORMAT)));
@@ -165,6 +170,8 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
     Ok(plan)
 }
 
+/// The circle of views of the variant that is trained on one; the public code's height is that of its data sets.
+const RING: Ring = Ring { elevation: 30.0 };
 /// The variant whose weights of the loss stay as they are, instead of being changed so that a PSNR is held.
 const FIXED_WEIGHTS: &str = "fixed weights";
 const PERTURBATIONS: [&str; 8] = [
@@ -180,19 +187,6 @@ const PERTURBATIONS: [&str; 8] = [
 
 fn parsed(texts: &[&str]) -> Result<Vec<Trial>> {
     texts.iter().map(|text| text.parse()).collect()
-}
-
-/// Settings that learn constant and other coefficients at these shares of their rates.
-fn learning(standard: &Settings, dc: f32, rest: f32) -> Settings {
-    let mut settings = *standard;
-    settings.adam.rate_dc *= dc;
-    settings.adam.rate_rest *= rest;
-    settings.descent = settings.descent.map(|descent| DescentOptions {
-        dc: descent.dc * dc,
-        rest: descent.rest * rest,
-        ..descent
-    });
-    settings
 }
 
 #[cfg(test)]

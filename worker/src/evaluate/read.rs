@@ -1,6 +1,7 @@
 //! Views of a scene as 8-bit pictures, and what is read of them after something was done to them.
 use std::collections::BTreeMap;
 
+use guardsplat_distortion::Vae;
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::names;
 use guardsplat_evaluation::report::record::{Id, Reading as Record};
@@ -11,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::extract::{Engine, Reading, read_guesses};
 use crate::message::Message;
 use crate::picture::Picture;
-use crate::quality::{mean_psnr, psnr};
+use crate::quality::{batch, mean_psnr, psnr, unbatch};
 use crate::scene::Gaussians;
 use crate::view::{Camera, Split, ViewSampler};
 
@@ -96,6 +97,20 @@ impl Views {
             cameras: self.cameras.clone(),
             images,
             strange: attack.to_string() != names::NONE,
+        })
+    }
+
+    /// The same views compressed by a learned codec and decompressed, in 8 bits again.
+    pub fn compressed(&self, engine: &Engine, vae: &Vae) -> Result<Self> {
+        let one = |image: &RgbImage| {
+            engine.stop.check()?;
+            let pictures = batch(&[&to_picture(image)], &engine.compute.device)?;
+            let left = unbatch(vae.reconstruct(pictures))?;
+            left.first().map_or_else(|| Ok(image.clone()), to_image)
+        };
+        Ok(Self {
+            cameras: self.cameras.clone(),
+            images: self.images.iter().map(one).collect::<Result<_>>()?,
         })
     }
 

@@ -2,6 +2,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use guardsplat_distortion::Vae;
 use guardsplat_evaluation::report::names;
 use guardsplat_evaluation::report::record::{Embedding, Id, Record, reading_id};
 use guardsplat_evaluation::report::store::Store;
@@ -32,6 +33,8 @@ pub struct Options {
     pub size: u32,
     /// Held-out views of each mark.
     pub views: usize,
+    /// The learned codec; without it, it is not among the attacks.
+    pub vae: Option<Vae>,
 }
 
 /// What a run tells whoever watches it.
@@ -187,7 +190,8 @@ impl One<'_> {
         let (size, views) = (self.options.size, self.options.views);
         let left = |store: &Store| -> Vec<&Trial> {
             let is_left = |trial: &&Trial| !store.has(&reading_id(&id, &trial.to_string(), size, views as u32));
-            self.wanted.trials.iter().filter(is_left).collect()
+            let possible = |trial: &&Trial| **trial != Trial::Vae || self.options.vae.is_some();
+            self.wanted.trials.iter().filter(possible).filter(is_left).collect()
         };
         if store.has(&id) && left(store).is_empty() {
             return Ok(id);
@@ -228,6 +232,10 @@ impl One<'_> {
         for trial in trials {
             let read = match trial {
                 Trial::Pictures { attack, .. } => plain.attacked(attack, self.seed)?,
+                Trial::Vae => match &self.options.vae {
+                    Some(vae) => plain.compressed(self.engine, vae)?,
+                    None => continue,
+                },
                 Trial::Scene(change) => {
                     let changed = change.apply(&marked, self.seed)?;
                     Views::render(self.engine, &changed, &cameras)?

@@ -25,6 +25,8 @@ pub enum Trial {
         /// What is done.
         attack: Attack,
     },
+    /// Compression of pictures by the learned codec, with weights that somebody gave.
+    Vae,
     /// Something done to the scene.
     Scene(SceneChange),
 }
@@ -64,6 +66,8 @@ impl FromStr for Trial {
             SceneChange::ShDegree(number(degree)? as usize)
         } else if let Some(format) = text.strip_prefix(names::FORMAT) {
             SceneChange::Format(format_of(format)?)
+        } else if text == names::VAE {
+            return Ok(Self::Vae);
         } else {
             let attack = match text.strip_prefix(names::OCCLUSION) {
                 Some(share) => format!("{MASK}{share}").parse(),
@@ -82,6 +86,7 @@ impl fmt::Display for Trial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pictures { name, .. } => f.write_str(name),
+            Self::Vae => f.write_str(names::VAE),
             Self::Scene(SceneChange::PruneLowest(share)) => write!(f, "{}{share}", names::PRUNE_LOWEST_PREFIX),
             Self::Scene(SceneChange::PruneRandom(share)) => write!(f, "{}{share}", names::PRUNE_RANDOM_PREFIX),
             Self::Scene(SceneChange::ShNoise(sigma)) => write!(f, "{}{sigma}", names::SH_NOISE),
@@ -152,7 +157,7 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_reports() {
-        let all = names::PAPER_ATTACKS.iter().filter(|name| !name.starts_with("vae"));
+        let all = names::PAPER_ATTACKS.iter();
         let scene = [
             "prune-lowest:0.25",
             "prune-random:0.5",
@@ -167,7 +172,14 @@ mod tests {
             let name = format!("format:{format}");
             assert_eq!(name.parse::<Trial>().unwrap().to_string(), name);
         }
-        for wrong in ["prune-lowest:x", "format:obj", "occlusion:2", "jpeg:1000", "magic"] {
+        for wrong in [
+            "prune-lowest:x",
+            "format:obj",
+            "occlusion:2",
+            "jpeg:1000",
+            "vae:1",
+            "magic",
+        ] {
             assert!(wrong.parse::<Trial>().is_err(), "{wrong}");
         }
     }

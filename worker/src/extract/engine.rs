@@ -1,16 +1,16 @@
-//! The parts that embedding and extraction share: device, CLIP, a key's decoder and the renderer.
+//! The parts that embedding and extraction share: device, what reads messages from pictures, and the renderer.
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
-use crate::clip::config::VisionTower;
+use super::extractor::{ClipExtractor, Extractor};
 use crate::clip::{Clip, resize};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::memory::Limits;
-use crate::message::{Key, Reader};
+use crate::message::Key;
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch, unbatch};
 use crate::scene::Gaussians;
@@ -52,10 +52,8 @@ pub(crate) fn cpu_weight_cache(side: u32, half: bool) -> WeightCache {
 pub struct Engine {
     /// Where tensors live.
     pub compute: Compute,
-    /// The frozen CLIP.
-    pub clip: Clip,
-    /// The key's projection and decoder.
-    pub reader: Reader,
+    /// What reads messages from pictures.
+    pub extractor: Box<dyn Extractor>,
     /// Bits of the key's messages.
     pub bits: usize,
     /// The renderer, from its first use on: pictures are read without it.
@@ -75,32 +73,27 @@ impl Engine {
     /// ([`Key::require_clip`]), who knows their files.
     ///
     /// # Errors
-    /// When features and decoder differ in width.
+    /// Those of [`ClipExtractor::new`].
     pub fn new(compute: Compute, clip: Clip, key: &Key, lpips_weights: Option<PathBuf>) -> Result<Self> {
-        if clip.dim() != key.projection.width {
-            return Err(Error::BadModel {
-                name: key.clip.name.clone(),
-                reason: format!(
-                    "its features have {} dimensions, the key reads {}",
-                    clip.dim(),
-                    key.projection.width
-                ),
-            });
-        }
-        Ok(Self {
+        let extractor = ClipExtractor::new(clip, key, &compute.device)?;
+        Ok(Self::with_extractor(compute, Box::new(extractor), lpips_weights))
+    }
+
+    /// An engine that reads with any extractor, whose weights are on the device of `compute`.
+    pub fn with_extractor(compute: Compute, extractor: Box<dyn Extractor>, lpips_weights: Option<PathBuf>) -> Self {
+        Self {
             rasterizer: OnceLock::new(),
-            reader: key.reader(&compute.device),
-            bits: key.bits(),
+            bits: extractor.bits(),
+            extractor,
             limits: Limits {
                 buffer: compute.max_buffer,
                 ..Limits::of_machine(None)
             },
             compute,
-            clip,
             lpips_weights,
             lpips: OnceLock::new(),
             stop: Stop::default(),
-        })
+        }
     }
 
     /// The renderer.
@@ -141,12 +134,15 @@ impl Engine {
     pub fn model_bytes(&self, with_lpips: bool) -> u64 {
         let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
         let lpips = self.lpips_weights.as_ref().filter(|_| with_lpips).map_or(0, size);
-        4 * (self.clip.parameters() + self.reader.parameters()) as u64 + lpips
+        4 * self.extractor.parameters() as u64 + lpips
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]` in [0, 1]; differentiable in the pictures.
-    pub fn logits(&self, pictures: Tensor<4>) -> Tensor<2> {
-        self.reader.image_logits(self.clip.image_features(pictures))
+    ///
+    /// # Errors
+    /// Those of the extractor.
+    pub fn logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        self.extractor.logits(pictures)
     }
 
     /// Logits of each picture, `bits` numbers a picture. Sizes may differ.
@@ -159,24 +155,19 @@ impl Engine {
             for chunk in same.chunks(READ_BATCH) {
                 self.stop.check()?;
                 let chunk: Vec<&Picture> = chunk.iter().collect();
-                let logits = self.logits(batch(&chunk, &self.compute.device)?);
+                let logits = self.logits(batch(&chunk, &self.compute.device)?)?;
                 rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
             }
         }
         Ok(rows)
     }
 
-    /// Whether CLIP reads exact colours, as the shipped one does: then tones that were changed must be undone.
-    pub fn reads_exact_colours(&self) -> bool {
-        matches!(self.clip.config.vision.tower, VisionTower::Statistics { .. })
-    }
-
-    /// A picture at the side that CLIP takes in.
+    /// A picture at the side that the extractor takes in.
     ///
     /// # Errors
     /// A picture without pixels, or a failing device.
     pub fn resized(&self, picture: &Picture) -> Result<Picture> {
-        let side = self.clip.config.vision.image_size;
+        let side = self.extractor.side();
         let pictures = resize(batch(&[picture], &self.compute.device)?, side, side);
         Ok(unbatch(pictures)?.swap_remove(0))
     }

@@ -1,6 +1,9 @@
 //! Ways to look at a picture that somebody may have turned, mirrored, or put into a frame.
 //!
 //! Each is read for itself, and each is a hypothesis of its own: whoever decides on the best of them pays for all.
+use super::Engine;
+use super::restore::{Guess, guesses, read_guesses};
+use crate::error::Result;
 use crate::picture::Picture;
 
 /// How far values of a border may be from its corner's: what JPEG does to a plain colour.
@@ -9,7 +12,7 @@ const TOLERANCE: f32 = 8.0 / 255.0;
 const LEAST_SIDE: u32 = 16;
 
 /// What is done to a picture before it is read: borders are cut off, then it is turned, then mirrored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Framing {
     /// Counterclockwise, 0 to 3.
     pub quarter_turns: u8,
@@ -17,6 +20,24 @@ pub struct Framing {
     pub mirrored: bool,
     /// Borders of one colour are cut off.
     pub trimmed: bool,
+    /// What is guessed to have been done to its tones, and undone.
+    pub undone: Guess,
+}
+
+impl std::fmt::Display for Framing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.undone.fmt(f)?;
+        if self.quarter_turns > 0 {
+            write!(f, ", turned by {} degrees", 90 * u32::from(self.quarter_turns))?;
+        }
+        if self.mirrored {
+            f.write_str(", mirrored")?;
+        }
+        if self.trimmed {
+            f.write_str(", without borders")?;
+        }
+        Ok(())
+    }
 }
 
 impl Framing {
@@ -27,12 +48,40 @@ impl Framing {
                 quarter_turns,
                 mirrored,
                 trimmed,
+                undone: Guess::Nothing,
             })
         })
     }
 
+    /// The ways that this engine tries on a picture, as given first; with borders or `trimmed`. How a picture lies makes no
+    /// difference to an average over its pixels, so where exact colours are read it is tones that are guessed.
+    pub fn tried(engine: &Engine, trimmed: bool) -> Vec<Self> {
+        if !engine.extractor.reads_exact_colours() {
+            return Self::laid(trimmed).collect();
+        }
+        let guessed = guesses(engine).into_iter().map(|undone| Self {
+            trimmed,
+            undone,
+            ..Self::default()
+        });
+        guessed.collect()
+    }
+
+    /// Logits of a picture in each of these ways, in their order; its borders, if they are to go, were cut off before.
+    ///
+    /// # Errors
+    /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
+    pub fn read(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
+        if engine.extractor.reads_exact_colours() {
+            return read_guesses(engine, picture);
+        }
+        // One at a time: a large picture need not fit in memory eight times.
+        let laid = Self::laid(false).map(|framing| Ok(engine.read_logits(&[framing.lay(picture)])?.swap_remove(0)));
+        laid.collect()
+    }
+
     /// The picture turned and mirrored; its borders, if they are to go, were cut off before.
-    pub fn lay(self, picture: &Picture) -> Picture {
+    fn lay(self, picture: &Picture) -> Picture {
         let (w, h) = (picture.width as usize, picture.height as usize);
         let (width, height) = match self.quarter_turns % 2 {
             0 => (w, h),

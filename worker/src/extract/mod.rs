@@ -1,5 +1,6 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
+mod extractor;
 mod framing;
 mod kind;
 mod pictures;
@@ -8,6 +9,7 @@ mod restore;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
+pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
 pub use framing::{Framing, without_borders};
 pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
@@ -22,10 +24,10 @@ use crate::view::{Split, ViewSampler};
 /// Views that a scene is read from where nothing else is asked for.
 pub const DEFAULT_VIEWS: usize = 20;
 
-/// Side of views in pixels where nothing else is asked for: what CLIP takes in, between 128 and 512. The presets train
-/// at the shipped CLIP's size, and a mark is read best at the size it was trained at.
+/// Side of views in pixels where nothing else is asked for: what the extractor takes in, between 128 and 512. The presets
+/// train at the shipped CLIP's size, and a mark is read best at the size it was trained at.
 pub fn default_size(engine: &Engine) -> u32 {
-    engine.clip.config.vision.image_size.clamp(128, 512) as u32
+    engine.extractor.side().clamp(128, 512) as u32
 }
 
 /// Reads pictures, whatever their sizes.

@@ -66,6 +66,14 @@ impl Reading {
     /// # Errors
     /// When lengths differ.
     pub fn compare(&self, message: &Message) -> Result<Comparison> {
+        self.compare_among(message, 1)
+    }
+
+    /// As [`Reading::compare`], where this is one of so many hypotheses that are tried.
+    ///
+    /// # Errors
+    /// When lengths differ.
+    pub fn compare_among(&self, message: &Message, hypotheses: u32) -> Result<Comparison> {
         if message.len() != self.summed.len() {
             return Err(Error::BadOption {
                 field: "message",
@@ -79,7 +87,7 @@ impl Reading {
             .collect::<Result<Vec<f64>>>()?;
         let matched = self.message()?.matches(message);
         Ok(Comparison {
-            decision: decide(message.len() as u32, matched as u32, 1),
+            decision: decide(message.len() as u32, matched as u32, hypotheses),
             bit_accuracy: accuracies.iter().sum::<f64>() / accuracies.len() as f64,
             bit_accuracy_worst_view: accuracies.iter().copied().fold(1.0, f64::min),
         })

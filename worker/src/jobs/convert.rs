@@ -8,7 +8,7 @@ use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{self as api};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::embed::{self, NewKey, Outcome, Preset, Settings};
-use guardsplat_worker::extract::{DEFAULT_VIEWS, Framing, Reading};
+use guardsplat_worker::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
 use guardsplat_worker::message::training::Progress as Training;
 use guardsplat_worker::message::{Key, Verdict};
 use guardsplat_worker::scene::{BadRows, Ignored};
@@ -129,6 +129,8 @@ pub fn verify_result(found: Findings) -> api::VerifyResult {
         view_agreement: found.view_agreement,
         reason: found.reason.unwrap_or_default(),
         ignored_rows: found.ignored_rows as u64,
+        framings: found.framings as u32,
+        framing: found.framing.unwrap_or_default(),
         ..api::VerifyResult::default()
     }
 }
@@ -141,7 +143,24 @@ pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
         trimmed: framing.trimmed,
         views: reading.views.len() as u32,
         logits: reading.summed.clone(),
+        undone: undone(framing.undone),
     }
+}
+
+fn undone(guess: Guess) -> Option<api::Undone> {
+    use api::undone::Kind;
+    let (kind, factor) = match guess {
+        Guess::Nothing => return None,
+        Guess::Ground => (Kind::Ground, 1.0),
+        Guess::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
+        Guess::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
+        Guess::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
+        Guess::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
+    };
+    Some(api::Undone {
+        kind: kind.into(),
+        factor,
+    })
 }
 
 /// What may be known of a key.

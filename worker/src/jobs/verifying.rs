@@ -4,13 +4,13 @@ use std::time::{Duration, Instant};
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{FramedReading, VerifyResult, VerifySpec};
-use guardsplat_worker::extract::{Framing, MAX_PICTURES, find_source};
+use guardsplat_worker::extract::{MAX_PICTURES, find_source};
 use guardsplat_worker::message::Key;
 
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::work::findings::{Findings, read, read_framed};
+use crate::work::findings::{Findings, read_and_compare, read_framed};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
@@ -46,27 +46,23 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let device = bench.device().to_owned();
         let engine = bench.engine(&name, &key, stop)?;
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
-        let (framed, ignored) = match claim {
-            true => read_framed(engine, &source, &views, progress)?,
-            false => {
-                let (reading, ignored) = read(engine, &source, &views, progress)?;
-                (vec![(Framing::default(), reading)], ignored)
-            }
+        let (findings, framed) = if claim {
+            let (framed, ignored) = read_framed(engine, &source, &views, progress)?;
+            // As given comes first.
+            let reading = framed.first().map(|(_, reading)| reading);
+            let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
+            (Findings::new(reading, None, ignored.as_ref())?, framed)
+        } else {
+            let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
+            (Findings::of(&compared)?, Vec::new())
         };
-        // As given comes first.
-        let reading = framed.first().map(|(_, reading)| reading);
-        let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-        let comparison = message.map(|message| reading.compare(&message)).transpose()?;
         Ok(Verified {
-            findings: Findings::new(reading, comparison.as_ref(), ignored.as_ref())?,
+            findings,
             // Of a raw message all is said in the findings.
-            readings: match claim {
-                true => framed
-                    .iter()
-                    .map(|(framing, reading)| convert::framed(*framing, reading))
-                    .collect(),
-                false => Vec::new(),
-            },
+            readings: framed
+                .iter()
+                .map(|(framing, reading)| convert::framed(*framing, reading))
+                .collect(),
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),

@@ -12,13 +12,12 @@ use super::bits::{Message, check_bits};
 use super::decoder::DecoderWeights;
 use super::key_file;
 use super::projection::Projection;
-use super::reader::Reader;
 use super::tokens::{CONTEXT, TokenTable, fewest_bits_per_token, hmac_sha256};
 use super::training::{Progress, TrainingOptions, train};
 use crate::error::{Error, Result};
 use crate::stop::Stop;
 
-/// Which CLIP a key belongs to.
+/// Which CLIP a key belongs to; for keys that read pictures without one, how their decoder is made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClipIdentity {
     /// Its name, for people.
@@ -87,6 +86,20 @@ impl fmt::Debug for Secret {
     }
 }
 
+/// How a key's messages are read from pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Decoding {
+    /// From CLIP's features of a picture.
+    Clip {
+        /// What happens to features before the decoder.
+        projection: Projection,
+        /// The decoder.
+        decoder: DecoderWeights,
+    },
+    /// By a convolutional decoder from the picture itself.
+    Hidden(guardsplat_hidden::Weights),
+}
+
 /// What embedding and extraction need besides a scene and a CLIP.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Key {
@@ -98,14 +111,13 @@ pub struct Key {
     pub bits_per_token: usize,
     /// The CLIP whose features the decoder reads.
     pub clip: ClipIdentity,
-    /// What happens to features before the decoder.
-    pub projection: Projection,
-    /// The decoder.
-    pub decoder: DecoderWeights,
+    /// How messages are read.
+    pub decoding: Decoding,
     /// Share of right bits on text features of messages not seen in training; `None` for lengths of so few messages
-    /// that none could be kept apart.
+    /// that none could be kept apart. Of a convolutional decoder: in pictures that it did not see.
     pub accuracy_unseen: Option<f64>,
-    /// The same under the noise of the training.
+    /// The same under the noise of the training; of a convolutional decoder: in pictures that were turned, zoomed and
+    /// moved.
     pub accuracy_unseen_noisy: Option<f64>,
 }
 
@@ -145,8 +157,10 @@ impl Key {
             seed: options.seed,
             bits_per_token,
             clip,
-            projection,
-            decoder: trained.weights,
+            decoding: Decoding::Clip {
+                projection,
+                decoder: trained.weights,
+            },
             accuracy_unseen: trained.accuracy_unseen,
             accuracy_unseen_noisy: trained.accuracy_unseen_noisy,
         })
@@ -154,7 +168,10 @@ impl Key {
 
     /// Bits of its messages.
     pub fn bits(&self) -> usize {
-        self.decoder.bits()
+        match &self.decoding {
+            Decoding::Clip { decoder, .. } => decoder.bits(),
+            Decoding::Hidden(weights) => weights.bits(),
+        }
     }
 
     /// 32 hexadecimal digits that name the key and give nothing of the secret away: an HMAC over everything in it.
@@ -182,11 +199,6 @@ impl Key {
     /// Parses a message of the key's length from hexadecimal.
     pub fn message(&self, text: &str) -> Result<Message> {
         Message::parse(text, self.bits())
-    }
-
-    /// Projection and decoder on a device.
-    pub fn reader(&self, device: &Device) -> Reader {
-        Reader::new(&self.projection, &self.decoder, device)
     }
 
     /// Fails unless the key belongs to the CLIP with these weights; `path` is the key's file, for the message.

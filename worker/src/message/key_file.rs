@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bits::MAX_BITS;
 use super::decoder::{DecoderWeights, HIDDEN, LayerWeights};
-use super::key::{ClipIdentity, Key, Secret};
+use super::key::{ClipIdentity, Decoding, Key, Secret};
 use super::projection::Projection;
 use super::tokens::check_bits_per_token;
 use crate::clip::check_header;
@@ -31,6 +31,9 @@ struct Header {
     bits_per_token: usize,
     #[serde(default = "three")]
     layers: usize,
+    /// What reads pictures; CLIP unless it is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    extractor: Option<String>,
     secret: String,
     seed: Option<u64>,
     clip: ClipIdentity,
@@ -48,6 +51,9 @@ fn three() -> usize {
     3
 }
 
+/// What the header calls a convolutional decoder, and its tensors' names begin with.
+const HIDDEN_DECODER: &str = "hidden";
+
 /// One tensor of a key.
 pub(super) struct Named<'a> {
     name: String,
@@ -64,15 +70,28 @@ impl Named<'_> {
 
 /// All tensors of a key, in the order that its id covers them.
 pub(super) fn tensors(key: &Key) -> Vec<Named<'_>> {
-    let projection = key.projection.parts().into_iter();
-    let mut all: Vec<_> = projection
+    let (projection, decoder) = match &key.decoding {
+        Decoding::Clip { projection, decoder } => (projection, decoder),
+        Decoding::Hidden(weights) => {
+            let all = weights.tensors().into_iter();
+            return all
+                .map(|tensor| Named {
+                    name: format!("{HIDDEN_DECODER}.{}", tensor.name),
+                    shape: tensor.shape,
+                    values: tensor.values,
+                })
+                .collect();
+        }
+    };
+    let parts = projection.parts().into_iter();
+    let mut all: Vec<_> = parts
         .map(|(name, shape, values)| Named {
             name: name.into(),
             shape,
             values,
         })
         .collect();
-    for (i, layer) in key.decoder.layers.iter().enumerate() {
+    for (i, layer) in decoder.layers.iter().enumerate() {
         let (inputs, outputs) = (layer.inputs, layer.outputs);
         all.push(Named {
             name: format!("decoder.{i}.weight"),
@@ -108,12 +127,17 @@ pub(super) fn write(key: &Key, path: &Path) -> Result<()> {
 
 /// The file's bytes.
 pub(super) fn serialize(key: &Key) -> Result<Vec<u8>, String> {
+    let (layers, extractor) = match &key.decoding {
+        Decoding::Clip { decoder, .. } => (decoder.layers.len(), None),
+        Decoding::Hidden(_) => (0, Some(HIDDEN_DECODER.into())),
+    };
     let header = Header {
         version: VERSION,
         id: key.id(),
         bits: key.bits(),
         bits_per_token: key.bits_per_token,
-        layers: key.decoder.layers.len(),
+        layers,
+        extractor,
         secret: hex::encode(key.secret.expose()),
         seed: key.seed,
         clip: key.clip.clone(),
@@ -182,11 +206,45 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     hex::decode_to_slice(&header.secret, &mut secret).map_err(|_| "its secret is not 64 hexadecimal digits")?;
 
     let file = SafeTensors::deserialize(bytes).map_err(|e| not_a_key(&e))?;
+    let decoding = match header.extractor.as_deref() {
+        None => clip_decoding(&file, &header)?,
+        Some(HIDDEN_DECODER) => {
+            let read = |name: &str, shape: &[usize]| tensor(&file, &format!("{HIDDEN_DECODER}.{name}"), shape);
+            let weights = guardsplat_hidden::Weights::from_tensors("decoder", header.bits, read);
+            Decoding::Hidden(weights.map_err(|e| e.to_string())?)
+        }
+        Some(other) => {
+            return Err(format!(
+                "it reads pictures with {other:?}, which this program does not know"
+            ));
+        }
+    };
+    let key = Key {
+        secret: Secret::new(secret),
+        seed: header.seed,
+        bits_per_token: header.bits_per_token,
+        clip: header.clip,
+        decoding,
+        accuracy_unseen: header.accuracy_unseen,
+        accuracy_unseen_noisy: header.accuracy_unseen_noisy,
+    };
+    // The id covers secret, weights, projection and CLIP, so it finds what the checks above let pass.
+    if key.id() != header.id {
+        return Err(format!(
+            "its content does not match its id {}: the file is damaged",
+            header.id
+        ));
+    }
+    Ok(key)
+}
+
+/// Projection and decoder of a key that reads CLIP's features.
+fn clip_decoding(file: &SafeTensors<'_>, header: &Header) -> Result<Decoding, String> {
     let matrix = file.tensor("projection.matrix_image").map_err(|e| e.to_string())?;
     let &[width, rank] = matrix.shape() else {
         return Err("projection.matrix_image is not a matrix".into());
     };
-    let read = |name: &str, shape: &[usize]| tensor(&file, name, shape);
+    let read = |name: &str, shape: &[usize]| tensor(file, name, shape);
     let projection = Projection {
         width,
         rank,
@@ -218,24 +276,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     };
     let decoder = DecoderWeights { layers };
     decoder.check()?;
-    let key = Key {
-        secret: Secret::new(secret),
-        seed: header.seed,
-        bits_per_token: header.bits_per_token,
-        clip: header.clip,
-        projection,
-        decoder,
-        accuracy_unseen: header.accuracy_unseen,
-        accuracy_unseen_noisy: header.accuracy_unseen_noisy,
-    };
-    // The id covers secret, weights, projection and CLIP, so it finds what the checks above let pass.
-    if key.id() != header.id {
-        return Err(format!(
-            "its content does not match its id {}: the file is damaged",
-            header.id
-        ));
-    }
-    Ok(key)
+    Ok(Decoding::Clip { projection, decoder })
 }
 
 fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
@@ -272,8 +313,10 @@ mod tests {
                 name: "tiny".into(),
                 hash: "ab".repeat(32),
             },
-            projection,
-            decoder: DecoderWeights::seeded(6, 32, 1),
+            decoding: Decoding::Clip {
+                projection,
+                decoder: DecoderWeights::seeded(6, 32, 1),
+            },
             accuracy_unseen: Some(0.999),
             accuracy_unseen_noisy: None,
         }
@@ -293,6 +336,30 @@ mod tests {
         assert_eq!(serialize(&key).unwrap(), serialize(&key.clone()).unwrap());
         key.write(&path).unwrap(); // replaces
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn convolutional_decoders_are_kept_and_checked() {
+        let weights = guardsplat_hidden::Weights::seeded(4, 3).unwrap();
+        let key = Key {
+            decoding: Decoding::Hidden(weights),
+            ..key()
+        };
+        let bytes = key.to_bytes().unwrap();
+        assert_eq!(Key::from_bytes("k", &bytes).unwrap(), key);
+        assert_eq!(key.bits(), 4);
+        let with = |from: &[u8], to: &[u8]| {
+            let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
+            let mut changed = bytes.clone();
+            changed[at..at + to.len()].copy_from_slice(to);
+            deserialize(&changed).unwrap_err()
+        };
+        assert!(with(b"extractor\\\":\\\"hidden", b"extractor\\\":\\\"magics").contains("\"magics\", which this"));
+        assert!(with(b"bits\\\":4", b"bits\\\":5").contains("hidden.head.weight is F32 [96, 4], not F32 [96, 5]"));
+        assert!(with(b"hidden.head.bias", b"hidden.head.bia5").contains("hidden.head.bias is missing"));
+        let mut last = bytes.clone();
+        *last.last_mut().unwrap() ^= 1;
+        assert!(deserialize(&last).is_err());
     }
 
     #[cfg(unix)]

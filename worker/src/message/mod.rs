@@ -17,7 +17,7 @@ pub mod training;
 pub use bits::{MAX_BITS, Message};
 pub use decoder::{Decoder, DecoderWeights, bce_from_logits};
 pub use fit::{FitOptions, fit};
-pub use key::{ClipIdentity, Key, KeyOptions};
+pub use key::{ClipIdentity, Decoding, Key, KeyOptions};
 pub use key_file::MAX_BYTES as MAX_KEY_BYTES;
 pub use projection::Projection;
 pub use reader::Reader;

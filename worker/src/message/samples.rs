@@ -127,6 +127,40 @@ impl Samples {
         (tensor(features, self.rank), tensor(targets, self.bits))
     }
 
+    /// As many samples as there are, in `order`, but the share of them that is read best gives way to the share that is read
+    /// worst, which then is there twice. A sample is read as well as its worst bit.
+    pub fn hardest_again(
+        &self,
+        decoder: &Decoder,
+        order: &[usize],
+        share: f32,
+        noise: Option<(&Vec<f32>, &mut ChaCha20Rng)>,
+        device: &Device,
+    ) -> Result<Vec<usize>> {
+        let rows: Vec<usize> = (0..self.len()).collect();
+        let logits = read(decoder.forward(self.batch(&rows, noise, device).0))?;
+        let signed = logits
+            .iter()
+            .zip(&self.targets)
+            .map(|(logit, target)| logit * (2.0 * target - 1.0));
+        let signed: Vec<f32> = signed.collect();
+        let margins: Vec<f32> = signed
+            .chunks_exact(self.bits)
+            .map(|bits| bits.iter().copied().fold(f32::INFINITY, f32::min))
+            .collect();
+        let mut by_margin = rows;
+        by_margin.sort_by(|a, b| margins[*a].total_cmp(&margins[*b]));
+        let count = (share * 0.5 * self.len() as f32) as usize;
+        let again = &by_margin[..count];
+        let left_out: HashSet<usize> = by_margin[self.len() - count..].iter().copied().collect();
+        Ok(order
+            .iter()
+            .filter(|row| !left_out.contains(row))
+            .chain(again)
+            .copied()
+            .collect())
+    }
+
     /// Share of right bits; `None` without samples.
     pub fn accuracy(
         &self,
@@ -151,7 +185,35 @@ impl Samples {
 mod tests {
     use rand::SeedableRng;
 
+    use super::super::decoder::{DecoderWeights, LayerWeights};
     use super::*;
+
+    #[test]
+    fn what_is_read_worst_comes_twice_and_the_best_not_at_all() {
+        // The decoder reads each sample's own number, so the margins are these.
+        let samples = Samples {
+            features: vec![4.0, -1.0, 2.0, 0.5],
+            targets: vec![1.0, 1.0, 1.0, 0.0],
+            rank: 1,
+            bits: 1,
+        };
+        let layer = LayerWeights {
+            inputs: 1,
+            outputs: 1,
+            weight: vec![1.0],
+            bias: vec![0.0],
+        };
+        let decoder = Decoder::new(&DecoderWeights { layers: vec![layer] }, &Device::flex());
+        let again = |share| {
+            let order = [3, 1, 0, 2];
+            samples
+                .hardest_again(&decoder, &order, share, None, &Device::flex())
+                .unwrap()
+        };
+        assert_eq!(again(0.0), [3, 1, 0, 2]);
+        assert_eq!(again(0.5), [3, 1, 2, 1]);
+        assert_eq!(again(1.0), [3, 1, 1, 3]);
+    }
 
     #[test]
     fn messages_are_distinct_and_the_unseen_ones_apart() {

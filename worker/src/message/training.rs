@@ -44,6 +44,9 @@ pub struct TrainingOptions {
     pub learning_rate: f64,
     /// Natural variation added to the features: times what unmarked pictures show (the projection's noise).
     pub noise: f32,
+    /// Share of each epoch after the first, 0 to 1, that is made of the messages that are read worst and their repetition, in
+    /// place of those that are read best; 0 has every message once an epoch.
+    pub hard: f32,
     /// Decides messages, initial weights, order and noise.
     pub seed: u64,
 }
@@ -73,6 +76,7 @@ impl Default for TrainingOptions {
             epochs: None,
             learning_rate: 5e-3,
             noise: 0.5,
+            hard: 0.0,
             seed: 0,
         }
     }
@@ -197,8 +201,15 @@ fn perceptron(
     });
     let steps = epochs * seen.len().div_ceil(options.batch);
     let mut step = 0;
-    for _ in 0..epochs {
+    for epoch in 0..epochs {
         shuffle(&mut order, rng);
+        if options.hard > 0.0 && epoch > 0 {
+            let plain = device.clone().without_autodiff();
+            let all = (0..seen.len()).collect::<Vec<_>>();
+            let noise = Some((noise, &mut *rng));
+            order = seen.hardest_again(&decoder.valid(), &all, options.hard, noise, &plain)?;
+            shuffle(&mut order, rng);
+        }
         for rows in order.chunks(options.batch) {
             stop.check()?;
             let (features, targets) = seen.batch(rows, Some((noise, &mut *rng)), &tracking);
@@ -230,6 +241,9 @@ fn check(options: &TrainingOptions) -> Result<()> {
     }
     if !(options.noise >= 0.0 && options.noise.is_finite()) {
         return bad("noise", "must be zero or a positive number");
+    }
+    if !(0.0..=1.0).contains(&options.hard) {
+        return bad("hard", "must be a share of 0 to 1");
     }
     if !(options.learning_rate > 0.0 && options.learning_rate.is_finite()) {
         return bad("learning rate", "must be a positive number");
@@ -347,6 +361,21 @@ mod tests {
     }
 
     #[test]
+    fn hard_messages_again_are_read_as_well() {
+        let table = TokenTable::new(&[9; 32], 16, 1).unwrap();
+        let projection = projection(&table, 0.1);
+        let hard = TrainingOptions { hard: 0.5, ..options() };
+        let run = |options: &TrainingOptions| {
+            let (device, stop) = (Device::flex(), Stop::default());
+            train(&table, &projection, tower, options, &device, &stop, |_| {}).unwrap()
+        };
+        let trained = run(&hard);
+        assert!(trained.accuracy_unseen.unwrap() > 0.98, "{:?}", trained.accuracy_unseen);
+        assert_ne!(trained.weights, run(&options()).weights);
+        assert_eq!(trained.steps, 160);
+    }
+
+    #[test]
     fn noise_costs_accuracy_and_none_costs_none() {
         let table = TokenTable::new(&[9; 32], 16, 1).unwrap();
         let run = |noise| {
@@ -406,6 +435,8 @@ mod tests {
             ..options()
         };
         assert!(run(tower, &bad_noise).contains("noise"));
+        let bad_share = TrainingOptions { hard: 1.5, ..options() };
+        assert!(run(tower, &bad_share).contains("hard"));
     }
 
     #[test]

@@ -11,6 +11,9 @@
 //! is spread evenly. Held-out places are visited in order of largest distance to those before, so that even the
 //! first five look from all around. Distance, aim and the place within a held-out cap are drawn from ChaCha8, one
 //! stream a view.
+//!
+//! **Ring.** Training views can be put on a circle instead, at one elevation and one distance and aimed at the centre, as
+//! published code has them ([`ViewSampler::train_on_ring`]); held-out views stay where they are.
 use super::camera::Camera;
 use super::extent::Extent;
 use super::vector::{along, dot, frame, unit};
@@ -24,6 +27,9 @@ use std::f32::consts::{PI, TAU};
 const FIELD_OF_VIEW: f32 = 0.25 * PI;
 /// Distance at which the reference rasteriser culls, world units.
 const NEAR: f32 = 0.2;
+/// Distances of cameras, times that at which the scene just fills the picture; and that of all cameras on a ring.
+const FILL: std::ops::Range<f32> = 0.95..1.2;
+const MEAN_FILL: f32 = 0.5 * (FILL.start + FILL.end);
 /// Lowest sine of elevation over ground: 6 degrees.
 const LOWEST: f32 = 0.1;
 /// Places of held-out views.
@@ -49,6 +55,8 @@ pub struct ViewSampler {
     seed: u64,
     shift: [f64; 2],
     places: Vec<[f32; 3]>,
+    /// Elevation of all training views, radians.
+    ring: Option<f32>,
 }
 
 impl ViewSampler {
@@ -68,7 +76,13 @@ impl ViewSampler {
             seed,
             shift,
             places,
+            ring: None,
         })
+    }
+
+    /// Puts the training views on a circle at this elevation above the scene's horizon, radians.
+    pub fn train_on_ring(&mut self, elevation: f32) {
+        self.ring = Some(elevation);
     }
 
     /// Where and how large the scene is.
@@ -85,7 +99,8 @@ impl ViewSampler {
             Split::Training => self.training_direction(index, &mut random),
             Split::HeldOut => self.held_out_direction(index, &mut random),
         };
-        self.place(direction, size, &mut random)
+        let still = split == Split::Training && self.ring.is_some();
+        self.place(direction, size, still, &mut random)
     }
 
     fn training_direction(&self, index: u64, random: &mut ChaCha8Rng) -> [f32; 3] {
@@ -105,10 +120,13 @@ impl ViewSampler {
         self.direction_at(u, v)
     }
 
-    /// Area-preserving map of the unit square to the directions from which the scene is seen.
+    /// Area-preserving map of the unit square to the directions from which the scene is seen; or of `v` to the ring.
     fn direction_at(&self, u: f32, v: f32) -> [f32; 3] {
         let lowest = if self.extent.on_ground { LOWEST } else { -1.0 };
-        let height = 1.0 - u * (1.0 - lowest);
+        let height = match self.ring {
+            Some(elevation) => elevation.sin(),
+            None => 1.0 - u * (1.0 - lowest),
+        };
         let [east, north, up] = frame(self.extent.up);
         let (sine, cosine) = (TAU * v).sin_cos();
         let level = (1.0 - height * height).max(0.0).sqrt();
@@ -133,15 +151,19 @@ impl ViewSampler {
         along(place.map(|e| e * tilt.cos()), tilt.sin(), flat)
     }
 
-    /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane.
-    fn place(&self, direction: [f32; 3], size: u32, random: &mut impl Rng) -> Camera {
+    /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane. `still` ones are
+    /// all at the mean distance and look at the centre.
+    fn place(&self, direction: [f32; 3], size: u32, still: bool, random: &mut impl Rng) -> Camera {
         let Extent { centre, radius, up, .. } = self.extent;
-        let fill = random.random_range(0.95..1.2);
+        let fill = if still { MEAN_FILL } else { random.random_range(FILL) };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
         let distance = wanted.max(radius + 1.1 * NEAR);
         let field_of_view = 2.0 * (radius * fill / distance).min(0.99).asin();
-        let aim: [f32; 3] = std::array::from_fn(|_| random.random_range(-0.04..0.04));
+        let aim: [f32; 3] = match still {
+            true => [0.0; 3],
+            false => std::array::from_fn(|_| random.random_range(-0.04..0.04)),
+        };
         let target = along(centre, radius, aim);
         let eye = along(target, distance, direction);
         Camera::look_at(eye, target, up, field_of_view, size, size)
@@ -229,6 +251,39 @@ mod tests {
         );
         // The gap costs little: most of the sphere stays in use.
         assert!(closest > 6f32.to_radians().cos());
+    }
+
+    #[test]
+    fn a_ring_is_a_circle_that_keeps_away_from_held_out_views() {
+        let scene = ball(1.0);
+        let sphere = ViewSampler::new(&scene, 4).unwrap();
+        let mut ring = sphere.clone();
+        ring.train_on_ring(30f32.to_radians());
+        let Extent { centre, up, .. } = *ring.extent();
+        let cameras: Vec<Camera> = (0..400).map(|i| ring.camera(Split::Training, i, 32)).collect();
+        let held_out: Vec<Camera> = (0..200).map(|i| ring.camera(Split::HeldOut, i, 32)).collect();
+        let distance = |camera: &Camera| {
+            let [x, y, z] = sub(camera.centre(), centre);
+            (x * x + y * y + z * z).sqrt()
+        };
+        let mut azimuths = [false; 12];
+        let [east, north, _] = frame(up);
+        for camera in &cameras {
+            let from = direction(camera);
+            assert!((dot(from, up) - 0.5).abs() < 1e-4, "{from:?}");
+            assert!((distance(camera) - distance(&cameras[0])).abs() < 1e-3 * distance(camera));
+            let turn = dot(from, north).atan2(dot(from, east)) / TAU + 0.5;
+            azimuths[((turn * 12.0) as usize).min(11)] = true;
+            assert!(
+                held_out
+                    .iter()
+                    .all(|h| dot(direction(h), from) < 2.4f32.to_radians().cos())
+            );
+        }
+        assert_eq!(azimuths, [true; 12]);
+        for (i, camera) in held_out.iter().enumerate() {
+            assert_eq!(*camera, sphere.camera(Split::HeldOut, i as u64, 32));
+        }
     }
 
     #[test]

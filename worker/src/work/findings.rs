@@ -5,7 +5,7 @@ use guardsplat_worker::extract::{
     Comparison, Engine, Framing, Reading, Source, default_size, read_scene, without_borders,
 };
 use guardsplat_worker::memory::Memory;
-use guardsplat_worker::message::Verdict;
+use guardsplat_worker::message::{Message, Verdict};
 use guardsplat_worker::quality::read_picture;
 use guardsplat_worker::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
@@ -88,22 +88,24 @@ pub fn read_framed(
         let (reading, ignored) = read(engine, source, views, progress)?;
         return Ok((vec![(Framing::default(), reading)], ignored));
     };
-    let framings: Vec<Framing> = [false, true].into_iter().flat_map(Framing::laid).collect();
-    let laid = framings.len() / 2;
+    let framings: Vec<Framing> = [false, true]
+        .into_iter()
+        .flat_map(|trimmed| Framing::tried(engine, trimmed))
+        .collect();
     let mut logits: Vec<Vec<Vec<f32>>> = vec![Vec::with_capacity(paths.len()); framings.len()];
     let mut borders = false;
     for (index, path) in paths.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
-        let trimmed = without_borders(&picture);
-        borders |= trimmed.is_some();
-        // One at a time: a large picture need not fit in memory eight times.
-        for (place, framing) in framings.iter().enumerate() {
-            let read = match (&trimmed, framing.trimmed) {
-                (Some(trimmed), true) => engine.read_logits(&[framing.lay(trimmed)])?,
-                (None, true) => vec![logits[place - laid][index].clone()],
-                (_, false) => engine.read_logits(&[framing.lay(&picture)])?,
-            };
-            logits[place].extend(read);
+        let whole = Framing::read(engine, &picture)?;
+        let trimmed = match without_borders(&picture) {
+            Some(trimmed) => {
+                borders = true;
+                Framing::read(engine, &trimmed)?
+            }
+            None => whole.clone(),
+        };
+        for (place, read) in whole.into_iter().chain(trimmed).enumerate() {
+            logits[place].push(read);
         }
         progress(index + 1, paths.len());
     }
@@ -111,6 +113,65 @@ pub fn read_framed(
     let tried = read.filter(|(framing, _)| borders || !framing.trimmed);
     let readings = tried.map(|(framing, logits)| Ok((framing, Reading::new(logits)?)));
     Ok((readings.collect::<Result<_>>()?, None))
+}
+
+/// What was read, and how it compares with a raw message.
+pub struct Compared {
+    /// The reading that agrees best.
+    pub reading: Reading,
+    /// How it compares, if there is a message.
+    pub comparison: Option<Comparison>,
+    /// How the pictures were looked at for it.
+    pub framing: Framing,
+    /// Ways in which they were looked at.
+    pub framings: usize,
+    /// Rows of the scene that were ignored.
+    pub ignored: Option<Ignored>,
+}
+
+/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read in every framing
+/// besides. Half of the rate of false positives is for pictures as they are, the other half for all other framings
+/// together, so that those who change nothing hardly pay for those who do.
+pub fn read_and_compare(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    message: Option<&Message>,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Compared> {
+    let (reading, ignored) = read(engine, source, views, &mut progress)?;
+    let mut best = Compared {
+        reading,
+        comparison: None,
+        framing: Framing::default(),
+        framings: 1,
+        ignored,
+    };
+    let Some(message) = message else {
+        return Ok(best);
+    };
+    let halves = match source {
+        Source::Scene(_) => 1,
+        Source::Pictures(_) => 2,
+    };
+    let as_given = best.reading.compare_among(message, halves)?;
+    let decided = halves == 1 || as_given.decision.verdict != Verdict::NoMatch;
+    let mut p_value = as_given.decision.p_value;
+    best.comparison = Some(as_given);
+    if decided {
+        return Ok(best);
+    }
+    let (framed, _) = read_framed(engine, source, views, progress)?;
+    best.framings = framed.len();
+    let others = halves * (framed.len() as u32 - 1).max(1);
+    for (framing, reading) in framed.into_iter().skip(1) {
+        let comparison = reading.compare_among(message, others)?;
+        if comparison.decision.p_value < p_value {
+            p_value = comparison.decision.p_value;
+            (best.reading, best.framing, best.comparison) = (reading, framing, Some(comparison));
+        }
+    }
+    Ok(best)
 }
 
 /// The outcome, with the names of the program's JSON.
@@ -140,6 +201,10 @@ pub struct Findings {
     pub mean_abs_logit: f64,
     /// Mean share of views that agree with the decision on a bit.
     pub view_agreement: f64,
+    /// Ways in which pictures were looked at, each of which the p-value pays for.
+    pub framings: usize,
+    /// The way that agreed best, where it is not the first: what was undone, whether borders were cut off.
+    pub framing: Option<String>,
     /// Rows of the scene that are no Gaussians of it and were ignored.
     pub ignored_rows: usize,
     /// Why nothing could be decided.
@@ -147,6 +212,21 @@ pub struct Findings {
 }
 
 impl Findings {
+    /// What a comparison says.
+    pub fn of(compared: &Compared) -> Result<Self> {
+        let found = Self::new(
+            &compared.reading,
+            compared.comparison.as_ref(),
+            compared.ignored.as_ref(),
+        )?;
+        let as_given = compared.framing == Framing::default();
+        Ok(Self {
+            framings: compared.framings,
+            framing: (!as_given).then(|| compared.framing.to_string()),
+            ..found
+        })
+    }
+
     /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
     /// were ignored for it.
     pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: Option<&Ignored>) -> Result<Self> {
@@ -164,6 +244,8 @@ impl Findings {
             bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
             mean_abs_logit: reading.mean_abs_logit(),
             view_agreement: reading.agreement(),
+            framings: 1,
+            framing: None,
             ignored_rows: ignored.map_or(0, Ignored::count),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),

@@ -1,13 +1,13 @@
-//! Loads what embedding and verifying need: CLIP, and the engine for a key, which loads the rest when it is used.
+//! Loads what embedding and verifying need: what reads pictures, and the engine for a key, which loads the rest when it is used.
 use std::path::{Path, PathBuf};
 
-use guardsplat_worker::Result;
 use guardsplat_worker::clip::{Clip, Parts};
 use guardsplat_worker::device::Compute;
-use guardsplat_worker::extract::Engine;
+use guardsplat_worker::extract::{Engine, HiddenExtractor};
 use guardsplat_worker::memory::Limits;
-use guardsplat_worker::message::{ClipIdentity, Key};
+use guardsplat_worker::message::{ClipIdentity, Decoding, Key};
 use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
+use guardsplat_worker::{Error, Result};
 
 /// What the CLIP in the repository is called.
 pub const SHIPPED: &str = "guardsplat";
@@ -34,7 +34,7 @@ fn lpips() -> Option<PathBuf> {
     Some(folder.join(WEIGHTS))
 }
 
-/// An engine for a key, which must belong to the CLIP: the one named, else the one that the key names. `path` names the
+/// An engine for a key, which must belong to the CLIP, if it reads with one: the one named, else the one that the key names. `path` names the
 /// key in messages, and `budget` is how many bytes of memory a job may take, if not all of the machine's.
 pub fn engine(
     path: &Path,
@@ -44,11 +44,25 @@ pub fn engine(
     with_lpips: bool,
     budget: Option<u64>,
 ) -> Result<Engine> {
-    let name = clip_name.unwrap_or(&key.clip.name);
-    let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
-    key.require_clip(path, &identity)?;
     let lpips = if with_lpips { lpips() } else { None };
-    let mut engine = Engine::new(compute, clip, key, lpips)?;
+    let mut engine = match &key.decoding {
+        Decoding::Clip { .. } => {
+            let name = clip_name.unwrap_or(&key.clip.name);
+            let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
+            key.require_clip(path, &identity)?;
+            Engine::new(compute, clip, key, lpips)?
+        }
+        Decoding::Hidden(_) => {
+            if let Some(name) = clip_name {
+                return Err(Error::BadOption {
+                    field: "clip",
+                    reason: format!("the key reads pictures without a CLIP, so {name:?} has no use"),
+                });
+            }
+            let extractor = HiddenExtractor::new(key, &compute.device)?;
+            Engine::with_extractor(compute, Box::new(extractor), lpips)
+        }
+    };
     engine.limits = Limits {
         buffer: engine.limits.buffer,
         ..Limits::of_machine(budget)

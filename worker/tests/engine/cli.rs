@@ -124,6 +124,48 @@ fn from_a_sample_to_a_verdict() {
 }
 
 #[test]
+fn a_convolutional_decoder_takes_the_place_of_a_clip() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 300 --sh-degree 1 --seed 2", 0);
+    let create = "key create --bits 8 --extractor hidden --seed 7 --device cpu";
+    let key = bench.json(&format!("{create} --steps 2 -o k.key --json"), 0);
+    assert_eq!((&key["bits"], &key["clip"]), (&8.into(), &"hidden".into()));
+    assert!(key["bit_accuracy_unseen"].is_number(), "{key}");
+    write(
+        &bench.path("few.json"),
+        r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
+            "verify": {"views": 3, "message_views": 2}, "target": {"bit_accuracy": 0, "psnr_db": 0, "message": false}}"#,
+    );
+    let line = "embed in.ply out.ply --key k.key --message 5c --size 32 --settings few.json --device cpu --json";
+    let report = bench.json(&format!("{line} --learn dc --ring 20"), 0);
+    assert_eq!(report["clip"], "hidden");
+    let verdict = bench.json("verify out.ply --key k.key --views 3 --size 32 --device cpu --json", 3);
+    assert_eq!((&verdict["clip"], &verdict["views"]), (&"hidden".into(), &3.into()));
+    assert_eq!(verdict["message"], report["message"]);
+    for (line, needle) in [
+        (format!("{create} --clip other -o a.key"), "clip: it is of keys"),
+        (format!("{create} --decoder linear -o a.key"), "decoder: it is of keys"),
+        (format!("{create} --steps 0 -o a.key"), "steps: 0 is outside"),
+        (
+            "key create --bits 8 --steps 5 -o a.key".into(),
+            "steps: they are of the conv",
+        ),
+        (
+            "verify out.ply --key k.key --clip guardsplat --device cpu".into(),
+            "without a CLIP",
+        ),
+        (
+            line.replace("--json", "--ring 85"),
+            "ring.elevation: 85 is outside -80 to 80",
+        ),
+    ] {
+        let told = bench.fails(&line);
+        assert!(told.contains(needle), "{line}: {told}");
+    }
+    assert!(!bench.path("a.key").exists());
+}
+
+#[test]
 fn bad_input_is_told_clearly_and_leaves_nothing() {
     let bench = Bench::new();
     bench.exits("sample in.ply --gaussians 50 --sh-degree 0", 0);

@@ -8,7 +8,7 @@ use guardsplat_worker::extract::Engine;
 use guardsplat_worker::memory::Bytes;
 use guardsplat_worker::message::decoder::LayerWeights;
 use guardsplat_worker::message::key::Secret;
-use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Key, Message, Projection};
+use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Decoding, Key, Message, Projection};
 use guardsplat_worker::sample::sample;
 use guardsplat_worker::scene::{BadRows, Gaussians, Scene};
 use guardsplat_worker::splat::{MAX_PAIRS, TILE};
@@ -46,8 +46,7 @@ fn engine(machine: &Machine, lpips: Option<PathBuf>, change: impl FnOnce(&mut De
             name: String::new(),
             hash: String::new(),
         },
-        projection,
-        decoder,
+        decoding: Decoding::Clip { projection, decoder },
         accuracy_unseen: None,
         accuracy_unseen_noisy: None,
     };

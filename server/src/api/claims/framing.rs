@@ -4,12 +4,13 @@ use std::collections::HashSet;
 use guardsplat_codeword::Framing;
 use guardsplat_evidence as evidence;
 use guardsplat_proto::v1::FramedReading;
+use guardsplat_proto::v1::undone::Kind;
 
 use crate::api::problems::Problems;
 use crate::error::Result;
 
-/// Most framings: four turns, mirrored or not, with borders or without.
-const MOST: usize = 16;
+/// Most framings. Workers try some seventy tones, with borders and without.
+const MOST: usize = 1024;
 
 /// What was read in each framing, checked against the bits of the key.
 pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
@@ -28,7 +29,14 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
             let reason = format!("has {} values, the key has {bits} bits", reading.logits.len());
             problems.add(field("logits"), reason);
         }
-        if !seen.insert((turns, reading.mirrored, reading.trimmed)) {
+        if let Some(undone) = &reading.undone {
+            let known = undone.kind() != Kind::Unspecified;
+            problems.check(known, &field("undone.kind"), "must be given");
+            let positive = undone.factor.is_finite() && undone.factor > 0.0;
+            problems.check(positive, &field("undone.factor"), "must be above 0");
+        }
+        let undone = reading.undone.map(|undone| (undone.kind, undone.factor.to_bits()));
+        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone)) {
             problems.add(format!("readings[{i}]"), "is in the same framing as another one");
         }
     }
@@ -44,6 +52,17 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
 /// What was done to the pictures, in words.
 fn name(reading: &FramedReading) -> String {
     let mut done = Vec::new();
+    if let Some(undone) = &reading.undone {
+        let factor = undone.factor;
+        done.push(match undone.kind() {
+            Kind::Unspecified => "undone".to_owned(),
+            Kind::Ground => "ground made white".to_owned(),
+            Kind::Brightness => format!("brightness x {factor:.2} undone"),
+            Kind::Gamma => format!("gamma {factor:.2} undone"),
+            Kind::Contrast => format!("contrast x {factor:.2} undone"),
+            Kind::Saturation => format!("saturation x {factor:.2} undone"),
+        });
+    }
     if reading.quarter_turns > 0 {
         done.push(format!("turned by {} degrees", 90 * reading.quarter_turns));
     }
@@ -61,15 +80,16 @@ fn name(reading: &FramedReading) -> String {
 
 /// The same by kinds, for the report: as much as was done counts under what changes most.
 pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
-    use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn};
+    use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
+        _ if reading.undone.is_some() => Tone,
         (true, ..) => Crop,
         (_, true, _) => Mirrored,
         (_, _, 0) => AsGiven,
         _ => QuarterTurn,
     };
     let count = |wanted| readings.iter().filter(|reading| kind(reading) == wanted).count() as u32;
-    let each = [AsGiven, QuarterTurn, Mirrored, Crop].map(|kind| evidence::Framing {
+    let each = [AsGiven, Tone, QuarterTurn, Mirrored, Crop].map(|kind| evidence::Framing {
         kind,
         variants: count(kind),
         pooled: false,
@@ -81,6 +101,7 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
 mod tests {
     use super::*;
     use crate::error::Error;
+    use guardsplat_proto::v1::Undone;
 
     fn reading(quarter_turns: u32, mirrored: bool, trimmed: bool) -> FramedReading {
         FramedReading {
@@ -89,6 +110,17 @@ mod tests {
             trimmed,
             views: 1,
             logits: vec![1.0; 64],
+            undone: None,
+        }
+    }
+
+    fn brightened(factor: f32) -> FramedReading {
+        FramedReading {
+            undone: Some(Undone {
+                kind: Kind::Brightness.into(),
+                factor,
+            }),
+            ..reading(0, false, false)
         }
     }
 
@@ -107,6 +139,18 @@ mod tests {
     }
 
     #[test]
+    fn tones_are_framings_of_their_own() {
+        let readings = [reading(0, false, false), brightened(0.81), brightened(1.5)];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "brightness x 0.81 undone");
+        assert_eq!(names.iter().collect::<HashSet<_>>().len(), 3);
+        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 2]);
+        assert!(checked(&[brightened(0.81), brightened(0.81)], 64).is_err());
+        assert!(checked(&[brightened(0.0)], 64).is_err() && checked(&[brightened(f32::NAN)], 64).is_err());
+    }
+
+    #[test]
     fn what_makes_no_sense_is_told_by_field() {
         let mut wrong = reading(4, false, false);
         wrong.views = 0;
@@ -119,6 +163,6 @@ mod tests {
         let second = ["quarter_turns", "views", "logits"].map(|name| format!("readings[1].{name}"));
         assert_eq!(fields[..3], second);
         assert_eq!(fields[3..], ["readings[2]"]);
-        assert!(checked(&[all(), all()].concat(), 64).is_err());
+        assert!(checked(&vec![all(); 65].concat(), 64).is_err());
     }
 }

@@ -4,7 +4,7 @@ use burn::tensor::Device;
 use guardsplat_fuzz::TINY_CLIP;
 use guardsplat_worker::clip::{ClipConfig, ClipModel, Parts, Precision};
 use guardsplat_worker::message::key::Secret;
-use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Key, Projection};
+use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
 
 pub fn put_all() {
     keys();
@@ -60,8 +60,7 @@ fn keys() {
                 name: "tiny".into(),
                 hash: "ab".repeat(32),
             },
-            projection,
-            decoder,
+            decoding: Decoding::Clip { projection, decoder },
             accuracy_unseen: Some(0.5),
             accuracy_unseen_noisy: None,
         };

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 /// - "Crop 40 %" keeps a window of 40 % of each side, that is, 16 % of the area, as the public code does. The milder
 ///   reading, which loses 40 % of each side, is `crop:0.6`, in `everyday`.
 /// - Rotation is bilinear here and takes the nearest pixel in the public code.
-/// - VAE compression, a trained network, is no part of this crate.
+/// - VAE compression, a trained network, is no part of this crate; `evaluate --vae` adds it.
 const PAPER: [&str; 9] = [
     "none",
     "noise:0.1",

@@ -10,6 +10,8 @@ pub const ALL_ATTRIBUTES: &str = "all attributes";
 pub const DC: &str = "dc";
 /// Only the other bands are learned.
 pub const REST: &str = "rest";
+/// Training views are on one circle around the scene, instead of over the sphere.
+pub const RING: &str = "ring";
 /// Only the message counts.
 pub const MESSAGE_ONLY: &str = "message only";
 /// Message and likeness count, the offsets' size does not.
@@ -47,6 +49,8 @@ pub const OCCLUSION: &str = "occlusion:";
 pub const FORMAT: &str = "format:";
 /// Formats that scenes can have.
 pub const FORMATS: [&str; 5] = ["ply", "compressed-ply", "spz", "splat", "sog"];
+/// Compressed by the learned codec of quality 3, whose weights somebody has to give.
+pub const VAE: &str = "vae:3";
 /// Attacks of the paper's Table 2, in its order.
 pub const PAPER_ATTACKS: [&str; 10] = [
     NONE,
@@ -57,6 +61,6 @@ pub const PAPER_ATTACKS: [&str; 10] = [
     "crop:0.4",
     "brightness:0.5..1.5",
     "jpeg:10",
-    "vae:3",
+    VAE,
     "crop:0.4+brightness:0.5..1.5+jpeg:10",
 ];

@@ -33,6 +33,7 @@ fn row(framing: &Framing) -> Markup {
         FramingKind::QuarterTurn => "Quarter turns",
         FramingKind::Mirrored => "Mirrored",
         FramingKind::Scaling => "Other scales",
+        FramingKind::Tone => "Changed tones undone",
     };
     html! {
         tr {

@@ -31,7 +31,7 @@ pub enum Guess {
 /// All guesses, nothing first: what [`read_guesses`] reads.
 pub fn guesses(engine: &Engine) -> Vec<Guess> {
     let mut all = vec![Guess::Nothing];
-    if engine.reads_exact_colours() {
+    if engine.extractor.reads_exact_colours() {
         all.push(Guess::Ground);
         all.extend(tone::all().into_iter().map(Guess::Tone));
     }
@@ -50,6 +50,16 @@ pub fn read_guesses(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>>
         logits.extend(engine.read_logits(&pictures)?);
     }
     Ok(logits)
+}
+
+impl std::fmt::Display for Guess {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Nothing => f.write_str("as it is"),
+            Self::Ground => f.write_str("ground made white"),
+            Self::Tone(tone) => write!(f, "{tone} undone"),
+        }
+    }
 }
 
 impl Guess {

@@ -29,6 +29,17 @@ pub(super) const KINDS: [(fn(f32) -> Tone, f32, f32); 4] = [
     (Tone::Saturation, 2.0, 1.15),
 ];
 
+impl std::fmt::Display for Tone {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Brightness(factor) => write!(f, "brightness x {factor:.2}"),
+            Self::Gamma(exponent) => write!(f, "gamma {exponent:.2}"),
+            Self::Contrast(factor) => write!(f, "contrast x {factor:.2}"),
+            Self::Saturation(factor) => write!(f, "saturation x {factor:.2}"),
+        }
+    }
+}
+
 impl Tone {
     /// The picture before this was done to it, values cut to [0, 1]; what was cut when it was done stays cut.
     pub(super) fn undone(self, picture: &Picture) -> Picture {

@@ -1,7 +1,7 @@
 //! Accuracy by the elevation of views.
 use super::{Options, Plot, Report};
 use crate::error::Result;
-use crate::report::names::{NONE, STANDARD};
+use crate::report::names::{NONE, RING, STANDARD};
 use crate::report::plot::{Axes, Line, Point, lines};
 use crate::report::selection::{Run, Selection};
 use crate::report::summary::Estimate;
@@ -48,58 +48,91 @@ fn bin_of(degrees: f32) -> usize {
     (place as usize).min(BINS - 1)
 }
 
+/// The accuracy in a bin, in percent.
+fn accuracy(bin: &Bin) -> Option<Estimate> {
+    let mut estimate = Estimate::of(&bin.runs)?;
+    estimate.interval = estimate.interval.map(|ends| ends.map(|end| end.clamp(0.0, 100.0)));
+    Some(estimate)
+}
+
+/// A line through the bins that hold anything.
+fn line(name: String, bins: &[Bin]) -> Line {
+    let point = |(place, bin): (usize, &Bin)| {
+        let estimate = accuracy(bin)?;
+        Some(Point {
+            x: low_end(place) + BIN / 2.0,
+            y: estimate.mean,
+            interval: estimate.interval,
+        })
+    };
+    Line {
+        name,
+        points: bins.iter().enumerate().filter_map(point).collect(),
+        dots: true,
+    }
+}
+
+fn low_end(place: usize) -> f64 {
+    place as f64 * BIN - 90.0
+}
+
 pub(super) fn fill(report: &mut Report, selection: &Selection<'_>, options: &Options) -> Result<()> {
-    let runs = selection.runs(options.bits, STANDARD, NONE);
+    let bits = options.bits;
+    let sphere = bins(&selection.runs(bits, STANDARD, NONE));
+    let on_ring = selection.runs(bits, RING, NONE);
+    let ring = bins(&on_ring);
     let mut rows = Vec::new();
-    let mut points = Vec::new();
-    for (place, bin) in bins(&runs).into_iter().enumerate() {
-        let low = place as f64 * BIN - 90.0;
-        let estimate = Estimate::of(&bin.runs);
+    for (place, (sphere, ring)) in sphere.iter().zip(&ring).enumerate() {
+        let low = low_end(place);
         let name = format!("{low:.0}° to {:.0}°", low + BIN);
+        let estimate = accuracy(sphere);
         if estimate.is_none() {
-            report
-                .missing
-                .push(format!("{} bits, elevation {name}: not measured", options.bits));
+            let missing = format!("{bits} bits, elevation {name}: not measured");
+            report.missing.push(missing);
         }
-        if let Some(estimate) = estimate {
-            points.push(Point {
-                x: low + BIN / 2.0,
-                y: estimate.mean,
-                interval: estimate.interval.map(|ends| ends.map(|end| end.clamp(0.0, 100.0))),
-            });
-        }
-        let clamped = estimate.map(|mut estimate| {
-            estimate.interval = estimate.interval.map(|ends| ends.map(|end| end.clamp(0.0, 100.0)));
-            estimate
-        });
         rows.push(Row::new(vec![
             Cell::text(name),
-            Cell::Count(bin.runs.len() as u64),
-            Cell::Count(bin.views as u64),
-            Cell::estimate(clamped, 2),
+            Cell::Count(sphere.runs.len() as u64),
+            Cell::Count(sphere.views as u64),
+            Cell::estimate(estimate, 2),
+            Cell::Count(ring.runs.len() as u64),
+            Cell::estimate(accuracy(ring), 2),
         ]));
     }
+    if on_ring.is_empty() {
+        report.missing.push(format!("{bits} bits, {RING}: not measured"));
+    }
     report.tables.push(Table {
-        title: format!("{}, {} bits", report.title, options.bits),
-        columns: ["elevation", "runs", "views", "accuracy (%)"]
-            .map(String::from)
-            .to_vec(),
+        title: format!("{}, {bits} bits", report.title),
+        columns: [
+            "elevation",
+            "runs",
+            "views",
+            "accuracy (%)",
+            "runs, trained on a ring",
+            "accuracy, trained on a ring (%)",
+        ]
+        .map(String::from)
+        .to_vec(),
         rows,
-        notes: vec!["Mean over runs of the accuracy of their views in each range, lower end included.".into()],
+        notes: vec![
+            "Mean over runs of the accuracy of their views in each range, lower end included. A ring is a circle of training \
+             views at an elevation of 30°, as published code has them; all views that are read are over the sphere."
+                .into(),
+        ],
     });
-    let line = Line {
-        name: format!("{} bits, mean over runs with 95 % interval", options.bits),
-        points,
-        dots: true,
-    };
     let axes = Axes {
         title: "accuracy by elevation",
         x: "elevation (degrees)",
         y: "accuracy (%)",
     };
+    let mut drawn = vec![line(format!("{bits} bits, mean over runs with 95 % interval"), &sphere)];
+    if !on_ring.is_empty() {
+        drawn.push(line("the same, trained on a ring".into(), &ring));
+    }
     report.plots.push(Plot {
         caption: "Accuracy of views by their elevation".into(),
-        svg: lines(axes, &[line])?,
+        svg: lines(axes, &drawn)?,
     });
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Tables of cases: one row a case, summed up over scenes and seeds, next to what the paper says.
 use super::{Cell, Row, Table};
+use crate::report::names::VAE;
 use crate::report::paper::{Figure, Metric};
 use crate::report::selection::{Run, Selection};
 use crate::report::summary::Summary;
@@ -123,6 +124,7 @@ pub fn grid(title: &str, cases: &[Case], selection: &Selection<'_>, layout: Layo
         if runs.is_empty() {
             missing.push(match marks {
                 0 => format!("{name}: not measured"),
+                _ if case.attack == VAE => format!("{name}: not measured: no weights"),
                 n => format!("{name}: not measured ({n} marks without this reading)"),
             });
         } else if runs.len() < marks {
