@@ -80,9 +80,9 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
         (&turned["asset"], turned["views"].as_u64()),
         (&asset.clone().into(), Some(12))
     );
-    // The plain background is a border, too, and may be cut off.
-    let framing = turned["framing"].as_str().unwrap();
-    assert!(framing.starts_with("turned by 270 degrees, mirrored"), "{turned}");
+    // The plain background is a border, too. The shipped CLIP hardly minds how pictures lie, so that any framing may be
+    // the best; all of them are paid for.
+    assert_eq!((&turned["framings"], &turned["hypotheses"]), (&16.into(), &32.into()));
 
     // The evidence stands without the server.
     service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);
