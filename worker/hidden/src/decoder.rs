@@ -8,7 +8,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::error::{Result, host};
 use crate::parameter::parameter;
-use crate::weights::{BLOCKS, Block, CHANNELS, FEATURES, KERNEL, STRIDES, Weights};
+use crate::weights::{BLOCKS, Block, CHANNELS, DILATIONS, FEATURES, KERNEL, STRIDES, Weights};
 
 /// Groups of channels that are normalised together (Wu and He 2018, arXiv 1803.08494).
 const GROUPS: usize = 8;
@@ -31,6 +31,7 @@ struct Layer {
     kernel: Param<Tensor<4>>,
     norm: GroupNorm,
     stride: usize,
+    dilation: usize,
 }
 
 impl Decoder {
@@ -45,6 +46,7 @@ impl Decoder {
                 kernel: parameter(&block.kernel, [outputs, inputs, KERNEL, KERNEL], device),
                 norm,
                 stride: STRIDES[i],
+                dilation: DILATIONS[i],
             }
         };
         Self {
@@ -85,7 +87,7 @@ impl Decoder {
     pub fn forward(&self, pictures: Tensor<4>) -> Tensor<2> {
         let mut x = details(pictures);
         for layer in &self.blocks {
-            let options = ConvOptions::new([layer.stride, layer.stride], [1, 1], [1, 1], 1);
+            let options = ConvOptions::new([layer.stride; 2], [layer.dilation; 2], [layer.dilation; 2], 1);
             x = relu(layer.norm.forward(conv2d(x, layer.kernel.val(), None, options)));
         }
         let [b, c, h, w] = x.dims();

@@ -31,13 +31,12 @@ impl Geometry {
         within("shift", self.shift.into(), 0.0, 0.5)
     }
 
-    /// The same changes, `part` (0 to 1) as far, but for moves: a decoder that never saw them learns where the pattern's
-    /// pixels lie on its strides, and reads nothing else.
+    /// The same changes, `part` (0 to 1) as far.
     pub(crate) fn scaled(&self, part: f32) -> Self {
         Self {
             degrees: self.degrees * part,
             zoom: self.zoom.powf(part),
-            shift: self.shift,
+            shift: self.shift * part,
         }
     }
 

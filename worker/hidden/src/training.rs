@@ -44,7 +44,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             bits: 32,
-            steps: 1000,
+            steps: 1500,
             batch: 8,
             learning_rate: 2e-3,
             start_psnr: 26.0,
@@ -258,25 +258,6 @@ mod tests {
         assert_ne!(first, Weights::seeded(2, 0).unwrap());
         let other = Options { seed: 1, ..options() };
         assert_ne!(run(&other, 32, false).unwrap().weights.head, first.head);
-    }
-
-    #[test]
-    fn a_few_steps_read_more_than_chance() {
-        let options = Options {
-            bits: 4,
-            steps: 120,
-            batch: 8,
-            end_psnr: 30.0,
-            geometry: Geometry::NONE,
-            ..Options::default()
-        };
-        let trained = run(&options, 48, false).unwrap();
-        let device = Device::flex();
-        let mut unseen = Synthetic::new(48, 77).unwrap();
-        let next = |n| Ok(unseen.next(n, &device));
-        let found = trained.measure(next, 64, 30.0, &Geometry::NONE, 3).unwrap();
-        // Of 256 bits by chance no more than 0.63 but once in 10,000.
-        assert!(found.accuracy > 0.65, "{found:?}");
     }
 
     #[test]

@@ -8,9 +8,12 @@ use crate::parameter::draw;
 /// Most bits that a decoder reads.
 pub const MAX_BITS: usize = 128;
 /// Channels before the first block and after each one.
-pub(crate) const CHANNELS: [usize; BLOCKS + 1] = [3, 32, 64, 64, 96];
-/// By how much each block shrinks the sides.
-pub(crate) const STRIDES: [usize; BLOCKS] = [2, 2, 1, 2];
+pub(crate) const CHANNELS: [usize; BLOCKS + 1] = [3, 16, 32, 32, 48];
+/// By how much each block shrinks the sides. More than once would tell decoders where a pattern's pixels lie on the strides,
+/// which they then learn, and read nothing that was moved by less.
+pub(crate) const STRIDES: [usize; BLOCKS] = [2, 1, 1, 1];
+/// How far apart the pixels are that each block's kernels see.
+pub(crate) const DILATIONS: [usize; BLOCKS] = [1, 1, 2, 2];
 /// Blocks of convolution, normalisation and ReLU.
 pub(crate) const BLOCKS: usize = 4;
 /// Sides of the convolutions' kernels.
@@ -178,7 +181,7 @@ mod tests {
             Weights::from_tensors("w", bits, read).unwrap_err().to_string()
         };
         assert_eq!(reason(5, f32::INFINITY, 0), "w: block.0.kernel holds inf");
-        assert!(reason(5, 0.0, 1).contains("block.0.kernel is not [32, 3, 3, 3]"));
+        assert!(reason(5, 0.0, 1).contains("block.0.kernel is not [16, 3, 3, 3]"));
         assert!(reason(0, 0.0, 0).contains("bits is 0"));
         let none = |_: &str, _: &[usize]| Err("nothing there".to_string());
         assert_eq!(

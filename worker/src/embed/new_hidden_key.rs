@@ -14,7 +14,7 @@ use crate::stop::Stop;
 /// What keys name in place of a CLIP.
 pub const HIDDEN: &str = "hidden";
 /// Side of the pictures of the training, in pixels: textures count, not the size of what is shown.
-const SIDE: usize = 96;
+const SIDE: usize = 48;
 /// Pictures that the decoder is measured on, and how strong their marks are.
 const MEASURED: usize = 64;
 const MEASURED_PSNR: f32 = 37.0;

@@ -355,7 +355,7 @@ mod tests {
             deserialize(&changed).unwrap_err()
         };
         assert!(with(b"extractor\\\":\\\"hidden", b"extractor\\\":\\\"magics").contains("\"magics\", which this"));
-        assert!(with(b"bits\\\":4", b"bits\\\":5").contains("hidden.head.weight is F32 [96, 4], not F32 [96, 5]"));
+        assert!(with(b"bits\\\":4", b"bits\\\":5").contains("hidden.head.weight is F32 [48, 4], not F32 [48, 5]"));
         assert!(with(b"hidden.head.bias", b"hidden.head.bia5").contains("hidden.head.bias is missing"));
         let mut last = bytes.clone();
         *last.last_mut().unwrap() ^= 1;
