@@ -111,6 +111,7 @@ impl Views {
         Ok(Self {
             cameras: self.cameras.clone(),
             images: self.images.iter().map(one).collect::<Result<_>>()?,
+            strange: true,
         })
     }
 
