@@ -35,7 +35,7 @@ fn embed(scene: &str) -> EmbedSpec {
         seed: 5,
         size: 32,
         force: true,
-        ignore_bad_rows: false,
+        ..EmbedSpec::default()
     }
 }
 
