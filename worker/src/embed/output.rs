@@ -67,19 +67,20 @@ pub struct Outcome {
 /// stop; the output is then as it was before.
 pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     job.settings.check()?;
+    let settings = &job.settings.for_bits(job.message.len());
     let stop = &engine.stop;
     stop.check()?;
     let rest = Memory {
-        models: ModelBytes::of(engine, job.settings).learning,
+        models: ModelBytes::of(engine, settings).learning,
         ..Memory::of_program()
     };
     admission::to_mark(job.input, &engine.limits, rest)?;
     let scene = Scene::read_with(job.input, job.bad_rows)?;
     stop.check()?;
-    let memory = admit(engine, &scene, job.settings)?;
+    let memory = admit(engine, &scene, settings)?;
     let aside = reserve(job, &scene)?;
     progress(Progress::Admitted(memory));
-    let optimised = optimise(engine, &scene, job.message, job.settings, progress)?;
+    let optimised = optimise(engine, &scene, job.message, settings, progress)?;
 
     stop.check()?;
     progress(Progress::Writing);
@@ -94,11 +95,11 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     check_geometry(job.output, &scene, &marked)?;
     let marked = marked.into_gaussians();
 
-    let total = job.settings.verify.views;
-    let verification = verify(engine, &scene.gaussians, &marked, job.message, job.settings, |done| {
+    let total = settings.verify.views;
+    let verification = verify(engine, &scene.gaussians, &marked, job.message, settings, |done| {
         progress(Progress::Verifying { done, total })
     })?;
-    let missed = verification.missed(&job.settings.target);
+    let missed = verification.missed(&settings.target);
     let written = missed.is_empty() || job.force;
     if written {
         aside.persist(job.output).map_err(|e| Error::io(job.output)(e.error))?;

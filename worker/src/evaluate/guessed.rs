@@ -1,44 +1,68 @@
 //! What is read of a picture whose tones may have been changed, without counting matches that were searched for.
 //!
 //! A claim takes the guess at what was done under which most bits match, and counts every guess in its p-value. The share
-//! of right bits under that guess would be too good: it was searched for. So each half of the bits is read under the guess
-//! that the *other* half prefers; no bit has a say in how it is read.
+//! of right bits under that guess would be too good: it was searched for. So each bit is read under the guess that all
+//! *other* bits prefer; no bit has a say in how it is read.
 use crate::message::Message;
 
 /// How much better than the picture as it is a guess must match: 1 is all bits against half of them.
 const BETTER: f64 = 0.25;
 
-/// Logits of a picture, each read under the guess that the other half of the bits prefers. `guesses` has the logits of
-/// every guess, nothing done first.
+/// Logits of a picture, each bit under the guess that the others prefer. `guesses` has the logits of every guess, nothing
+/// done first.
 pub(super) fn cross_chosen(guesses: &[Vec<f32>], message: &Message) -> Vec<f32> {
-    let chosen: [usize; 2] = std::array::from_fn(|half| best(guesses, message, 1 - half));
-    (0..message.len())
-        .map(|bit| guesses.get(chosen[bit % 2]).map_or(0.0, |logits| logits[bit]))
-        .collect()
+    let all: Vec<Agreement> = guesses.iter().map(|logits| Agreement::of(logits, message)).collect();
+    let read = message.bits().iter().enumerate().map(|(bit, right)| {
+        let scores = guesses
+            .iter()
+            .zip(&all)
+            .map(|(logits, all)| all.without(logits[bit], *right));
+        guesses[best(scores)][bit]
+    });
+    read.collect()
 }
 
-/// The guess under which the bits of a half match best.
-fn best(guesses: &[Vec<f32>], message: &Message, half: usize) -> usize {
-    let scores: Vec<f64> = guesses.iter().map(|logits| agreement(logits, message, half)).collect();
-    let mut best = 0;
-    for (index, score) in scores.iter().enumerate().skip(1) {
-        let bar = if best == 0 { scores[0] + BETTER } else { scores[best] };
-        if *score > bar {
-            best = index;
+/// The place of the best score, where the first is preferred.
+fn best(scores: impl Iterator<Item = f64>) -> usize {
+    let (mut best, mut bar) = (0, f64::NEG_INFINITY);
+    for (index, score) in scores.enumerate() {
+        if index == 0 {
+            bar = score + BETTER;
+        } else if score > bar {
+            (best, bar) = (index, score);
         }
     }
     best
 }
 
-/// Right logits less wrong ones over all, of the bits of a half: 1 when all are right, about 0 by chance.
-fn agreement(logits: &[f32], message: &Message, half: usize) -> f64 {
-    let (mut signed, mut all) = (0.0, 0.0);
-    for (logit, bit) in logits.iter().zip(message.bits()).skip(half).step_by(2) {
-        let logit = f64::from(*logit);
-        signed += if *bit { logit } else { -logit };
-        all += logit.abs();
+/// Right logits less wrong ones, and all of them.
+struct Agreement {
+    signed: f64,
+    all: f64,
+}
+
+impl Agreement {
+    fn of(logits: &[f32], message: &Message) -> Self {
+        let pairs = || logits.iter().zip(message.bits());
+        Self {
+            signed: pairs().map(|(logit, right)| signed(*logit, *right)).sum(),
+            all: logits.iter().map(|v| f64::from(v.abs())).sum(),
+        }
     }
-    if all > 0.0 { signed / all } else { 0.0 }
+
+    /// The share without one bit: 1 when all others are right, about 0 by chance.
+    fn without(&self, logit: f32, right: bool) -> f64 {
+        let all = self.all - f64::from(logit.abs());
+        if all > 0.0 {
+            (self.signed - signed(logit, right)) / all
+        } else {
+            0.0
+        }
+    }
+}
+
+fn signed(logit: f32, right: bool) -> f64 {
+    f64::from(if right { logit } else { -logit })
 }
 
 #[cfg(test)]

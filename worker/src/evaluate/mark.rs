@@ -53,7 +53,8 @@ impl Making<'_> {
         }
         let stopwatch = self.machine.stopwatch();
         let mut made_after = None;
-        let optimised = optimise(self.engine, self.scene, self.message, self.settings, &mut |p| {
+        let settings = self.settings.for_bits(self.message.len());
+        let optimised = optimise(self.engine, self.scene, self.message, &settings, &mut |p| {
             if let Progress::Check(check) = p
                 && check.bit_accuracy >= MADE
             {
