@@ -20,14 +20,26 @@ pub enum Tone {
     Saturation(f32),
 }
 
-/// Tones that are looked for, by their kind: what makes one of a factor, how far factors reach either way, and the ratio
-/// of one to the next. A mark is read when the factor is right to a twentieth.
-pub(super) const KINDS: [(fn(f32) -> Tone, f32, f32); 4] = [
-    (Tone::Brightness, 2.2, 1.07),
-    (Tone::Gamma, 2.2, 1.1),
-    (Tone::Contrast, 2.2, 1.1),
-    (Tone::Saturation, 2.0, 1.15),
+/// A kind of tone that is looked for.
+struct Sought {
+    /// Makes one of a factor.
+    tone: fn(f32) -> Tone,
+    /// How far factors reach, either way.
+    reach: f32,
+    /// The ratio of one to the next: a mark is read when the factor is right to a twentieth.
+    ratio: f32,
+}
+
+const SOUGHT: [Sought; 4] = [
+    sought(Tone::Brightness, 2.2, 1.07),
+    sought(Tone::Gamma, 2.2, 1.1),
+    sought(Tone::Contrast, 2.2, 1.1),
+    sought(Tone::Saturation, 2.0, 1.15),
 ];
+
+const fn sought(tone: fn(f32) -> Tone, reach: f32, ratio: f32) -> Sought {
+    Sought { tone, reach, ratio }
+}
 
 impl std::fmt::Display for Tone {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -70,7 +82,7 @@ impl Tone {
 /// All factors of all kinds.
 pub(super) fn all() -> Vec<Tone> {
     let mut all = Vec::new();
-    for (tone, reach, ratio) in KINDS {
+    for Sought { tone, reach, ratio } in SOUGHT {
         let steps = (reach.ln() / ratio.ln()).ceil() as i32;
         all.extend((-steps..=steps).filter(|i| *i != 0).map(|i| tone(ratio.powi(i))));
     }
@@ -100,7 +112,7 @@ mod tests {
     #[test]
     fn what_was_done_is_undone() {
         let before = picture();
-        for (tone, ..) in KINDS {
+        for Sought { tone, .. } in SOUGHT {
             // Undoing the inverse is doing it.
             let done = tone(1.4).undone(&before);
             assert_ne!(done, before, "{:?}", tone(1.4));
@@ -113,7 +125,7 @@ mod tests {
 
     #[test]
     fn factors_reach_twice_and_half() {
-        for (tone, ..) in KINDS {
+        for Sought { tone, .. } in SOUGHT {
             let of_kind = |t: &&Tone| std::mem::discriminant(*t) == std::mem::discriminant(&tone(1.0));
             let all = all();
             let found = |f: f32| all.iter().filter(of_kind).any(|t| *t == tone(f));
