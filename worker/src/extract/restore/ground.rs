@@ -31,7 +31,7 @@ pub(super) fn whitened(picture: &Picture) -> Option<Picture> {
     let [near, far] = DISTANCE;
     let pixels = picture.pixels.as_chunks::<3>().0.iter().flat_map(|pixel| {
         let scene = ((distance(pixel) - near) / (far - near)).clamp(0.0, 1.0);
-        pixel.map(|v| v * scene + 1.0 - scene)
+        pixel.map(|v| v * scene + (1.0 - scene))
     });
     Some(Picture {
         pixels: pixels.collect(),
