@@ -67,7 +67,7 @@ pub struct Outcome {
 /// stop; the output is then as it was before.
 pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     job.settings.check()?;
-    let settings = &job.settings.for_bits(job.message.len());
+    let settings = job.settings;
     let stop = &engine.stop;
     stop.check()?;
     let rest = Memory {

@@ -93,7 +93,6 @@ impl Preset {
             robust_to: EVERYDAY.into_iter().collect(),
             distortions: Ranges::default(),
             distorted_size: 640,
-            longer_db: 2.0,
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
@@ -145,7 +144,6 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 distorted_size: 224,
-                longer_db: 0.0,
                 robust_to: RobustTo::none(),
                 lambda: Lambdas {
                     l1: 0.8,
@@ -176,25 +174,6 @@ impl Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn longer_messages_may_show_more_and_shorter_ones_not_less() {
-        let standard = Preset::Standard.settings();
-        let psnr = |bits: usize| {
-            let settings = standard.for_bits(bits);
-            let (balance, stop) = (settings.balance.unwrap(), settings.early_stop.unwrap());
-            [balance.target_psnr_db, stop.psnr_db, settings.target.psnr_db]
-        };
-        for bits in [1, 16, 32] {
-            assert_eq!(standard.for_bits(bits), standard);
-        }
-        let [held, stopped, asked] = psnr(32);
-        assert_eq!(psnr(64), [held - 2.0, stopped - 2.0, asked - 2.0]);
-        assert_eq!(psnr(128)[0], held - 4.0);
-        assert!(psnr(48)[0] < held && psnr(48)[0] > psnr(64)[0]);
-        let paper = Preset::Paper.settings();
-        assert_eq!(paper.for_bits(128), paper);
-    }
 
     #[test]
     fn presets_keep_to_their_limits_and_stand_dropped_bands() {

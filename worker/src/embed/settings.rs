@@ -140,9 +140,6 @@ pub struct Settings {
     /// Side in pixels to which a training view is enlarged before its picture is distorted, where that is more than its
     /// own: squares of JPEG and grains of noise are as large, against the scene, as in pictures of that side.
     pub distorted_size: u32,
-    /// How many dB a longer message may show more, for each doubling beyond [`FULL_BITS`]: in the PSNR that is held, at
-    /// which is stopped early, and that is asked for.
-    pub longer_db: f64,
     /// When to stop before the last step.
     pub early_stop: Option<EarlyStop>,
     /// How the result is verified.
@@ -151,25 +148,7 @@ pub struct Settings {
     pub target: Target,
 }
 
-/// Bits of a message up to which a preset's PSNR is held.
-pub const FULL_BITS: usize = 32;
-
 impl Settings {
-    /// These settings with the PSNRs of a message of so many bits.
-    pub fn for_bits(&self, bits: usize) -> Self {
-        let doublings = (bits as f64 / FULL_BITS as f64).log2().max(0.0);
-        let less = self.longer_db * doublings;
-        let mut settings = *self;
-        settings.target.psnr_db -= less;
-        if let Some(balance) = &mut settings.balance {
-            balance.target_psnr_db -= less;
-        }
-        if let Some(stop) = &mut settings.early_stop {
-            stop.psnr_db -= less;
-        }
-        settings
-    }
-
     /// These settings with the fields of a JSON object in place of their own; for experiments.
     ///
     /// # Errors
@@ -214,7 +193,6 @@ impl Settings {
         }
         count("pool_views", self.pool_views, 1_000_000)?;
         within("size", f64::from(self.size), 16.0, 4096.0)?;
-        within("longer_db", self.longer_db, 0.0, 10.0)?;
         within("distorted_size", f64::from(self.distorted_size), 16.0, 4096.0)?;
         if let Some(ring) = &self.ring {
             within("ring.elevation", f64::from(ring.elevation), -80.0, 80.0)?;

@@ -53,8 +53,7 @@ impl Making<'_> {
         }
         let stopwatch = self.machine.stopwatch();
         let mut made_after = None;
-        let settings = self.settings.for_bits(self.message.len());
-        let optimised = optimise(self.engine, self.scene, self.message, &settings, &mut |p| {
+        let optimised = optimise(self.engine, self.scene, self.message, self.settings, &mut |p| {
             if let Progress::Check(check) = p
                 && check.bit_accuracy >= MADE
             {
