@@ -6,6 +6,7 @@ mod console;
 mod context;
 mod create;
 mod details;
+mod distortion;
 mod error;
 mod interrupt;
 mod kind;

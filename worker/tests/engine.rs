@@ -195,7 +195,7 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     assert!(outcome.changed > 100 && outcome.changed <= outcome.gaussians);
     // What was verified is what anyone reads from the file.
     let scene = Scene::read(&at("a.ply")).unwrap().gaussians;
-    let reading = read_scene(&engine, &scene, 4, 32, [1.0; 3], 3, |_| {}).unwrap();
+    let reading = read_scene(&engine, &scene, 4, 32, [1.0; 3], 3, |_, _| Ok(())).unwrap();
     let found = &outcome.verification;
     assert_eq!(reading.compare(&message()).unwrap(), found.comparison);
     let sampler = ViewSampler::new(&scene, 3).unwrap();

@@ -11,6 +11,7 @@ use super::{key, suspects};
 use crate::arguments::Submission;
 use crate::context::Context;
 use crate::create::{create_with, leave, missed_target, no_result, succeeded, wait};
+use crate::distortion::{self, Distortion};
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::kind::Kind;
@@ -67,6 +68,15 @@ pub struct Arguments {
     /// How much work is spent
     #[arg(long, value_enum, default_value = "standard")]
     preset: Preset,
+    /// What the mark is trained to stand, in place of what the preset has: names with commas, or all
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_enum,
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
+    robust_to: Vec<Distortion>,
     /// Decides views, backgrounds and augmentation
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
@@ -163,6 +173,7 @@ fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs
         size: arguments.size.unwrap_or_default(),
         force: arguments.force,
         ignore_bad_rows: arguments.ignore_bad_rows,
+        robust_to: distortion::named(&arguments.robust_to),
         ..EmbedSpec::default()
     };
     spec.set_preset(arguments.preset.into());

@@ -4,6 +4,7 @@ use guardsplat_proto::v1::{EmbedSpec, Failure, Job, KeySpec, Progress, VerifySpe
 use serde::Serialize;
 
 use super::{EmbedReport, KeyResultReport, VerifyReport, some, time, word};
+use crate::distortion;
 
 /// A job as it stands.
 #[derive(Debug, Serialize)]
@@ -42,6 +43,8 @@ enum SpecReport {
         size: Option<u32>,
         force: bool,
         ignore_bad_rows: bool,
+        /// Empty where the preset decides.
+        robust_to: Vec<String>,
     },
     Verify {
         suspects: Vec<String>,
@@ -137,6 +140,7 @@ impl From<&Spec> for SpecReport {
                 size: given(spec.size),
                 force: spec.force,
                 ignore_bad_rows: spec.ignore_bad_rows,
+                robust_to: distortion::names(spec),
             },
             Spec::Verify(spec) => verify(spec, given(spec.views), given(spec.size)),
             // A seed is as good as the key: it is not printed.

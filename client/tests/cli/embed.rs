@@ -1,5 +1,5 @@
 //! `embed`: bytes arrive, figures are told, and files are whole or not there.
-use guardsplat_proto::v1::embed_spec::Preset;
+use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec, State};
 use guardsplat_proto::v1::progress::Stage;
@@ -70,7 +70,7 @@ fn bench(missed: &[&str]) -> Bench {
 fn a_scene_goes_there_and_comes_back_marked() {
     let bench = bench(&[]);
     let ran = bench.run(&format!(
-        "{LINE} --preset draft --seed 9 --size 128 --ignore-bad-rows --comparison c.png --json"
+        "{LINE} --preset draft --robust-to jpeg,8bit --seed 9 --size 128 --ignore-bad-rows --comparison c.png --json"
     ));
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
@@ -110,6 +110,10 @@ fn a_scene_goes_there_and_comes_back_marked() {
     assert_eq!(
         (spec.preset(), spec.seed, spec.size, spec.force),
         (Preset::Draft, 9, 128, false)
+    );
+    assert_eq!(
+        spec.robust_to().collect::<Vec<_>>(),
+        [Distortion::Jpeg, Distortion::EightBit]
     );
     assert!(spec.ignore_bad_rows && json["ignored_rows"] == 2);
     let request = state.created.last().unwrap();

@@ -1,7 +1,7 @@
 //! Checks a `CreateJob` request, all of it, before anything is queued.
 use std::collections::HashSet;
 
-use guardsplat_proto::v1::embed_spec::Preset;
+use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
 use prost::Message as _;
@@ -119,6 +119,7 @@ fn embed(spec: &EmbedSpec, problems: &mut Problems) -> Result<Option<Wanted>> {
         "job.embed.preset",
         "is no preset that this server knows",
     );
+    distortions(&spec.robust_to, problems);
     side("job.embed.size", spec.size, problems);
     let message = (!spec.message.is_empty()).then(|| ("job.embed.message", spec.message.clone()));
     Ok(scene.map(|scene| Wanted {
@@ -127,6 +128,20 @@ fn embed(spec: &EmbedSpec, problems: &mut Problems) -> Result<Option<Wanted>> {
         message,
         claim,
     }))
+}
+
+fn distortions(robust_to: &[i32], problems: &mut Problems) {
+    const FIELD: &str = "job.embed.robust_to";
+    let mut seen = HashSet::new();
+    for (i, number) in robust_to.iter().enumerate() {
+        let field = format!("{FIELD}[{i}]");
+        if !Distortion::try_from(*number).is_ok_and(|known| known != Distortion::Unspecified) {
+            return problems.add(field, "is no distortion that this server knows");
+        }
+        if !seen.insert(number) {
+            return problems.add(field, "is named twice");
+        }
+    }
 }
 
 fn verify(spec: &VerifySpec, problems: &mut Problems) -> Result<Option<Wanted>> {

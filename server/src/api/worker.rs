@@ -66,6 +66,7 @@ impl WorkerService for Api {
         let told = Told {
             readings: std::mem::take(&mut request.readings),
             engine: request.engine,
+            views: std::mem::take(&mut request.views),
         };
         // A job that is over was concluded before, and is only to be answered in the same way.
         if !job.state.is_over() {

@@ -92,6 +92,14 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
 
     // The evidence stands without the server.
     service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);
+    // With pictures in it: what was read, and of the marking the originals and the differences besides.
+    let pictures = |folder: &str| {
+        let page = service.bench.path(folder).join("evidence.html");
+        std::fs::read_to_string(page).unwrap().matches("data:image/png").count()
+    };
+    let marking = marked["job"].as_str().unwrap();
+    service.json(&format!("report open {marking} -o marking"), 0);
+    assert_eq!((pictures("report"), pictures("marking")), (4, 9));
     let pem = service.json("report key", 0)["pem"].as_str().unwrap().to_owned();
     service.bench.write("service.pem", pem);
     assert!(

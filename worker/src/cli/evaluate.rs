@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     scenes: Vec<PathBuf>,
     /// Which experiments: capacity, robustness, trained, losses, pruning, longer, perturbations, sensitivity, elevation,
-    /// formats, security, trade
+    /// formats, security, claims, trade
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "capacity")]
     experiments: Vec<Kind>,
     /// Only messages of these lengths
@@ -177,6 +177,7 @@ fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Opti
         }),
         Progress::Embedding(_) => {}
         Progress::Read(attack, accuracy) => display.say(&format!("  {attack}: {:.2} %", 100.0 * accuracy)),
+        Progress::Claimed(about, matches, of) => display.say(&format!("  claims, {about}: {matches} of {of} match")),
         Progress::Failed(why) => display.say(&format!("  failed: {why}")),
         Progress::Detected(bits, detector, area) => display.say(&format!("{bits} bits, {detector}: area {area:.3}")),
     })

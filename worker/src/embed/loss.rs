@@ -2,7 +2,7 @@
 //!
 //! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
 //! of a step.
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 
 use super::progress::Terms;
@@ -74,7 +74,8 @@ impl<'a> Loss<'a> {
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
         let lpips = match lpips {
             Some(lpips) => {
-                let distance = lpips.per_view(original, marked.clone())?.mean();
+                let (original, marked) = (self.some(step, original), self.some(step, marked.clone()));
+                let distance = lpips.per_view(original, marked)?.mean();
                 reconstruction = reconstruction + distance.clone() * lambda.lpips;
                 Some(distance)
             }
@@ -121,6 +122,17 @@ impl<'a> Loss<'a> {
             gradients,
             bit_accuracy: right as f64 / logits.len() as f64,
         })
+    }
+
+    /// The views of a step that LPIPS looks at: a window that moves on at every step, and comes around.
+    fn some(&self, step: usize, pictures: Tensor<4>) -> Tensor<4> {
+        let views = pictures.dims()[0];
+        let Some(count) = self.settings.lpips_views.filter(|count| *count < views) else {
+            return pictures;
+        };
+        let places: Vec<i64> = (0..count).map(|i| ((step * count + i) % views) as i64).collect();
+        let places = Tensor::<1, Int>::from_data(TensorData::new(places, [count]), &pictures.device());
+        pictures.select(0, places)
     }
 }
 

@@ -124,6 +124,9 @@ pub struct Settings {
     pub black_backgrounds: f32,
     /// Weights of the loss.
     pub lambda: Lambdas,
+    /// Views of a step that LPIPS looks at, the next ones at every step; its time is nearly all of a step's. `None` for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lpips_views: Option<usize>,
     /// The optimiser.
     pub adam: AdamOptions,
     /// Takes the place of Adam.
@@ -188,6 +191,9 @@ impl Settings {
             0.0,
             self.views_per_step as f64,
         )?;
+        if let Some(views) = self.lpips_views {
+            within("lpips_views", views as f64, 1.0, self.views_per_step as f64)?;
+        }
         if let Some(views) = self.views {
             within("views", views as f64, self.views_per_step as f64, 1e6)?;
         }

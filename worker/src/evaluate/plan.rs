@@ -1,4 +1,5 @@
 //! What the experiments of the paper, and ours, need: marks, and what is done to them.
+use guardsplat_distortion::{Kind as Distortion, RobustTo};
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::named::Kind;
 use guardsplat_evaluation::report::names;
@@ -12,6 +13,8 @@ use crate::error::Result;
 const BITS: usize = 32;
 /// Bits of the paper's robustness table.
 const ROBUST_BITS: usize = 16;
+/// Bits of the words that assets are marked with.
+const CLAIM_BITS: usize = 64;
 /// Bits that other work has a figure for.
 const LONGER_BITS: usize = 128;
 
@@ -30,6 +33,8 @@ pub struct Wanted {
     pub trials: Vec<Trial>,
     /// Whether seconds are what is asked for.
     pub timed: bool,
+    /// Whether claims are made about marks besides.
+    pub claims: bool,
 }
 
 /// Everything that some experiments need.
@@ -53,7 +58,9 @@ pub struct Trade {
 impl Plan {
     fn add(&mut self, experiment: Kind, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
         let same = |w: &&mut Wanted| w.bits == bits && w.variant == variant;
+        let claims = experiment == Kind::Claims;
         if let Some(known) = self.wanted.iter_mut().find(same) {
+            known.claims |= claims;
             for trial in trials {
                 if !known.trials.contains(&trial) {
                     known.trials.push(trial);
@@ -68,6 +75,7 @@ impl Plan {
             settings,
             trials,
             timed: experiment == Kind::Trade,
+            claims,
         });
     }
 }
@@ -106,6 +114,19 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                     .collect();
                 let attacks: Vec<&str> = attacks.iter().map(String::as_str).chain([names::VAE]).collect();
                 add(ROBUST_BITS, names::STANDARD, *standard, &attacks)?;
+                let stands = [Distortion::ShTruncation, Distortion::Noise, Distortion::Jpeg]
+                    .into_iter()
+                    .collect();
+                let robust = Settings {
+                    robust_to: stands,
+                    ..*standard
+                };
+                add(ROBUST_BITS, names::ROBUST, robust, &attacks)?;
+                let all = Settings {
+                    robust_to: RobustTo::all(),
+                    ..*standard
+                };
+                add(ROBUST_BITS, names::ROBUST_TO_ALL, all, &attacks)?;
             }
             Kind::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
@@ -151,6 +172,7 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                 let trials: Vec<&str> = trials.iter().map(String::as_str).collect();
                 add(BITS, names::STANDARD, *standard, &trials)?;
             }
+            Kind::Claims => add(CLAIM_BITS, names::STANDARD, *standard, &none)?,
             // What detectors make of these marks comes after all of them; see `security`.
             Kind::Security => {
                 for bits in free {
@@ -217,6 +239,8 @@ mod tests {
             let again = |other: &Wanted| (other.bits, &other.variant) == (one.bits, &one.variant);
             assert!(!plan.wanted[i + 1..].iter().any(again), "{} {}", one.bits, one.variant);
         }
+        let claimed: Vec<usize> = plan.wanted.iter().filter(|w| w.claims).map(|w| w.bits).collect();
+        assert_eq!(claimed, [64]);
         let standard = plan
             .wanted
             .iter()

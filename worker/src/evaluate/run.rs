@@ -10,6 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha20Rng;
 use sha2::{Digest, Sha256};
 
+use super::claims::Claiming;
 use super::machine::Machine;
 use super::mark::{Making, path};
 use super::plan::{Plan, Wanted};
@@ -48,6 +49,8 @@ pub enum Progress {
     Read(String, f64),
     /// A mark could not be made, and the run goes on without it: why.
     Failed(String),
+    /// Claims were made about a mark: what was looked at, and how many right ones matched, of how many.
+    Claimed(String, usize, usize),
     /// A detector looked at marks of this length, with this area under its ROC curve.
     Detected(usize, String, f64),
 }
@@ -193,7 +196,18 @@ impl One<'_> {
             let possible = |trial: &&Trial| **trial != Trial::Vae || self.options.vae.is_some();
             self.wanted.trials.iter().filter(possible).filter(is_left).collect()
         };
-        if store.has(&id) && left(store).is_empty() {
+        let claiming = Claiming {
+            engine: self.engine,
+            message: &message,
+            mark: &id,
+            size,
+            seed: self.seed,
+        };
+        let cases = |store: &Store| match self.wanted.claims {
+            true => claiming.left(store, views),
+            false => Vec::new(),
+        };
+        if store.has(&id) && left(store).is_empty() && cases(store).is_empty() {
             return Ok(id);
         }
         let scene = Scene::read(path_of_scene)?;
@@ -246,6 +260,15 @@ impl One<'_> {
             let accuracy = record.accuracy();
             store.append(Record::Reading(record)).map_err(super::judged)?;
             progress(Progress::Read(attack, accuracy));
+        }
+        for case in cases(store) {
+            let clean = || Views::render(self.engine, &scene.gaussians, &cameras);
+            let records = claiming.carry_out(&case, &plain, clean)?;
+            for record in records {
+                let (matches, of) = (record.matches(), record.p_values.len());
+                progress(Progress::Claimed(record.told(), matches, of));
+                store.append(Record::Claims(record)).map_err(super::judged)?;
+            }
         }
         Ok(id)
     }

@@ -1,6 +1,7 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
 mod extractor;
+mod framed;
 mod framing;
 mod kind;
 mod pictures;
@@ -10,6 +11,7 @@ mod restore;
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
+pub use framed::{Framed, framings};
 pub use framing::{Framing, without_borders};
 pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
@@ -39,7 +41,7 @@ pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<Reading> {
 }
 
 /// Renders `views` held-out 8-bit views of a scene, `size` by `size` pixels, and reads them. `done` hears of every
-/// view.
+/// view, and is shown it.
 ///
 /// # Errors
 /// An empty scene, a size out of range, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
@@ -50,15 +52,15 @@ pub fn read_scene(
     size: u32,
     background: [f32; 3],
     seed: u64,
-    mut done: impl FnMut(usize),
+    mut done: impl FnMut(usize, &Picture) -> Result<()>,
 ) -> Result<Reading> {
     let sampler = ViewSampler::new(gaussians, seed)?;
     let mut logits = Vec::with_capacity(views);
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let picture = engine.picture(gaussians, &camera, background)?;
-        logits.extend(engine.read_logits(&[picture])?);
-        done(index + 1);
+        logits.extend(engine.read_logits(std::slice::from_ref(&picture))?);
+        done(index + 1, &picture)?;
     }
     Reading::new(logits)
 }

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::progress::Stage;
-use guardsplat_proto::v1::{FramedReading, Job, complete_job_request};
+use guardsplat_proto::v1::{FramedReading, Job, SeenView, complete_job_request};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::stop::Stop;
 
@@ -22,6 +22,8 @@ pub struct Outcome {
     pub result: complete_job_request::Result,
     /// For the server, which decides claims.
     pub readings: Vec<FramedReading>,
+    /// For people who look at the evidence.
+    pub views: Vec<SeenView>,
 }
 
 impl From<complete_job_request::Result> for Outcome {
@@ -29,6 +31,7 @@ impl From<complete_job_request::Result> for Outcome {
         Self {
             result,
             readings: Vec::new(),
+            views: Vec::new(),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Between the API's messages and the engine's types.
 use std::time::Duration;
 
-use guardsplat_proto::v1::embed_spec::Preset as ApiPreset;
+use guardsplat_distortion::{Kind, RobustTo};
+use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
@@ -29,7 +30,39 @@ pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
         Err(_) => return Err(Error::BadJob(format!("preset: {} is none", spec.preset))),
     };
     let size = Some(spec.size).filter(|size| *size > 0);
-    Ok(chosen(preset.settings(), spec.seed, size)?)
+    let mut settings = preset.settings();
+    if !spec.robust_to.is_empty() {
+        settings.robust_to = robust_to(&spec.robust_to)?;
+    }
+    Ok(chosen(settings, spec.seed, size)?)
+}
+
+/// What a mark is to stand.
+fn robust_to(numbers: &[i32]) -> Result<RobustTo> {
+    let kind = |number: &i32| {
+        Ok(match Distortion::try_from(*number) {
+            Ok(Distortion::Crop) => Kind::Crop,
+            Ok(Distortion::Scaling) => Kind::Scaling,
+            Ok(Distortion::Rotation) => Kind::Rotation,
+            Ok(Distortion::Brightness) => Kind::Brightness,
+            Ok(Distortion::Contrast) => Kind::Contrast,
+            Ok(Distortion::Jpeg) => Kind::Jpeg,
+            Ok(Distortion::Noise) => Kind::Noise,
+            Ok(Distortion::Blur) => Kind::Blur,
+            Ok(Distortion::Mask) => Kind::Mask,
+            Ok(Distortion::EightBit) => Kind::EightBit,
+            Ok(Distortion::Combined) => Kind::Combined,
+            Ok(Distortion::ShNoise) => Kind::ShNoise,
+            Ok(Distortion::ShTruncation) => Kind::ShTruncation,
+            Ok(Distortion::Spz) => Kind::Spz,
+            Ok(Distortion::Sog) => Kind::Sog,
+            Ok(Distortion::Pruning) => Kind::Pruning,
+            Ok(Distortion::Unspecified) | Err(_) => {
+                return Err(Error::BadJob(format!("robust_to: {number} is no distortion")));
+            }
+        })
+    };
+    numbers.iter().map(kind).collect()
 }
 
 /// The views that a verification asks for.

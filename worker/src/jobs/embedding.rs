@@ -2,11 +2,12 @@
 use std::time::{Duration, Instant};
 
 use guardsplat_proto::v1::complete_job_request::Result as Done;
-use guardsplat_proto::v1::{EmbedResult, EmbedSpec};
+use guardsplat_proto::v1::{EmbedResult, EmbedSpec, SeenView};
 use guardsplat_worker::Error as EngineError;
 use guardsplat_worker::embed::{Job, Outcome, embed};
 use guardsplat_worker::extract::Framing;
 use guardsplat_worker::message::Key;
+use guardsplat_worker::picture::Picture;
 use guardsplat_worker::quality::{PictureFormat, encode_picture};
 use guardsplat_worker::scene::BadRows;
 
@@ -15,11 +16,16 @@ use super::convert;
 use super::error::{Error, Result};
 use super::transfer::Content;
 use crate::work::sheet;
+use crate::work::shown::small_png;
+
+/// Views of the evidence.
+const SHOWN: usize = 3;
 
 /// A scene that was marked.
 struct Marked {
     outcome: Outcome,
     sheet: Vec<u8>,
+    views: Vec<SeenView>,
     device: String,
     clip: String,
     duration: Duration,
@@ -71,9 +77,21 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
             path: sheet::NAME.into(),
             reason,
         })?;
+        // Only the evidence of an asset shows them.
+        let shown = if secret { SHOWN } else { 0 };
+        let pairs = outcome.verification.pairs.iter().take(shown).enumerate();
+        let view = |(index, (original, read)): (usize, &(Picture, Picture))| {
+            Ok(SeenView {
+                name: format!("view {}", index + 1),
+                read: small_png(read)?,
+                original: small_png(original)?,
+            })
+        };
+        let views = pairs.map(view).collect::<guardsplat_worker::Result<_>>()?;
         Ok(Marked {
             outcome,
             sheet,
+            views,
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),
@@ -96,5 +114,9 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         clip: marked.clip,
         ..convert::embed_result(&marked.outcome)
     });
-    Ok(Finished { result, readings })
+    Ok(Finished {
+        result,
+        readings,
+        views: marked.views,
+    })
 }

@@ -132,6 +132,7 @@ impl Lease {
             result: Some(outcome.result),
             readings: outcome.readings,
             engine: ENGINE.into(),
+            views: outcome.views,
         };
         let call = "complete the job";
         persist(call, async || {

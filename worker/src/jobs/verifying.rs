@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::progress::Stage;
-use guardsplat_proto::v1::{FramedReading, VerifyResult, VerifySpec};
+use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use guardsplat_worker::extract::{MAX_PICTURES, find_source};
 use guardsplat_worker::message::Key;
 
@@ -11,11 +11,13 @@ use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
 use crate::work::findings::{Findings, read_and_compare, read_framed};
+use crate::work::shown::Shown;
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
     findings: Findings,
     readings: Vec<FramedReading>,
+    shown: Shown,
     device: String,
     clip: String,
     duration: Duration,
@@ -46,8 +48,9 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let device = bench.device().to_owned();
         let engine = bench.engine(&name, &key, stop)?;
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
+        let mut shown = Shown::default();
         let (findings, framed) = if claim {
-            let (framed, ignored) = read_framed(engine, &source, &views, progress)?;
+            let (framed, ignored) = read_framed(engine, &source, &views, &mut shown, progress)?;
             // As given comes first.
             let reading = framed.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
@@ -63,6 +66,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
                 .iter()
                 .map(|(framing, reading)| convert::framed(*framing, reading))
                 .collect(),
+            shown,
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),
@@ -75,8 +79,14 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         clip: verified.clip,
         ..convert::verify_result(verified.findings)
     });
+    let view = |(name, read)| SeenView {
+        name,
+        read,
+        original: Vec::new(),
+    };
     Ok(Outcome {
         result,
         readings: verified.readings,
+        views: verified.shown.0.into_iter().map(view).collect(),
     })
 }

@@ -2,13 +2,15 @@
 use guardsplat_worker::Result;
 use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::extract::{
-    Comparison, Engine, Framing, Reading, Source, default_size, read_scene, without_borders,
+    Comparison, Engine, Framed, Framing, Reading, Source, default_size, framings, read_scene,
 };
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::{Message, Verdict};
 use guardsplat_worker::quality::read_picture;
 use guardsplat_worker::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
+
+use super::shown::Shown;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -27,12 +29,13 @@ pub struct Views {
     pub bad_rows: BadRows,
 }
 
-/// Reads `source`, and tells of rows of a scene that were ignored; `progress` hears how many views or pictures are done,
+/// Reads `source`, and tells of rows of a scene that were ignored; `shown` keeps the first pictures, and `progress` hears how many views or pictures are done,
 /// and of how many.
 pub fn read(
     engine: &Engine,
     source: &Source,
     views: &Views,
+    shown: &mut Shown,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<(Reading, Option<Ignored>)> {
     match source {
@@ -54,8 +57,9 @@ pub fn read(
                 size,
                 views.background,
                 views.seed,
-                |done| {
+                |done, picture| {
                     progress(done, views.count);
+                    shown.see("view", done - 1, picture)
                 },
             )?;
             Ok((reading, ignored))
@@ -65,6 +69,7 @@ pub fn read(
             // One at a time: thousands of large pictures need not fit in memory.
             for (index, path) in paths.iter().enumerate() {
                 let picture = read_picture(path, views.background)?;
+                shown.see("picture", index, &picture)?;
                 read.extend(engine.read_logits(&[picture])?);
                 progress(index + 1, paths.len());
             }
@@ -74,7 +79,7 @@ pub fn read(
 }
 
 /// A reading in each framing, as given first, and rows of a scene that were ignored.
-pub type Framed = (Vec<(Framing, Reading)>, Option<Ignored>);
+pub type InFramings = (Vec<(Framing, Reading)>, Option<Ignored>);
 
 /// As [`read`], in every framing that pictures may be in; a scene is rendered as it is, and has one only. Framings
 /// without borders are there only if some picture has any: others would be the same once more.
@@ -82,37 +87,21 @@ pub fn read_framed(
     engine: &Engine,
     source: &Source,
     views: &Views,
+    shown: &mut Shown,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Framed> {
+) -> Result<InFramings> {
     let Source::Pictures(paths) = source else {
-        let (reading, ignored) = read(engine, source, views, progress)?;
+        let (reading, ignored) = read(engine, source, views, shown, progress)?;
         return Ok((vec![(Framing::default(), reading)], ignored));
     };
-    let framings: Vec<Framing> = [false, true]
-        .into_iter()
-        .flat_map(|trimmed| Framing::tried(engine, trimmed))
-        .collect();
-    let mut logits: Vec<Vec<Vec<f32>>> = vec![Vec::with_capacity(paths.len()); framings.len()];
-    let mut borders = false;
+    let mut pictures = Vec::with_capacity(paths.len());
     for (index, path) in paths.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
-        let whole = Framing::read(engine, &picture)?;
-        let trimmed = match without_borders(&picture) {
-            Some(trimmed) => {
-                borders = true;
-                Framing::read(engine, &trimmed)?
-            }
-            None => whole.clone(),
-        };
-        for (place, read) in whole.into_iter().chain(trimmed).enumerate() {
-            logits[place].push(read);
-        }
+        shown.see("picture", index, &picture)?;
+        pictures.push(Framed::read(engine, &picture)?);
         progress(index + 1, paths.len());
     }
-    let read = framings.into_iter().zip(logits);
-    let tried = read.filter(|(framing, _)| borders || !framing.trimmed);
-    let readings = tried.map(|(framing, logits)| Ok((framing, Reading::new(logits)?)));
-    Ok((readings.collect::<Result<_>>()?, None))
+    Ok((framings(engine, &pictures)?, None))
 }
 
 /// What was read, and how it compares with a raw message.
@@ -139,7 +128,9 @@ pub fn read_and_compare(
     message: Option<&Message>,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Compared> {
-    let (reading, ignored) = read(engine, source, views, &mut progress)?;
+    // Nobody looks at what was compared with a raw message.
+    let mut shown = Shown::default();
+    let (reading, ignored) = read(engine, source, views, &mut shown, &mut progress)?;
     let mut best = Compared {
         reading,
         comparison: None,
@@ -161,7 +152,7 @@ pub fn read_and_compare(
     if decided {
         return Ok(best);
     }
-    let (framed, _) = read_framed(engine, source, views, progress)?;
+    let (framed, _) = read_framed(engine, source, views, &mut shown, progress)?;
     best.framings = framed.len();
     let others = halves * (framed.len() as u32 - 1).max(1);
     for (framing, reading) in framed.into_iter().skip(1) {

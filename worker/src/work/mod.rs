@@ -4,3 +4,4 @@ pub mod keys;
 pub mod load;
 pub mod settings;
 pub mod sheet;
+pub mod shown;

@@ -54,7 +54,7 @@ fn any_differentiable_extractor_can_be_embedded_for() {
         let found = optimise(&engine, &scene, &message, &message_only(), &mut |_| {}).unwrap();
         let mut marked = scene.gaussians.clone();
         marked.sh = found.learned.colours(&marked.sh);
-        let reading = read_scene(&engine, &marked, 4, 32, [0.0; 3], 3, |_| {}).unwrap();
+        let reading = read_scene(&engine, &marked, 4, 32, [0.0; 3], 3, |_, _| Ok(())).unwrap();
         assert_eq!(reading.message().unwrap(), message, "{reading:?}");
     }
 }
@@ -87,7 +87,7 @@ fn convolutional_decoders_come_with_the_key() {
     assert_eq!(engine.bits, 4);
     // Whatever the size of pictures is.
     for size in [20, 160, 200] {
-        let reading = read_scene(&engine, &small_scene(), 1, size, [1.0; 3], 3, |_| {}).unwrap();
+        let reading = read_scene(&engine, &small_scene(), 1, size, [1.0; 3], 3, |_, _| Ok(())).unwrap();
         assert_eq!(reading.views[0].len(), 4);
     }
 

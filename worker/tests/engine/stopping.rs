@@ -46,7 +46,7 @@ fn whatever_is_computed_ends_when_it_is_asked_to() {
     engine.stop.request();
     let nothing = run(&engine, &folder.path().join("none.ply"), &output, &settings(), true);
     assert!(matches!(nothing, Err(Error::Stopped)), "not even looked for");
-    let unread = read_scene(&engine, &small_scene(), 4, 32, [1.0; 3], 3, |_| {});
+    let unread = read_scene(&engine, &small_scene(), 4, 32, [1.0; 3], 3, |_, _| Ok(()));
     assert!(matches!(unread, Err(Error::Stopped)));
 }
 

@@ -1,8 +1,8 @@
 //! The end of a job with a claim: what a worker read becomes a verdict, and evidence of it.
 use guardsplat_codeword::{Answer, Framing, ReadPayload, Verdict};
-use guardsplat_evidence::Evidence;
+use guardsplat_evidence::{Evidence, View};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
-use guardsplat_proto::v1::{EmbedResult, FramedReading, VerifyResult};
+use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
 use prost::Message as _;
 
 use super::decision::Decided;
@@ -21,6 +21,15 @@ pub(in crate::api) struct Told {
     pub readings: Vec<FramedReading>,
     /// What it is.
     pub engine: String,
+    /// What it saw.
+    pub views: Vec<SeenView>,
+}
+
+/// What of that was checked.
+struct Checked<'a> {
+    told: &'a Told,
+    framings: Vec<Framing>,
+    views: Vec<View>,
 }
 
 impl Api {
@@ -34,10 +43,14 @@ impl Api {
     ) -> Result<()> {
         let Some(claim) = of_job(job)? else { return Ok(()) };
         let key = self.key_of(job).await?;
-        let framings = framing::checked(&told.readings, key.bits)?;
+        let told = Checked {
+            told,
+            framings: framing::checked(&told.readings, key.bits)?,
+            views: evidence::checked_views(&told.views)?,
+        };
         let report = match job.kind {
-            JobKind::Verify => self.verified(job, &key, &claim, told, &framings, completion).await?,
-            _ => self.marked(job, &key, &claim, told, &framings, completion).await?,
+            JobKind::Verify => self.verified(job, &key, &claim, told, completion).await?,
+            _ => self.marked(job, &key, &claim, told, completion).await?,
         };
         let signed = guardsplat_evidence::sign(&report, self.notary().report_key())
             .map_err(|error| Error::internal("writing evidence", error))?;
@@ -75,21 +88,22 @@ impl Api {
         job: &JobRow,
         key: &KeyRow,
         claim: &Claim,
-        told: &Told,
-        framings: &[Framing],
+        told: Checked<'_>,
         completion: &mut Completion,
     ) -> Result<Evidence> {
+        let Checked { told, framings, views } = told;
         if framings.is_empty() {
             let reason = "is missing: the server decides a claim on what was read";
             return Err(Error::invalid("readings", reason));
         }
-        let decided = self.decide(claim, key, framings).await?;
+        let decided = self.decide(claim, key, &framings).await?;
         let result = answered(decode(&completion.result)?, &decided, framings.len());
         let facts = Facts {
             job,
             key,
             engine: &told.engine,
             device: &result.device,
+            views,
         };
         let files = Files::of_suspects(self, job).await?;
         let read = Read {
@@ -106,16 +120,16 @@ impl Api {
         job: &JobRow,
         key: &KeyRow,
         claim: &Claim,
-        told: &Told,
-        framings: &[Framing],
+        told: Checked<'_>,
         completion: &mut Completion,
     ) -> Result<Evidence> {
+        let Checked { told, framings, views } = told;
         let mut result: EmbedResult = decode(&completion.result)?;
         // The word that was embedded is as secret as its pad.
         result.message.clear();
         let decided = match framings.is_empty() {
             true => None,
-            false => Some(self.decide(claim, key, framings).await?),
+            false => Some(self.decide(claim, key, &framings).await?),
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,
@@ -127,6 +141,7 @@ impl Api {
             key,
             engine: &told.engine,
             device: &result.device,
+            views,
         };
         let files = Files::of_marking(self, job, &result).await?;
         completion.result = result.encode_to_vec();

@@ -1,9 +1,10 @@
 //! The evidence that a job with a claim leaves: what the server knows of it, as a report to be signed.
 mod files;
 mod reading;
+mod views;
 
 use guardsplat_evidence::{
-    Audience, Embedding, Evidence, Key, Kind as Of, Model, SCHEMA, Sha256, Target, Timestamp, VERSION,
+    Audience, Embedding, Evidence, Key, Kind as Of, Model, SCHEMA, Sha256, Target, Timestamp, VERSION, View,
 };
 use guardsplat_proto::v1::EmbedResult;
 
@@ -15,6 +16,7 @@ use crate::ledger::{JobRow, KeyRow};
 use crate::marks::{self, CODE};
 pub(super) use files::Files;
 pub(super) use reading::Read;
+pub(super) use views::checked as checked_views;
 
 /// Most bytes of a text that a worker wrote.
 const MAX_TEXT_BYTES: usize = 200;
@@ -29,6 +31,8 @@ pub(super) struct Facts<'a> {
     pub engine: &'a str,
     /// On what it did.
     pub device: &'a str,
+    /// Pictures of what was read.
+    pub views: Vec<View>,
 }
 
 /// The evidence of a claim on a suspect.
@@ -92,7 +96,7 @@ impl Facts<'_> {
             inputs: files.inputs,
             verification: None,
             embedding: None,
-            views: Vec::new(),
+            views: self.views.clone(),
         })
     }
 }

@@ -2,15 +2,15 @@
 use std::time::Duration;
 
 use guardsplat_codeword::Word;
-use guardsplat_evidence::{Checked, Verdict as Told, VerifyingKey, check};
+use guardsplat_evidence::{Checked, Picture, Verdict as Told, VerifyingKey, check};
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::job::{Result as JobResult, Spec, State};
 use guardsplat_proto::v1::key::State as KeyState;
 use guardsplat_proto::v1::verify_result::Verdict;
 use guardsplat_proto::v1::{
-    CompleteJobRequest, DownloadArtifactRequest, EmbedResult, EmbedSpec, FramedReading, Job, UpdateKeyStateRequest,
-    VerifyResult, VerifySpec, download_artifact_response,
+    CompleteJobRequest, DownloadArtifactRequest, EmbedResult, EmbedSpec, FramedReading, Job, SeenView,
+    UpdateKeyStateRequest, VerifyResult, VerifySpec, download_artifact_response,
 };
 use tonic::{Code, Status};
 use uuid::Uuid;
@@ -26,6 +26,16 @@ struct Bench {
     owners: [String; 2],
     /// With their original.
     assets: Vec<(String, String)>,
+}
+
+/// A view that a worker saw, three levels off the original.
+fn seen(value: u8) -> SeenView {
+    let png = |value| Picture::from_rgb(2, 1, &[value; 6]).unwrap().png().unwrap().to_vec();
+    SeenView {
+        name: "view 1".into(),
+        read: png(value),
+        original: png(value - 3),
+    }
 }
 
 async fn bench_with(limits: Limits) -> Bench {
@@ -142,6 +152,7 @@ impl Bench {
             result: Some(result),
             readings,
             engine: "a test".into(),
+            views: vec![seen(103)],
         };
         self.server.worker.clone().complete_job(request).await.map(|_| ())
     }
@@ -177,6 +188,12 @@ impl Bench {
         assert_eq!(result.message, "");
         let checked = self.report(&result.evidence_html).await;
         assert!(checked.holds(), "{checked:?}");
+        let views = &checked.evidence.as_ref().unwrap().views;
+        let difference = Picture::from_rgb(2, 1, &[30; 6]).unwrap();
+        assert_eq!(
+            views.iter().map(|v| v.difference.clone()).collect::<Vec<_>>(),
+            [Some(difference)]
+        );
         assert!(self.report(&result.evidence_json).await.holds());
         (result, checked)
     }

@@ -55,6 +55,8 @@ async fn every_wrong_field_is_named() {
         (embed(|s| s.key = "keys/mine".into()), "job.embed.key"),
         (embed(|s| s.message.clear()), "job.embed.message"),
         (embed(|s| s.preset = 17), "job.embed.preset"),
+        (embed(|s| s.robust_to = vec![6, 0]), "job.embed.robust_to[1]"),
+        (embed(|s| s.robust_to = vec![6, 13, 6]), "job.embed.robust_to[2]"),
         (embed(|s| s.size = 15), "job.embed.size"),
         (embed(|s| s.size = 4097), "job.embed.size"),
         (verify(|s| s.suspects.clear()), "job.verify.suspects"),

@@ -10,6 +10,10 @@ pub const ALL_ATTRIBUTES: &str = "all attributes";
 pub const DC: &str = "dc";
 /// Only the other bands are learned.
 pub const REST: &str = "rest";
+/// Trained to stand dropped bands, noise and JPEG.
+pub const ROBUST: &str = "robust";
+/// Trained to stand every distortion that is known.
+pub const ROBUST_TO_ALL: &str = "robust to all";
 /// Training views are on one circle around the scene, instead of over the sphere.
 pub const RING: &str = "ring";
 /// Only the message counts.
@@ -30,6 +34,11 @@ pub const LAMBDA_OFFSET: &str = "lambda-offset:";
 pub const TRADE: &str = "trade:";
 /// Detections of what must be found, replaced bits instead of marks, are called this and the detector.
 pub const CONTROL: &str = "control:";
+
+/// A marked scene that is given as it is, and rendered by whoever looks for the mark.
+pub const SCENE: &str = "scene";
+/// Pictures of the scene before it was marked.
+pub const UNMARKED: &str = "unmarked";
 
 /// Views as they are.
 pub const NONE: &str = "none";

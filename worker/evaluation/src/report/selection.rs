@@ -1,5 +1,5 @@
 //! What one table is made of: records of one engine version with one CLIP, and of each variant the newest settings.
-use super::record::{Detection, Id, Mark, Reading};
+use super::record::{Claims, Detection, Id, Mark, Reading};
 use super::store::Records;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -177,6 +177,16 @@ impl<'a> Selection<'a> {
     /// Bits and variants that there are marks of.
     pub fn groups(&self) -> BTreeSet<(u32, &'a str)> {
         self.marks.iter().map(|(_, mark)| group(mark)).collect()
+    }
+
+    /// Claims about these marks, with them; by mark, then as they were made.
+    pub fn claims(&self) -> Vec<(&'a Mark, &'a Claims)> {
+        let all = self.records.claims();
+        let of_mark = |(id, mark): &(&'a Id, &'a Mark)| {
+            let (id, mark) = (*id, *mark);
+            all.iter().filter(move |c| c.mark == *id).map(move |c| (mark, c))
+        };
+        self.marks.iter().flat_map(of_mark).collect()
     }
 
     /// Detections all of whose marks are among these, by detector and identity.

@@ -1,5 +1,5 @@
 //! Records for the tests of reports.
-use super::record::{Detection, Embedding, Mark, Reading, Record, Timing};
+use super::record::{Claims, Detection, Embedding, Mark, Reading, Record, Timing};
 use super::store::Records;
 
 /// A change of a record, and the field that it is of.
@@ -69,6 +69,25 @@ pub fn detection(marks: &[Mark]) -> Detection {
         auc: 0.75,
         auc_interval: [0.2, 0.98],
         clusters: None,
+    }
+}
+
+/// Two right claims from ten views each, one of which matched, and a thousand wrong ones as p-values have them.
+pub fn claims(mark: &Mark, suspect: &str, searched: bool) -> Claims {
+    Claims {
+        mark: mark.id(),
+        suspect: suspect.into(),
+        searched,
+        size: mark.embedding.size,
+        views: 20,
+        pool: 10,
+        framings: if searched { 144 } else { 1 },
+        rate: 1e-6,
+        p_values: vec![1e-9, 1e-3],
+        payloads: 1,
+        wrong: 1000,
+        wrong_at_most: [100, 10, 1, 0, 0, 0],
+        wrong_as_trials: Some([200, 60, 15, 4, 1, 0]),
     }
 }
 

@@ -33,6 +33,20 @@ fn presets_seeds_and_sizes_reach_the_settings() {
     let found = sized(96).unwrap();
     assert_eq!((found.size, found.verify.size), (96, Some(96)));
     assert_eq!(sized(4).err().unwrap().to_string(), "size: 4 is outside 16 to 4096");
+    let standing = |robust_to: Vec<i32>| {
+        settings(&api::EmbedSpec {
+            robust_to,
+            ..api::EmbedSpec::default()
+        })
+    };
+    let every: Vec<i32> = (1..).take_while(|n| Distortion::try_from(*n).is_ok()).collect();
+    assert_eq!(standing(every).unwrap().robust_to, RobustTo::all());
+    let some = standing(vec![Distortion::Noise.into(), Distortion::Jpeg.into()]).unwrap();
+    assert_eq!(some.robust_to.to_string(), "jpeg,noise");
+    assert_eq!(
+        standing(vec![0]).err().unwrap().to_string(),
+        "robust_to: 0 is no distortion"
+    );
     let none = settings(&api::EmbedSpec {
         preset: 9,
         ..api::EmbedSpec::default()

@@ -1,5 +1,6 @@
 //! The reports that there are: which records each is made of, and how it lays them out.
 mod cases;
+mod claims;
 mod elevation;
 mod figures;
 mod security;
@@ -37,13 +38,15 @@ pub enum Kind {
     Formats,
     /// What detectors without a key see.
     Security,
+    /// Claims that are right, and claims that are wrong.
+    Claims,
     /// Time against success against likeness, over settings of the embedding.
     Trade,
 }
 
 impl Kind {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Kind; 12] = [
+    pub const ALL: [Kind; 13] = [
         Kind::Capacity,
         Kind::Robustness,
         Kind::Trained,
@@ -55,6 +58,7 @@ impl Kind {
         Kind::Elevation,
         Kind::Formats,
         Kind::Security,
+        Kind::Claims,
         Kind::Trade,
     ];
 
@@ -72,6 +76,7 @@ impl Kind {
             Kind::Elevation => "elevation",
             Kind::Formats => "formats",
             Kind::Security => "security",
+            Kind::Claims => "claims",
             Kind::Trade => "trade",
         }
     }
@@ -95,6 +100,7 @@ impl Kind {
             Kind::Elevation => "Accuracy by elevation of the view",
             Kind::Formats => "Other formats, and back",
             Kind::Security => "What detectors without a key see",
+            Kind::Claims => "Claims: right ones found, wrong ones refused",
             Kind::Trade => "Time against success against likeness",
         }
     }
@@ -186,6 +192,7 @@ pub fn report(kind: Kind, selection: &Selection<'_>, options: &Options) -> Resul
     match kind {
         Kind::Elevation => elevation::fill(&mut report, selection, options)?,
         Kind::Security => security::fill(&mut report, selection)?,
+        Kind::Claims => claims::fill(&mut report, selection)?,
         Kind::Trade => trade::fill(&mut report, selection)?,
         _ => {}
     }

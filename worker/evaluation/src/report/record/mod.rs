@@ -1,13 +1,15 @@
-//! What is kept of every run: marks, what was read of them, and what detectors made of them.
+//! What is kept of every run: marks, what was read of them, what detectors made of them, and claims about them.
 //!
 //! What identifies a record is known before it is measured, so that a resumed run can ask for it; results never count.
 mod check;
+mod claims;
 mod detection;
 mod id;
 mod mark;
 mod reading;
 mod timing;
 
+pub use claims::{Claims, POWERS, claims_id};
 pub use detection::{Detection, detection_id};
 pub use id::Id;
 pub use mark::{Embedding, Mark};
@@ -28,6 +30,8 @@ pub enum Record {
     Reading(Reading),
     /// One detector, judging clean and marked pictures.
     Detection(Detection),
+    /// Claims about one suspect, right and wrong ones.
+    Claims(Claims),
 }
 
 impl Record {
@@ -37,6 +41,7 @@ impl Record {
             Record::Mark(mark) => mark.id(),
             Record::Reading(reading) => reading.id(),
             Record::Detection(detection) => detection.id(),
+            Record::Claims(claims) => claims.id(),
         }
     }
 
@@ -49,6 +54,7 @@ impl Record {
             Record::Mark(mark) => mark.check(),
             Record::Reading(reading) => reading.check(),
             Record::Detection(detection) => detection.check(),
+            Record::Claims(claims) => claims.check(),
         }
     }
 }

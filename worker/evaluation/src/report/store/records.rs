@@ -1,7 +1,7 @@
 //! The records of a store, in the order they were written.
 use super::FILE;
 use crate::error::{Error, Result};
-use crate::report::record::{Detection, Id, Mark, Reading, Record};
+use crate::report::record::{Claims, Detection, Id, Mark, Reading, Record};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -21,6 +21,7 @@ pub struct Records {
     marks: Vec<(Id, Mark)>,
     readings: Vec<Reading>,
     detections: Vec<Detection>,
+    claims: Vec<Claims>,
     /// Every identity; those of marks with their place among them.
     ids: BTreeMap<Id, Option<usize>>,
     notes: Vec<Note>,
@@ -116,6 +117,10 @@ impl Records {
                 Some(mark) => reading.check_against(mark),
                 None => bad("mark", format!("{} is not in the store", reading.mark)),
             },
+            Record::Claims(claims) => match self.mark(&claims.mark) {
+                Some(_) => Ok(()),
+                None => bad("mark", format!("{} is not in the store", claims.mark)),
+            },
             Record::Detection(detection) => match detection.marks.iter().find(|mark| self.mark(mark).is_none()) {
                 Some(mark) => bad("marks", format!("{mark} is not in the store")),
                 None => Ok(()),
@@ -136,6 +141,10 @@ impl Records {
             }
             Record::Detection(detection) => {
                 self.detections.push(detection);
+                None
+            }
+            Record::Claims(claims) => {
+                self.claims.push(claims);
                 None
             }
         };
@@ -166,6 +175,11 @@ impl Records {
     /// All detections, in the order they were written; each one's marks are among [`Records::marks`].
     pub fn detections(&self) -> &[Detection] {
         &self.detections
+    }
+
+    /// All claims, in the order they were made; each one's mark is among [`Records::marks`].
+    pub fn claims(&self) -> &[Claims] {
+        &self.claims
     }
 
     /// The folder that paths in records start from.
