@@ -91,6 +91,15 @@ impl Bench {
         self.output(command.args(line.split_whitespace().map(OsStr::new)))
     }
 
+    /// Runs the worker in an address space of so many KiB.
+    #[cfg(unix)]
+    pub fn run_in_little_memory(&self, kibibytes: u64, line: &str) -> Output {
+        let script = format!("ulimit -v {kibibytes}; exec \"$0\" \"$@\"");
+        let mut command = self.command("sh".as_ref());
+        command.args(["-c".as_ref(), script.as_ref(), crate::worker().as_os_str()]);
+        self.output(command.args(line.split_whitespace().map(OsStr::new)))
+    }
+
     /// A program to be run in the folder, which finds nothing of the user's own.
     pub fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);

@@ -232,7 +232,7 @@ fn what_does_not_fit_the_key_is_refused() {
             verify("k.key --key k.key --message c0ffee42"),
             &["k.key: not a PNG", "and not a scene"],
         ),
-        (verify("in.ply bad.png --key k.key --message c0ffee42"), &["on its own"]),
+        (verify("in.ply bad.png --key k.key --message c0ffee42"), &["bad.png"]),
         (
             "verify in.ply --key k.key --message c0ffee42 --device tpu".into(),
             &["tpu", "auto, wgpu or cpu"],

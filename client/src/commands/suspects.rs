@@ -7,7 +7,7 @@ use crate::kind::Kind;
 use crate::names;
 use crate::transfer::{Source, discard, upload};
 
-/// Most pictures of one job; the server takes no more.
+/// Most files of one job; the server takes no more.
 const MOST: usize = 1000;
 /// Names of pictures in folders.
 const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
@@ -83,7 +83,7 @@ pub async fn send(context: &Context, inputs: &[Input]) -> Result<Inputs> {
     Ok(known)
 }
 
-/// What the paths of `verify` name: one scene, or pictures and folders of them. Files are what their content says; in
+/// What the paths of `verify` name: scenes, pictures and folders of them. Files are what their content says; in
 /// folders, which may hold other things too, names say which are pictures.
 pub fn find(paths: &[String]) -> Result<Vec<Input>> {
     let mut found = Vec::new();
@@ -99,15 +99,14 @@ pub fn find(paths: &[String]) -> Result<Vec<Input>> {
             found.extend(folder(&path)?.into_iter().map(Input::File));
             continue;
         }
-        if matches!(Kind::of(&path)?, Kind::Scene(_)) && paths.len() > 1 {
-            return Err(bad(&path, "a scene is read on its own: give one scene, or pictures"));
-        }
+        // What is neither a scene nor a picture is better known before it is sent.
+        Kind::of(&path)?;
         found.push(Input::File(path));
     }
     if found.len() > MOST {
         return Err(Error::BadOption {
             field: "PATH",
-            reason: format!("{} pictures, but at most {MOST} are read at once", found.len()),
+            reason: format!("{} files, but at most {MOST} are read at once", found.len()),
         });
     }
     Ok(found)
@@ -169,14 +168,14 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_stands_alone() {
+    fn scenes_and_pictures_go_together() {
         let folder = tempfile::tempdir().unwrap();
         let (scene, picture) = (folder.path().join("a"), folder.path().join("b"));
         std::fs::write(&scene, "ply\n").unwrap();
         std::fs::write(&picture, b"\x89PNG\r\n\x1a\n").unwrap();
         assert_eq!(find(&[text(scene.clone())]).unwrap(), [Input::File(scene.clone())]);
-        let both = find(&[text(picture), text(scene)]).unwrap_err().to_string();
-        assert!(both.contains("on its own"), "{both}");
+        let both = find(&[text(picture.clone()), text(scene.clone())]).unwrap();
+        assert_eq!(both, [Input::File(picture), Input::File(scene)]);
     }
 
     #[test]

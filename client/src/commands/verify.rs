@@ -16,7 +16,7 @@ use crate::report::VerifyReport;
 /// Arguments of `verify`.
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene (PLY, compressed PLY, SPZ, SOG, .splat), or pictures (PNG, JPEG, WebP) and folders of them; or such that
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, .splat), pictures (PNG, JPEG, WebP) and folders of them; or such that
     /// are there already, artifacts/ID
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<String>,

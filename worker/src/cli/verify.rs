@@ -17,7 +17,8 @@ use crate::work::load;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene (PLY, compressed PLY, SPZ, SOG, .splat), or pictures (PNG, JPEG, WebP, OpenEXR) and folders of them
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, .splat), pictures (PNG, JPEG, WebP, OpenEXR) and folders of them, all of one
+    /// suspect
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<PathBuf>,
     /// The key file
@@ -97,11 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         print_json(&report)?;
     } else {
-        tell(
-            &report.findings,
-            compared.comparison.as_ref(),
-            compared.ignored.as_ref(),
-        );
+        tell(&report.findings, compared.comparison.as_ref(), &compared.ignored);
     }
     Ok(match report.findings.verdict {
         Verdict::Match => Exit::Done,
@@ -110,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: Option<&Ignored>) {
+fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: &[Ignored]) {
     let verdict = match report.verdict {
         Verdict::Match => "match",
         Verdict::NoMatch => "no match",
@@ -141,7 +138,7 @@ fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: Option<&Ign
     if let Some(reason) = &report.reason {
         print_line(reason);
     }
-    if let Some(ignored) = ignored {
+    for ignored in ignored {
         print_line(&ignored.to_string());
     }
 }

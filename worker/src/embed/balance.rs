@@ -7,6 +7,9 @@
 //! target counts only while the accuracy is below `bit_accuracy`. PSNR follows the factor some twenty steps late: an
 //! integral alone overshoots by 1 to 2 dB. Adam does not mind the overall scale of a loss, so this is a dial between
 //! seeing and reading.
+//!
+//! A second factor, on SSIM within reconstruction, holds an SSIM in the same way, between 0 and 1: a weight that scenes full of
+//! texture do not feel would leave a scene of few smooth surfaces hardly any place for a mark.
 use serde::{Deserialize, Serialize};
 
 use super::settings::within;
@@ -28,7 +31,17 @@ pub struct Balance {
     pub limit: f64,
     /// Decay of the running means.
     pub memory: f64,
+    /// SSIM to hold on training views, by weighing it less where it is above; `None` leaves its weight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target_ssim: Option<f64>,
 }
+
+/// Of the logarithm of the factor on SSIM, for each unit below the target.
+const SSIM_PROPORTIONAL: f64 = 300.0;
+/// The same, for each unit below the target and step.
+const SSIM_INTEGRAL: f64 = 20.0;
+/// Smallest factor on SSIM.
+const SSIM_LEAST: f64 = 0.01;
 
 impl Default for Balance {
     fn default() -> Self {
@@ -39,6 +52,7 @@ impl Default for Balance {
             integral: 0.05,
             limit: 100.0,
             memory: 0.8,
+            target_ssim: None,
         }
     }
 }
@@ -49,6 +63,7 @@ impl Balance {
         within("balance.proportional", self.proportional, 0.0, 100.0)?;
         within("balance.integral", self.integral, 0.0, 100.0)?;
         within("balance.limit", self.limit, 1.0, 1e6)?;
+        within("balance.target_ssim", self.target_ssim.unwrap_or(0.0), 0.0, 1.0)?;
         within("balance.memory", self.memory, 0.0, 0.9999)
     }
 }
@@ -57,10 +72,21 @@ impl Balance {
 #[derive(Clone, Debug)]
 pub struct Balancer {
     balance: Option<Balance>,
-    running: Option<[f64; 2]>,
+    running: Option<[f64; 3]>,
     /// `integral * sum of e`.
     sum: f64,
     factor: f64,
+    /// The same two of SSIM.
+    ssim: (f64, f64),
+}
+
+/// What terms of the loss are multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factors {
+    /// All that compare pictures.
+    pub reconstruction: f32,
+    /// SSIM among these, besides.
+    pub ssim: f32,
 }
 
 impl Balancer {
@@ -71,21 +97,25 @@ impl Balancer {
             running: None,
             sum: 0.0,
             factor: 1.0,
+            ssim: (0.0, 1.0),
         }
     }
 
-    /// What the reconstruction terms are multiplied by.
-    pub fn factor(&self) -> f32 {
-        self.factor as f32
+    /// What terms are multiplied by at the next step.
+    pub fn factors(&self) -> Factors {
+        Factors {
+            reconstruction: self.factor as f32,
+            ssim: self.ssim.1 as f32,
+        }
     }
 
-    /// Takes in the mean PSNR and bit accuracy of a step.
-    pub fn update(&mut self, psnr_db: f64, bit_accuracy: f64) {
+    /// Takes in the mean PSNR, bit accuracy and SSIM of a step.
+    pub fn update(&mut self, psnr_db: f64, bit_accuracy: f64, ssim: f64) {
         let Some(b) = self.balance else { return };
         // The first steps have nearly identical pictures; a cap keeps them from ruling the mean.
-        let now = [psnr_db.min(b.target_psnr_db + 10.0), bit_accuracy];
+        let now = [psnr_db.min(b.target_psnr_db + 10.0), bit_accuracy, ssim];
         let before = self.running.unwrap_or(now);
-        let running: [f64; 2] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
+        let running: [f64; 3] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
         self.running = Some(running);
         let mut below = b.target_psnr_db - running[0];
         if running[1] >= b.bit_accuracy {
@@ -94,6 +124,12 @@ impl Balancer {
         let limit = b.limit.ln();
         self.sum = (self.sum + b.integral * below).clamp(-limit, limit);
         self.factor = (self.sum + b.proportional * below).clamp(-limit, limit).exp();
+        if let Some(target) = b.target_ssim {
+            let below = target - running[2];
+            let least = SSIM_LEAST.ln();
+            let sum = (self.ssim.0 + SSIM_INTEGRAL * below).clamp(least, 0.0);
+            self.ssim = (sum, (sum + SSIM_PROPORTIONAL * below).clamp(least, 0.0).exp());
+        }
     }
 }
 
@@ -113,8 +149,8 @@ mod tests {
 
     fn factors(mut b: Balancer, psnr_and_bits: &[(f64, f64)]) -> Vec<f64> {
         let follow = |(psnr, bits): &(f64, f64)| {
-            b.update(*psnr, *bits);
-            f64::from(b.factor()).ln()
+            b.update(*psnr, *bits, 1.0);
+            f64::from(b.factors().reconstruction).ln()
         };
         psnr_and_bits.iter().map(follow).collect()
     }
@@ -150,11 +186,35 @@ mod tests {
     #[test]
     fn without_a_target_nothing_changes_and_means_run() {
         let mut none = Balancer::new(None);
-        none.update(10.0, 0.5);
-        assert_eq!(none.factor(), 1.0);
+        none.update(10.0, 0.5, 0.5);
+        let untouched = Factors {
+            reconstruction: 1.0,
+            ssim: 1.0,
+        };
+        assert_eq!(none.factors(), untouched);
         let mut slow = Balancer::new(Some(Balance::default()));
-        slow.update(40.0, 0.5);
-        slow.update(30.0, 0.5); // the mean is 38
-        assert!(slow.factor() < 1.0);
+        slow.update(40.0, 0.5, 0.5);
+        slow.update(30.0, 0.5, 0.5); // the mean is 38
+        assert!(slow.factors().reconstruction < 1.0 && slow.factors().ssim == 1.0);
+    }
+
+    #[test]
+    fn ssim_weighs_less_where_there_is_room_and_all_where_there_is_none() {
+        let mut b = Balancer::new(Some(Balance {
+            target_ssim: Some(0.994),
+            memory: 0.0,
+            ..Balance::default()
+        }));
+        let mut after = |ssim: f64| {
+            b.update(36.0, 0.9, ssim);
+            f64::from(b.factors().ssim)
+        };
+        // 0.002 of room: the proportional part and one step of the other.
+        assert!((after(0.996).ln() + 0.002 * 320.0).abs() < 1e-5);
+        assert_eq!(after(0.98), 1.0);
+        for _ in 0..100 {
+            after(1.0);
+        }
+        assert!((after(1.0) - SSIM_LEAST).abs() < 1e-6);
     }
 }

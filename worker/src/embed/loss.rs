@@ -5,6 +5,7 @@
 use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 
+use super::balance::Factors;
 use super::progress::Terms;
 use super::settings::Settings;
 use super::shown::Shown;
@@ -45,7 +46,7 @@ impl<'a> Loss<'a> {
         }
     }
 
-    /// Loss and gradient of `pictures` against `references`; `factor` multiplies reconstruction.
+    /// Loss and gradient of `pictures` against `references`, with terms multiplied by `factors`.
     ///
     /// # Errors
     /// [`Error::NotFinite`] with the term, or a failing device.
@@ -54,7 +55,7 @@ impl<'a> Loss<'a> {
         step: usize,
         pictures: &[&Picture],
         references: &[&Picture],
-        factor: f32,
+        factors: Factors,
         rng: &mut ChaCha8Rng,
     ) -> Result<Evaluated> {
         let device = &self.engine.compute.device;
@@ -70,7 +71,7 @@ impl<'a> Loss<'a> {
         let l1 = difference.clone().abs().mean();
         let l2 = difference.square().mean();
         let ssim = -self.ssim.mean(original.clone(), marked.clone()) + 1.0;
-        let mut reconstruction = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * lambda.ssim;
+        let mut reconstruction = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * (lambda.ssim * factors.ssim);
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
         let lpips = match lpips {
             Some(lpips) => {
@@ -88,7 +89,8 @@ impl<'a> Loss<'a> {
         let targets = Tensor::<2>::from_data(targets, device);
         let softened = logits.clone() / lambda.temperature;
         let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
-        let total = reconstruction * (lambda.reconstruction * factor) + message.clone() * lambda.message;
+        let total =
+            reconstruction * (lambda.reconstruction * factors.reconstruction) + message.clone() * lambda.message;
 
         // One transfer for all terms.
         let mut parts = vec![l1, ssim, message];

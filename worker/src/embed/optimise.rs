@@ -185,7 +185,8 @@ impl<'a> Run<'a> {
             }
         }
         self.learned.settle(self.scene);
-        self.balancer.update(figures.psnr_db, figures.bit_accuracy);
+        let ssim = 1.0 - f64::from(figures.terms.ssim);
+        self.balancer.update(figures.psnr_db, figures.bit_accuracy, ssim);
         timing.lap(Stage::Adam);
         Ok(figures)
     }
@@ -203,9 +204,9 @@ impl<'a> Run<'a> {
 
         let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
         let pictures: Vec<&Picture> = pictures.iter().collect();
-        let balance = self.balancer.factor();
+        let factors = self.balancer.factors();
         let rng = &mut self.augmentation;
-        let found = self.loss.evaluate(step, &pictures, &references, balance, rng)?;
+        let found = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
         let psnr_db = mean_psnr(&references, &pictures);
         timing.lap(Stage::Loss);
 
@@ -223,7 +224,7 @@ impl<'a> Run<'a> {
             bit_accuracy: found.bit_accuracy,
             psnr_db,
             terms: found.terms,
-            balance,
+            balance: factors.reconstruction,
         })
     }
 

@@ -1,4 +1,4 @@
-//! What there is to read on disk: one scene, or picture files and folders of them.
+//! What there is to read on disk: scenes, picture files and folders of them.
 use std::path::{Path, PathBuf};
 
 use super::kind::Kind;
@@ -9,42 +9,40 @@ use crate::scene::is_loose_sog;
 /// Most pictures of one reading.
 pub const MAX_PICTURES: usize = 10_000;
 
-/// What paths name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// A scene file, of any format.
-    Scene(PathBuf),
+/// What paths name: all of it is one suspect.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// Scene files, of any format.
+    pub scenes: Vec<PathBuf>,
     /// Picture files, those of a folder by name.
-    Pictures(Vec<PathBuf>),
+    pub pictures: Vec<PathBuf>,
 }
 
-/// Sorts out `paths`: a single scene of any format, or any number of pictures and folders of pictures. Files are what
-/// their content says; in folders, which may hold other things too, names say which are pictures.
+/// Sorts out `paths`: scenes of any format, pictures and folders of pictures, any number of each. Files are what their content
+/// says; in folders, which may hold other things too, names say which are pictures.
 ///
 /// # Errors
-/// A path that is not there, several scenes or scenes among pictures, a folder without pictures, a file of another
-/// kind, or more than [`MAX_PICTURES`].
+/// No paths, a path that is not there, a folder without pictures, a file of another kind, or more than [`MAX_PICTURES`].
 pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
-    let mut pictures = Vec::new();
+    let mut source = Source::default();
     for path in paths {
         if path.is_dir() {
-            add_folder(path, &mut pictures)?;
+            add_folder(path, &mut source.pictures)?;
             continue;
         }
         match Kind::of(path)? {
-            Kind::Scene if paths.len() == 1 => return Ok(Source::Scene(path.clone())),
-            Kind::Scene => return Err(bad(path, "a scene is read on its own: give one scene, or pictures")),
-            Kind::Picture => pictures.push(path.clone()),
+            Kind::Scene => source.scenes.push(path.clone()),
+            Kind::Picture => source.pictures.push(path.clone()),
         }
-        check_count(pictures.len())?;
+        check_count(source.scenes.len() + source.pictures.len())?;
     }
-    if pictures.is_empty() {
+    if source == Source::default() {
         return Err(Error::BadOption {
             field: "PATH",
-            reason: "give a scene or pictures".into(),
+            reason: "give scenes or pictures".into(),
         });
     }
-    Ok(Source::Pictures(pictures))
+    Ok(source)
 }
 
 /// Adds the pictures of a folder by name.
@@ -80,7 +78,7 @@ fn check_count(count: usize) -> Result<()> {
     }
     Err(Error::BadOption {
         field: "PATH",
-        reason: format!("more than {MAX_PICTURES} pictures"),
+        reason: format!("more than {MAX_PICTURES} files"),
     })
 }
 
@@ -96,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_give_their_pictures_by_name_and_scenes_stand_alone() {
+    fn folders_give_their_pictures_by_name_and_files_are_what_they_hold() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
@@ -107,25 +105,25 @@ mod tests {
         let (b, a, c) = (at("b.png", png), at("a.JPG", b"damaged"), at("c.webp", png));
         let (text, scene, picture) = (at("cameras.json", b"[]"), at("s", b"ply\n"), at("p", png));
         let folder_path = folder.path().to_path_buf();
+        let pictures = |pictures: Vec<PathBuf>| Source {
+            scenes: Vec::new(),
+            pictures,
+        };
         assert_eq!(
             find_source(std::slice::from_ref(&folder_path)).unwrap(),
-            Source::Pictures(vec![a.clone(), b.clone(), c.clone()])
+            pictures(vec![a.clone(), b.clone(), c.clone()])
         );
         assert_eq!(
             find_source(&[c.clone(), picture.clone()]).unwrap(),
-            Source::Pictures(vec![c.clone(), picture])
+            pictures(vec![c.clone(), picture.clone()])
         );
-        assert_eq!(
-            find_source(std::slice::from_ref(&scene)).unwrap(),
-            Source::Scene(scene.clone())
-        );
+        let mixed = find_source(&[scene.clone(), picture.clone(), scene.clone()]).unwrap();
+        assert_eq!(mixed.scenes, [scene.clone(), scene]);
+        assert_eq!(mixed.pictures, [picture]);
         let reason = |paths: &[PathBuf]| find_source(paths).unwrap_err().to_string();
-        assert!(reason(&[scene.clone(), scene.clone()]).contains("on its own"));
-        assert!(reason(&[c.clone(), scene.clone()]).contains("on its own"));
-        assert!(reason(&[folder_path.clone(), scene]).contains("on its own"));
         assert!(reason(&[c, text]).contains("not a scene"));
         assert!(reason(&[a]).contains("a.JPG: not a PNG"));
-        assert!(reason(&[]).contains("give a scene"));
+        assert!(reason(&[]).contains("give scenes"));
         assert!(reason(&[folder_path.join("none.png")]).contains("none.png"));
         let empty = tempfile::tempdir().unwrap();
         assert!(reason(&[empty.path().into()]).contains("without png"));

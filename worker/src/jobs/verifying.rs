@@ -54,7 +54,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
             // As given comes first.
             let reading = framed.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-            (Findings::new(reading, None, ignored.as_ref())?, framed)
+            (Findings::new(reading, None, &ignored)?, framed)
         } else {
             let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
             (Findings::of(&compared)?, Vec::new())

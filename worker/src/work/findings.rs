@@ -1,4 +1,4 @@
-//! What a verification finds: reads a scene or pictures, and says whether the message is there.
+//! What a verification finds: reads scenes and pictures, and says whether the message is there.
 use guardsplat_worker::Result;
 use guardsplat_worker::admission::{self, picture_bytes};
 use guardsplat_worker::extract::{
@@ -6,6 +6,7 @@ use guardsplat_worker::extract::{
 };
 use guardsplat_worker::memory::Memory;
 use guardsplat_worker::message::{Message, Verdict};
+use guardsplat_worker::picture::Picture;
 use guardsplat_worker::quality::read_picture;
 use guardsplat_worker::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
@@ -29,60 +30,73 @@ pub struct Views {
     pub bad_rows: BadRows,
 }
 
-/// Reads `source`, and tells of rows of a scene that were ignored; `shown` keeps the first pictures, and `progress` hears how many views or pictures are done,
-/// and of how many.
+/// Logits of views or pictures.
+type Logits = Vec<Vec<f32>>;
+
+/// Reads all scenes and pictures of `source` together, and tells of rows of scenes that were ignored; `shown` keeps the first
+/// pictures, and `progress` hears how many views and pictures are done, and of how many.
 pub fn read(
     engine: &Engine,
     source: &Source,
     views: &Views,
     shown: &mut Shown,
     mut progress: impl FnMut(usize, usize),
-) -> Result<(Reading, Option<Ignored>)> {
-    match source {
-        Source::Scene(path) => {
-            let size = views.size.unwrap_or_else(|| default_size(engine));
-            let rest = Memory {
-                models: engine.model_bytes(false),
-                pictures: picture_bytes(size, size),
-                ..Memory::of_program()
-            };
-            admission::to_read(path, &engine.limits, rest)?;
-            let scene = Scene::read_with(path, views.bad_rows)?;
-            let ignored = scene.ignored().cloned();
-            let gaussians = scene.into_gaussians();
-            let reading = read_scene(
-                engine,
-                &gaussians,
-                views.count,
-                size,
-                views.background,
-                views.seed,
-                |done, picture| {
-                    progress(done, views.count);
-                    shown.see("view", done - 1, picture)
-                },
-            )?;
-            Ok((reading, ignored))
-        }
-        Source::Pictures(paths) => {
-            let mut read = Vec::with_capacity(paths.len());
-            // One at a time: thousands of large pictures need not fit in memory.
-            for (index, path) in paths.iter().enumerate() {
-                let picture = read_picture(path, views.background)?;
-                shown.see("picture", index, &picture)?;
-                read.extend(engine.read_logits(&[picture])?);
-                progress(index + 1, paths.len());
-            }
-            Ok((Reading::new(read)?, None))
-        }
+) -> Result<(Reading, Vec<Ignored>)> {
+    let (mut logits, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
+    let (before, total) = (logits.len(), count(source, views));
+    // One at a time: thousands of large pictures need not fit in memory.
+    for (index, path) in source.pictures.iter().enumerate() {
+        let picture = read_picture(path, views.background)?;
+        shown.see("picture", index, &picture)?;
+        logits.extend(engine.read_logits(&[picture])?);
+        progress(before + index + 1, total);
     }
+    Ok((Reading::new(logits)?, ignored))
 }
 
-/// A reading in each framing, as given first, and rows of a scene that were ignored.
-pub type InFramings = (Vec<(Framing, Reading)>, Option<Ignored>);
+/// Views and pictures that are read.
+fn count(source: &Source, views: &Views) -> usize {
+    source.scenes.len() * views.count + source.pictures.len()
+}
 
-/// As [`read`], in every framing that pictures may be in; a scene is rendered as it is, and has one only. Framings
-/// without borders are there only if some picture has any: others would be the same once more.
+fn read_scenes(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    shown: &mut Shown,
+    progress: &mut impl FnMut(usize, usize),
+) -> Result<(Logits, Vec<Ignored>)> {
+    let (mut logits, mut ignored) = (Logits::new(), Vec::new());
+    let total = count(source, views);
+    for path in &source.scenes {
+        let size = views.size.unwrap_or_else(|| default_size(engine));
+        let rest = Memory {
+            models: engine.model_bytes(false),
+            pictures: picture_bytes(size, size),
+            ..Memory::of_program()
+        };
+        admission::to_read(path, &engine.limits, rest)?;
+        let scene = Scene::read_with(path, views.bad_rows)?;
+        ignored.extend(scene.ignored().cloned());
+        let gaussians = scene.into_gaussians();
+        let before = logits.len();
+        let seen = |done: usize, picture: &Picture| {
+            progress(before + done, total);
+            shown.see("view", before + done - 1, picture)
+        };
+        let (background, seed) = (views.background, views.seed);
+        let reading = read_scene(engine, &gaussians, views.count, size, background, seed, seen)?;
+        logits.extend(reading.views);
+    }
+    Ok((logits, ignored))
+}
+
+/// A reading in each framing, as given first, and rows of scenes that were ignored.
+pub type InFramings = (Vec<(Framing, Reading)>, Vec<Ignored>);
+
+/// As [`read`], in every framing that pictures may be in; views of scenes are as they are in all of them, and without
+/// pictures there is one framing only. Framings without borders are there only if some picture has any: others would be
+/// the same once more.
 pub fn read_framed(
     engine: &Engine,
     source: &Source,
@@ -90,18 +104,23 @@ pub fn read_framed(
     shown: &mut Shown,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<InFramings> {
-    let Source::Pictures(paths) = source else {
-        let (reading, ignored) = read(engine, source, views, shown, progress)?;
-        return Ok((vec![(Framing::default(), reading)], ignored));
-    };
-    let mut pictures = Vec::with_capacity(paths.len());
-    for (index, path) in paths.iter().enumerate() {
+    let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
+    if source.pictures.is_empty() {
+        return Ok((vec![(Framing::default(), Reading::new(of_scenes)?)], ignored));
+    }
+    let mut pictures = Vec::with_capacity(source.pictures.len());
+    for (index, path) in source.pictures.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
         shown.see("picture", index, &picture)?;
         pictures.push(Framed::read(engine, &picture)?);
-        progress(index + 1, paths.len());
+        progress(of_scenes.len() + index + 1, count(source, views));
     }
-    Ok((framings(engine, &pictures)?, None))
+    let together = |(framing, reading): (Framing, Reading)| {
+        let all = of_scenes.iter().cloned().chain(reading.views).collect();
+        Ok((framing, Reading::new(all)?))
+    };
+    let read = framings(engine, &pictures)?.into_iter().map(together);
+    Ok((read.collect::<Result<_>>()?, ignored))
 }
 
 /// What was read, and how it compares with a raw message.
@@ -114,8 +133,8 @@ pub struct Compared {
     pub framing: Framing,
     /// Ways in which they were looked at.
     pub framings: usize,
-    /// Rows of the scene that were ignored.
-    pub ignored: Option<Ignored>,
+    /// Rows of scenes that were ignored.
+    pub ignored: Vec<Ignored>,
 }
 
 /// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read in every framing
@@ -141,10 +160,7 @@ pub fn read_and_compare(
     let Some(message) = message else {
         return Ok(best);
     };
-    let halves = match source {
-        Source::Scene(_) => 1,
-        Source::Pictures(_) => 2,
-    };
+    let halves = if source.pictures.is_empty() { 1 } else { 2 };
     let as_given = best.reading.compare_among(message, halves)?;
     let decided = halves == 1 || as_given.decision.verdict != Verdict::NoMatch;
     let mut p_value = as_given.decision.p_value;
@@ -205,11 +221,7 @@ pub struct Findings {
 impl Findings {
     /// What a comparison says.
     pub fn of(compared: &Compared) -> Result<Self> {
-        let found = Self::new(
-            &compared.reading,
-            compared.comparison.as_ref(),
-            compared.ignored.as_ref(),
-        )?;
+        let found = Self::new(&compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
         let as_given = compared.framing == Framing::default();
         Ok(Self {
             framings: compared.framings,
@@ -220,7 +232,7 @@ impl Findings {
 
     /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
     /// were ignored for it.
-    pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: Option<&Ignored>) -> Result<Self> {
+    pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: &[Ignored]) -> Result<Self> {
         let decision = comparison.map(|c| &c.decision);
         Ok(Self {
             verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
@@ -237,7 +249,7 @@ impl Findings {
             view_agreement: reading.agreement(),
             framings: 1,
             framing: None,
-            ignored_rows: ignored.map_or(0, Ignored::count),
+            ignored_rows: ignored.iter().map(Ignored::count).sum(),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),
                 None => Some(NOTHING_TO_COMPARE.into()),

@@ -9,6 +9,7 @@ mod key_states;
 mod keys;
 mod lists;
 mod registry;
+mod search_speed;
 mod submissions;
 mod transport;
 mod watch;

@@ -116,7 +116,7 @@ fn findings_keep_their_figures() {
     let reading = Reading::new(vec![vec![2.0; 32], vec![-1.0; 32]]).unwrap();
     let message = Message::parse("ffffffff", 32).unwrap();
     let comparison = reading.compare(&message).unwrap();
-    let found = verify_result(Findings::new(&reading, Some(&comparison), None).unwrap());
+    let found = verify_result(Findings::new(&reading, Some(&comparison), &[]).unwrap());
     assert_eq!(found.verdict(), ApiVerdict::Match);
     assert_eq!((found.matched_bits, found.bits, found.views), (Some(32), 32, 2));
     assert_eq!(
@@ -124,7 +124,7 @@ fn findings_keep_their_figures() {
         (Some(0.5), Some(0.0))
     );
     assert!(found.p_value.unwrap() <= found.threshold.unwrap() && found.reason.is_empty());
-    let alone = verify_result(Findings::new(&reading, None, None).unwrap());
+    let alone = verify_result(Findings::new(&reading, None, &[]).unwrap());
     assert_eq!((alone.verdict(), alone.p_value), (ApiVerdict::Inconclusive, None));
     assert_eq!(alone.message, "ffffffff");
     assert!(

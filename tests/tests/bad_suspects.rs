@@ -1,0 +1,102 @@
+//! Pictures that no mark can be in, and files that are no pictures: clear answers, no crash, bounded memory.
+use guardsplat_tests::Bench;
+use guardsplat_tests::bench::check_refusal;
+use image::{ExtendedColorType, ImageEncoder, ImageFormat, Rgb, RgbImage};
+
+const VERIFY: &str = "--key k.key --message c0ffee42 --device cpu --json";
+
+/// A folder with a key of 32 bits.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.exits("key create --bits 32 --seed 5 -o k.key --device cpu", 0);
+    bench
+}
+
+fn encoded(picture: &RgbImage, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+/// A picture of something else.
+fn waves(width: u32, height: u32) -> RgbImage {
+    RgbImage::from_fn(width, height, |x, y| {
+        let value = |a: u32, b: u32| (127.0 + 120.0 * f64::from(a * x + b * y).mul_add(0.01, 0.3).sin()) as u8;
+        Rgb([value(3, 1), value(1, 7), value(5, 5)])
+    })
+}
+
+/// A PNG whose header says so many pixels, with `rows` of them in it, all of one colour.
+fn promised(width: u32, height: u32, rows: u32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let small = vec![9; 3 * width as usize * rows as usize];
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(&small, width, rows, ExtendedColorType::Rgb8)
+        .unwrap();
+    // The height stands behind the signature, the chunk's length and name, and the width; then the checksum of them all.
+    bytes[20..24].copy_from_slice(&height.to_be_bytes());
+    let sum = crc32(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&sum.to_be_bytes());
+    bytes
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+        })
+    })
+}
+
+#[test]
+fn pictures_of_something_else_do_not_match() {
+    let bench = bench();
+    bench.write("waves.png", encoded(&waves(300, 200), ImageFormat::Png));
+    bench.write(
+        "white.png",
+        encoded(&RgbImage::from_pixel(64, 64, Rgb([255; 3])), ImageFormat::Png),
+    );
+    bench.write("pixel.jpg", encoded(&RgbImage::new(1, 1), ImageFormat::Jpeg));
+    bench.write("line.webp", encoded(&waves(4000, 1), ImageFormat::WebP));
+    for picture in ["waves.png", "white.png", "pixel.jpg", "line.webp"] {
+        let report = bench.json(&format!("verify {picture} {VERIFY}"), 2);
+        assert_eq!(report["verdict"], "no_match", "{picture}: {report}");
+        assert!(report["p_value"].as_f64().unwrap() > 1e-6, "{picture}: {report}");
+    }
+}
+
+#[test]
+fn files_that_are_no_pictures_are_told_by_name() {
+    let bench = bench();
+    let png = encoded(&waves(300, 200), ImageFormat::Png);
+    let jpeg = encoded(&waves(300, 200), ImageFormat::Jpeg);
+    let webp = encoded(&waves(300, 200), ImageFormat::WebP);
+    for (name, bytes) in [
+        ("empty.png", Vec::new()),
+        ("half.png", png[..png.len() / 2].to_vec()),
+        ("half.webp", webp[..webp.len() / 2].to_vec()),
+        ("head.jpg", jpeg[..40].to_vec()),
+        (
+            "animated.gif",
+            b"GIF89a\x01\0\x01\0\x80\0\0\0\0\0\xff\xff\xff,".to_vec(),
+        ),
+        ("text.png", b"this is no picture".to_vec()),
+    ] {
+        bench.write(name, bytes);
+        bench.refuses(&format!("verify {name} {VERIFY}"), &[name]);
+    }
+}
+
+#[test]
+fn pictures_that_promise_too_much_take_no_memory() {
+    let bench = bench();
+    bench.write("huge.png", promised(20_000, 20_000, 4));
+    bench.write("wide.png", promised(4_000_000_000, 1, 0));
+    // 3 GiB: enough for the program and its models, and not for the pixels.
+    let refuses = |name: &str, needles: &[&str]| {
+        let output = bench.run_in_little_memory(3 << 20, &format!("verify {name} {VERIFY}"));
+        check_refusal(name, &output, needles);
+    };
+    refuses("huge.png", &["huge.png", "20000"]);
+    refuses("wide.png", &["wide.png"]);
+}
