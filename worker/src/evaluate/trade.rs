@@ -10,8 +10,8 @@ const BASE: &str = "base";
 const LONGEST: usize = 40;
 
 /// Single changes, as JSON in place of fields of the settings: steps, views a step and how many of them are new, size of
-/// pictures, precision of what views are kept in, optimiser, and how the rate falls over the steps.
-const CHANGES: [(&str, &str); 17] = [
+/// pictures, precision of what views are kept in, terms of likeness, optimiser, and how the rate falls over the steps.
+const CHANGES: [(&str, &str); 19] = [
     ("steps-50", r#"{"steps": 50}"#),
     ("steps-100", r#"{"steps": 100}"#),
     ("steps-200", r#"{"steps": 200}"#),
@@ -25,6 +25,8 @@ const CHANGES: [(&str, &str); 17] = [
     ("size-128", r#"{"size": 128}"#),
     ("size-224", r#"{"size": 224}"#),
     ("half-weights", r#"{"half_weights": true}"#),
+    ("without-ssim", r#"{"lambda": {"ssim": 0}}"#),
+    ("lpips", r#"{"lambda": {"lpips": 2}}"#),
     (
         "adam",
         r#"{"descent": null, "lambda": {"l1": 0.8, "l2": 0, "ssim": 0.2}}"#,
