@@ -1,7 +1,7 @@
 //! Pictures that no mark can be in, and files that are no pictures: clear answers, no crash, bounded memory.
 use guardsplat_tests::Bench;
 use guardsplat_tests::bench::check_refusal;
-use image::{ExtendedColorType, ImageEncoder, ImageFormat, Rgb, RgbImage};
+use image::{ImageFormat, Rgb, RgbImage};
 
 const VERIFY: &str = "--key k.key --message c0ffee42 --device cpu --json";
 
@@ -26,14 +26,11 @@ fn waves(width: u32, height: u32) -> RgbImage {
     })
 }
 
-/// A PNG whose header says so many pixels, with `rows` of them in it, all of one colour.
-fn promised(width: u32, height: u32, rows: u32) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let small = vec![9; 3 * width as usize * rows as usize];
-    image::codecs::png::PngEncoder::new(&mut bytes)
-        .write_image(&small, width, rows, ExtendedColorType::Rgb8)
-        .unwrap();
-    // The height stands behind the signature, the chunk's length and name, and the width; then the checksum of them all.
+/// A PNG whose header says so many pixels, and that has one row of sixteen.
+fn promised(width: u32, height: u32) -> Vec<u8> {
+    let mut bytes = encoded(&RgbImage::new(16, 1), ImageFormat::Png);
+    // Both stand behind the signature, the chunk's length and its name; then comes the checksum of them all.
+    bytes[16..20].copy_from_slice(&width.to_be_bytes());
     bytes[20..24].copy_from_slice(&height.to_be_bytes());
     let sum = crc32(&bytes[12..29]);
     bytes[29..33].copy_from_slice(&sum.to_be_bytes());
@@ -90,8 +87,8 @@ fn files_that_are_no_pictures_are_told_by_name() {
 #[test]
 fn pictures_that_promise_too_much_take_no_memory() {
     let bench = bench();
-    bench.write("huge.png", promised(20_000, 20_000, 4));
-    bench.write("wide.png", promised(4_000_000_000, 1, 0));
+    bench.write("huge.png", promised(20_000, 20_000));
+    bench.write("wide.png", promised(2_000_000_000, 1));
     // 3 GiB: enough for the program and its models, and not for the pixels.
     let refuses = |name: &str, needles: &[&str]| {
         let output = bench.run_in_little_memory(3 << 20, &format!("verify {name} {VERIFY}"));
