@@ -7,14 +7,18 @@
 //! [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
+mod again;
 pub mod candidates;
+mod chain;
 #[cfg(test)]
 pub mod conformance;
 mod error;
+mod numbers;
 mod registry;
 pub mod retry;
 pub mod sqlite;
 mod token;
+mod transition;
 mod types;
 
 use std::sync::Arc;
