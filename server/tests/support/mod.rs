@@ -1,4 +1,6 @@
 //! Starts the server's program on folders and ports of its own.
+pub mod postgres;
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;

@@ -9,6 +9,7 @@ mod key_states;
 mod keys;
 mod lists;
 mod registry;
+mod several;
 mod submissions;
 mod transport;
 mod watch;
