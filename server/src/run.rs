@@ -4,6 +4,7 @@ mod health;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -28,7 +29,12 @@ const LEAST_DRAIN: Duration = Duration::from_secs(1);
 
 /// Runs a server until `shutdown`. Says on standard output where it listens, once it does.
 pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Result<()> {
-    let server = Server::open(settings).await?;
+    let mut shutdown = pin!(shutdown);
+    // A database that is waited for must not keep the process from ending.
+    let server = tokio::select! {
+        server = Server::open(settings) => server?,
+        () = &mut shutdown => return Ok(()),
+    };
     // Nobody may be reading, which is no reason to stop.
     let _ = writeln!(std::io::stdout(), "listening on http://{}", server.address());
     server.run(shutdown).await

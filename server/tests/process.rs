@@ -294,3 +294,15 @@ async fn servers_share_a_database() {
         assert!(!bench.data().join("ledger.sqlite").exists());
     }
 }
+
+#[tokio::test]
+async fn a_stop_is_heard_while_the_database_is_waited_for() {
+    let bench = Bench::new();
+    let server = bench.begin(&["--database", "postgres://127.0.0.1:1/ledger"]);
+    until(
+        || bench.server_log(),
+        |log| log.contains("can't be reached; trying again"),
+    )
+    .await;
+    assert_eq!(server.stop().await.code(), Some(0));
+}

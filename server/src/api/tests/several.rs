@@ -1,8 +1,9 @@
 //! Two servers over one database: what one is told, those who wait at the other hear.
+use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::job::State;
-use guardsplat_proto::v1::{CancelJobRequest, FailJobRequest, Job, LeaseJobRequest, WatchJobRequest};
+use guardsplat_proto::v1::{CancelJobRequest, FailJobRequest, Job, LeaseJobRequest, ReportJobRequest, WatchJobRequest};
 use tokio::sync::broadcast::Receiver;
 use tokio::time::timeout;
 
@@ -10,7 +11,8 @@ use super::harness::{Server, key_spec};
 use crate::api::Limits;
 use crate::api::changes::{For, Heard};
 use crate::ledger::postgres::tests::Place;
-use crate::ledger::{Elsewhere, JobId};
+use crate::ledger::postgres::tests::cluster::Cluster;
+use crate::ledger::{Elsewhere, JobId, PostgresLedger};
 
 /// Nobody looks again by themselves before that.
 const NEVER: Duration = Duration::from_secs(3600);
@@ -112,4 +114,32 @@ async fn a_job_goes_its_way_through_two_servers() {
         }
     }
     assert_eq!(two.job(&job.name).await, one.job(&job.name).await);
+}
+
+/// While the database is away nobody's report can be written, and nobody is to lose a lease for that.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn leases_outlast_the_absence_of_the_database() {
+    let Some(cluster) = Cluster::start() else { return };
+    cluster.create("ledger", None);
+    let ledger = PostgresLedger::open(&cluster.url("ledger").into()).await.unwrap();
+    let limits = Limits {
+        lease: Duration::from_secs(4),
+        ..Limits::default()
+    };
+    let server = Server::over(Arc::new(ledger), tempfile::TempDir::new().unwrap(), limits).await;
+    let name = server.create(key_spec(8)).await.name;
+    let (_, token) = server.take().await;
+    cluster.stop();
+    tokio::time::sleep(Duration::from_secs(6)).await;
+    cluster.resume();
+    // Two looks after leases later.
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let request = ReportJobRequest {
+        name: name.clone(),
+        lease_token: token,
+        progress: None,
+    };
+    server.worker.clone().report_job(request).await.unwrap();
+    let job = server.job(&name).await;
+    assert_eq!((job.state(), job.attempt), (State::Running, 1));
 }

@@ -141,7 +141,7 @@ where
         return work(db).await.map_err(Failed::undone);
     }
     let mut transaction = db.begin().await.map_err(Failed::undone)?;
-    match work(&mut *transaction).await {
+    match work(&mut transaction).await {
         Ok(value) => match transaction.commit().await {
             Ok(()) => Ok(value),
             Err(error) => Err(Failed {
