@@ -36,9 +36,18 @@ install_packages() {
         "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
 
+has_postgresql() {
+    local initdb
+    for initdb in "$(type -P initdb)" /usr/lib/postgresql/*/bin/initdb; do
+        [ -x "$initdb" ] && return 0
+    done
+    return 1
+}
+
 # What only the tests need: npm for the check of the protos, Python for a client of another language, and kill as a
 # program, which a shell has built in, for tests that send signals. Without the first two those checks are skipped,
-# unless CI is set. The fuzzer is C++; a C compiler may be there without one for that.
+# unless CI is set. The fuzzer is C++; a C compiler may be there without one for that. Of PostgreSQL the tests
+# use the programs only, and start clusters of their own.
 setup_tests() {
     local missing=()
     command -v npm >/dev/null || missing+=(npm)
@@ -46,6 +55,7 @@ setup_tests() {
     type -P kill >/dev/null || missing+=(procps)
     # Pages of evidence are looked at in a browser.
     type -P chromium >/dev/null || missing+=(chromium)
+    has_postgresql || missing+=(postgresql)
     # The interpreter may be there without what makes an environment of its own.
     python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)
     if [ "${#missing[@]}" -gt 0 ] && ! install_packages "${missing[@]}"; then

@@ -20,7 +20,7 @@ use tokio::time::{Instant, sleep, timeout};
 
 use crate::error::{Error, Result};
 use crate::secrets::MASTER_KEY_VARIABLE;
-use crate::settings::Settings;
+use crate::settings::{DATABASE_VARIABLE, Settings};
 
 /// Name of the worker's program beside the server's.
 const PROGRAM: &str = "guardsplat-worker";
@@ -74,6 +74,8 @@ impl WorkerProcess {
         command
             .args(&self.arguments)
             .env_remove(MASTER_KEY_VARIABLE)
+            .env_remove(DATABASE_VARIABLE)
+            .env_remove("PGPASSWORD")
             .stdin(Stdio::piped())
             // Standard output is the server's own; what a worker says goes to the log.
             .stdout(io::stderr().as_fd().try_clone_to_owned()?)

@@ -4,6 +4,7 @@ mod health;
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ use crate::api::{self, Api, Limits};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
-use crate::ledger::SqliteLedger;
+use crate::ledger::{Ledger, LedgerError, PostgresLedger, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::settings::Settings;
@@ -28,7 +29,12 @@ const LEAST_DRAIN: Duration = Duration::from_secs(1);
 
 /// Runs a server until `shutdown`. Says on standard output where it listens, once it does.
 pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Result<()> {
-    let server = Server::open(settings).await?;
+    let mut shutdown = pin!(shutdown);
+    // A database that is waited for must not keep the process from ending.
+    let server = tokio::select! {
+        server = Server::open(settings) => server?,
+        () = &mut shutdown => return Ok(()),
+    };
     // Nobody may be reading, which is no reason to stop.
     let _ = writeln!(std::io::stdout(), "listening on http://{}", server.address());
     server.run(shutdown).await
@@ -40,7 +46,7 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     worker: Option<WorkerProcess>,
-    ledger: Arc<SqliteLedger>,
+    ledger: Arc<dyn Ledger>,
     api: Api,
     /// Held until the end, so that no other server uses the folder.
     _folder: DataFolder,
@@ -58,11 +64,7 @@ impl Server {
         let master = secrets::load(source, folder.path()).map_err(startup)?;
         let store =
             ArtifactStore::open(&folder.path().join("artifacts"), settings.max_artifact_bytes).map_err(startup)?;
-        let ledger = Arc::new(
-            SqliteLedger::open(&folder.path().join("ledger.sqlite"))
-                .await
-                .map_err(startup)?,
-        );
+        let ledger = ledger(&settings, &folder).await.map_err(startup)?;
         let listener = TcpListener::bind(settings.listen)
             .await
             .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
@@ -71,7 +73,9 @@ impl Server {
             true => Some(WorkerProcess::new(&settings, address)?),
             false => None,
         };
-        let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
+        let notary = Notary::open(ledger.as_ref(), &master, api::now())
+            .await
+            .map_err(startup)?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
@@ -101,6 +105,8 @@ impl Server {
             let _ = drained.await;
         }));
         let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
+        // It ends with the API.
+        tokio::spawn(api::relay(self.api.clone()));
         let worker = self
             .worker
             .map(|worker| EmbeddedWorker::start(worker, Backoff::default()));
@@ -136,6 +142,17 @@ impl Server {
             None => Ok(()),
         }
     }
+}
+
+/// The ledger that the settings name.
+async fn ledger(settings: &Settings, folder: &DataFolder) -> Result<Arc<dyn Ledger>, LedgerError> {
+    let Some(database) = &settings.database else {
+        return Ok(Arc::new(
+            SqliteLedger::open(&folder.path().join("ledger.sqlite")).await?,
+        ));
+    };
+    tracing::info!(%database, "the ledger is in a database");
+    Ok(Arc::new(PostgresLedger::open(database.secret()).await?))
 }
 
 type Calls = JoinHandle<Result<()>>;

@@ -5,12 +5,17 @@ use std::os::unix::process::ExitStatusExt;
 use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
+use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::upload_artifact_request::Payload;
-use guardsplat_proto::v1::{GetArtifactRequest, ListJobsRequest, UploadArtifactRequest, UploadMetadata};
+use guardsplat_proto::v1::{
+    CreateJobRequest, GetArtifactRequest, Job, KeySpec, ListJobsRequest, UploadArtifactRequest, UploadMetadata,
+};
 use nix::sys::signal::Signal;
 use sha2::{Digest, Sha256};
+use support::postgres::Cluster;
 use support::{Bench, SOON, until};
+use tokio::time::timeout;
 use tonic::Code;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
@@ -227,4 +232,77 @@ async fn the_master_key_stays_secret() {
     let text = bench.server_log();
     assert!(text.contains("opened") && !text.contains("5ec2e7"));
     assert!(!bench.data().join("master.key").exists());
+}
+
+/// Two servers over one database, and neither tells anybody its password.
+#[tokio::test]
+async fn servers_share_a_database() {
+    let Some(cluster) = Cluster::start() else { return };
+    cluster.create("ledger", None);
+    let url = format!("{}&password=5ec2e7", cluster.url("ledger"));
+    let mut benches = [Bench::new(), Bench::new()];
+    for bench in &mut benches {
+        bench.variable("GUARDSPLAT_DATABASE", &url);
+        bench.variable("GUARDSPLAT_MASTER_KEY", &"ab".repeat(32));
+        bench.variable("GUARDSPLAT_LOG_FILTER", "trace");
+    }
+    let script = "env >> $LOG; echo ready >> $LOG; cat";
+    let (one, two) = (benches[0].start_with_worker(script).await, benches[1].start().await);
+    let log = until(|| benches[0].log(), |log| log.ends_with("ready\n")).await;
+    assert!(!log.contains("5ec2e7"), "{log}");
+    let spec = Some(Spec::CreateKey(KeySpec { bits: 8, seed: None }));
+    let job = Some(Job { spec, ..Job::default() });
+    let request = CreateJobRequest {
+        job,
+        request_id: String::new(),
+    };
+    let mut jobs = JobServiceClient::new(one.channel().await);
+    let job = jobs.create_job(request).await.unwrap().into_inner();
+    assert_eq!(one.kill().await.signal(), Some(Signal::SIGKILL as i32));
+
+    let channel = two.channel().await;
+    let (mut jobs, mut health) = (JobServiceClient::new(channel.clone()), HealthClient::new(channel));
+    let list = jobs.list_jobs(ListJobsRequest::default()).await.unwrap().into_inner();
+    assert_eq!(list.jobs, [job]);
+    // The database goes away, and comes back; the server says so, and goes on.
+    let mut watched = health.watch(asks("")).await.unwrap().into_inner();
+    let mut says = async |wanted: ServingStatus| {
+        let told = timeout(SOON, watched.message()).await.expect("nothing is told");
+        assert_eq!(told.unwrap().unwrap().status(), wanted);
+    };
+    says(ServingStatus::Serving).await;
+    cluster.stop();
+    let refused = jobs.list_jobs(ListJobsRequest::default()).await.unwrap_err();
+    assert_eq!(
+        (refused.code(), refused.message()),
+        (Code::Unavailable, "the ledger is not available")
+    );
+    says(ServingStatus::NotServing).await;
+    cluster.resume();
+    says(ServingStatus::Serving).await;
+    assert_eq!(
+        jobs.list_jobs(ListJobsRequest::default()).await.unwrap().into_inner(),
+        list
+    );
+    assert_eq!(two.stop().await.code(), Some(0));
+    for bench in &benches {
+        let text = bench.server_log();
+        assert!(
+            text.contains("the ledger is in a database") && !text.contains("5ec2e7"),
+            "{text}"
+        );
+        assert!(!bench.data().join("ledger.sqlite").exists());
+    }
+}
+
+#[tokio::test]
+async fn a_stop_is_heard_while_the_database_is_waited_for() {
+    let bench = Bench::new();
+    let server = bench.begin(&["--database", "postgres://127.0.0.1:1/ledger"]);
+    until(
+        || bench.server_log(),
+        |log| log.contains("can't be reached; trying again"),
+    )
+    .await;
+    assert_eq!(server.stop().await.code(), Some(0));
 }

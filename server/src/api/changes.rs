@@ -1,7 +1,7 @@
 //! Who waits for a change hears of it: watchers of jobs, and workers that wait for one.
 //!
 //! Nothing here is needed for what is told to be right: whoever waits also looks into the ledger every so often, and a
-//! change that was missed, or made by another process, is seen then.
+//! change that was missed is seen then. What other servers change comes in through [`relay`](super::relay).
 use std::time::Duration;
 
 use tokio::sync::{broadcast, watch};
@@ -14,7 +14,8 @@ const KEPT: usize = 256;
 
 /// Announces changes.
 pub struct Changes {
-    jobs: broadcast::Sender<JobId>,
+    /// `None` stands for any job.
+    jobs: broadcast::Sender<Option<JobId>>,
     grew: watch::Sender<()>,
     moved: watch::Sender<()>,
     stopping: watch::Sender<bool>,
@@ -35,7 +36,15 @@ impl Changes {
     /// A job has changed. Never waits, however slow those who listen are.
     pub fn job(&self, id: JobId) {
         // An error only says that nobody listens.
-        let _ = self.jobs.send(id);
+        let _ = self.jobs.send(Some(id));
+    }
+
+    /// Anything may have changed.
+    pub fn everything(&self) {
+        // As above.
+        let _ = self.jobs.send(None);
+        self.queue_grew();
+        self.queue_moved();
     }
 
     /// There may be a job for a worker that waits.
@@ -88,7 +97,7 @@ pub enum Heard {
 
 /// Hears of changes from when it was made.
 pub struct Listener {
-    jobs: broadcast::Receiver<JobId>,
+    jobs: broadcast::Receiver<Option<JobId>>,
     grew: watch::Receiver<()>,
     moved: watch::Receiver<()>,
     stopping: watch::Receiver<bool>,
@@ -137,10 +146,10 @@ impl Listener {
     }
 }
 
-async fn job(jobs: &mut broadcast::Receiver<JobId>, id: Option<JobId>) {
+async fn job(jobs: &mut broadcast::Receiver<Option<JobId>>, id: Option<JobId>) {
     loop {
         match jobs.recv().await {
-            Ok(changed) if Some(changed) != id => {}
+            Ok(changed) if changed.is_some() && changed != id => {}
             // Too many changes at once: this job's may be among those that were dropped.
             Ok(_) | Err(broadcast::error::RecvError::Lagged(_)) => return,
             Err(broadcast::error::RecvError::Closed) => std::future::pending().await,
@@ -177,6 +186,16 @@ mod tests {
         assert!(hears(&mut listener, For::Work).await);
         assert!(!hears(&mut listener, For::Work).await);
         assert_eq!(listener.wait(For::Work, SHORT).await.unwrap(), Heard::Nothing);
+    }
+
+    #[tokio::test]
+    async fn all_hear_that_anything_may_have_changed() {
+        let (changes, a) = (Changes::default(), Uuid::now_v7());
+        for what in [For::Job(a), For::QueuedJob(a), For::Work] {
+            let mut listener = changes.listen();
+            changes.everything();
+            assert!(hears(&mut listener, what).await, "{what:?}");
+        }
     }
 
     #[tokio::test]

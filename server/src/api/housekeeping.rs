@@ -11,6 +11,8 @@ use crate::ledger::ArtifactRow;
 
 /// How late an expired lease may be noticed.
 const REAP_EVERY: Duration = Duration::from_secs(1);
+/// When leases could not be looked after for so long, reports of workers could not be written either.
+const ABSENCE: Duration = Duration::from_secs(3);
 /// How often abandoned bytes are looked for, at most.
 const COLLECT_EVERY: Duration = Duration::from_secs(10);
 /// Artifacts deleted at one go.
@@ -23,17 +25,20 @@ pub async fn housekeeping(api: Api) {
     let mut ticks = interval(REAP_EVERY);
     let collect_every = COLLECT_EVERY.min(api.limits().abandoned_after);
     let mut collected: Option<Instant> = None;
-    // While no server was there no worker could report; those that live get the time to, before any is given up.
-    if let Err(error) = api.ledger().renew_leases(api.limits().lease, started).await {
-        tracing::error!(error = %chain(&error), "the leases of running jobs could not be renewed");
-    }
+    // When leases were last looked after; never, as far as this server knows.
+    let mut looked: Option<Instant> = None;
+    let absence = ABSENCE.max(api.limits().lease / 2);
     loop {
         tokio::select! {
             () = stopping.stopped() => return,
             _ = ticks.tick() => {}
         }
-        if let Err(error) = api.reap().await {
-            tracing::error!(error = %chain(&error), "expired leases could not be ended");
+        match api
+            .look_after_leases(looked.is_none_or(|at| at.elapsed() > absence))
+            .await
+        {
+            Ok(()) => looked = Some(Instant::now()),
+            Err(error) => tracing::error!(error = %chain(&error), "expired leases could not be ended"),
         }
         if collected.is_none_or(|at| at.elapsed() >= collect_every) {
             collected = Some(Instant::now());
@@ -45,6 +50,15 @@ pub async fn housekeeping(api: Api) {
 }
 
 impl Api {
+    /// Ends attempts whose lease has expired. While no server was there, or it could not write, no worker could report;
+    /// `after_absence` those that live get the time to, before any is given up.
+    async fn look_after_leases(&self, after_absence: bool) -> Result<()> {
+        if after_absence {
+            self.ledger().renew_leases(self.limits().lease, clock::now()).await?;
+        }
+        self.reap().await
+    }
+
     /// Ends attempts whose lease has expired.
     pub(super) async fn reap(&self) -> Result<()> {
         let ended = self.ledger().reap(clock::now()).await?;
@@ -61,10 +75,15 @@ impl Api {
     }
 
     /// Deletes what uploads and attempts left behind. What was begun before this server was `started` is nobody's any
-    /// more, as a folder has one server; what was begun since may still be arriving for as long as that is allowed.
+    /// more, unless the ledger has other servers; what was begun since, or by them, may still be arriving for as long as
+    /// that is allowed.
     pub(super) async fn collect(&self, started: i64) -> Result<()> {
         let longest = clock::micros(self.limits().abandoned_after);
-        let older_than = started.max(clock::now().saturating_sub(longest));
+        let longest_ago = clock::now().saturating_sub(longest);
+        let older_than = match self.ledger().is_shared() {
+            true => longest_ago,
+            false => started.max(longest_ago),
+        };
         let abandoned = self.ledger().abandoned_artifacts(older_than, COLLECT_AT_ONCE).await?;
         for artifact in &abandoned {
             match self.remove_bytes(artifact).await {

@@ -40,6 +40,7 @@ mod problems;
 mod progress;
 mod refusals;
 mod registry;
+mod relay;
 mod status;
 #[doc(hidden)]
 pub mod strangers;
@@ -55,6 +56,7 @@ mod worker;
 pub use clock::now;
 pub use housekeeping::housekeeping;
 pub use listen::serve;
+pub use relay::relay;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
 const MAX_MESSAGE: usize = 4 << 20;

@@ -6,6 +6,8 @@ use crate::ledger::LedgerError;
 /// SQLite's results for a database that somebody else holds for the moment, and for a full disk.
 const SQLITE_BUSY: &str = "5";
 const SQLITE_FULL: &str = "13";
+/// PostgreSQL's for a full disk.
+const POSTGRES_FULL: &str = "53100";
 
 impl From<LedgerError> for Error {
     fn from(error: LedgerError) -> Self {
@@ -56,7 +58,7 @@ impl From<LedgerError> for Error {
                 },
                 Trouble::Other => Self::internal("the ledger", error),
             },
-            LedgerError::Closed => Self::Unavailable {
+            LedgerError::Closed | LedgerError::Unavailable(_) => Self::Unavailable {
                 what: "the ledger",
                 source: Box::new(error),
             },
@@ -79,7 +81,7 @@ fn transient(error: &sqlx::Error) -> Trouble {
         sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed => Trouble::Busy,
         sqlx::Error::Database(error) => match error.code().as_deref() {
             Some(SQLITE_BUSY) => Trouble::Busy,
-            Some(SQLITE_FULL) => Trouble::Full,
+            Some(SQLITE_FULL | POSTGRES_FULL) => Trouble::Full,
             _ => Trouble::Other,
         },
         _ => Trouble::Other,

@@ -11,7 +11,7 @@ use super::{Api, convert, token};
 use crate::error::{Error, Result};
 use crate::ledger::{JobId, JobRow, JobState};
 
-/// How late a change is heard of that was not announced in this process.
+/// How late a change is heard of that was not announced here.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);
 /// A queue that moves fast is told of so often at most.
 const POSITION_EVERY: Duration = Duration::from_millis(500);

@@ -83,6 +83,10 @@ pub enum LedgerError {
         #[source]
         source: guardsplat_commitment::Error,
     },
+    /// The database can't be reached now, or refused the change because of others at the same time. The same call may
+    /// succeed a little later; one that changes something may have done so all the same.
+    #[error("the ledger's database is not available")]
+    Unavailable(#[source] Arc<sqlx::Error>),
     /// The database failed.
     #[error("the ledger's database failed")]
     Database(#[source] Arc<sqlx::Error>),

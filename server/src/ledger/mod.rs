@@ -7,23 +7,32 @@
 //! [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
+mod again;
 pub mod candidates;
+mod chain;
 #[cfg(test)]
 pub mod conformance;
+mod elsewhere;
 mod error;
+mod numbers;
+pub mod postgres;
 mod registry;
 pub mod retry;
 pub mod sqlite;
 mod token;
+mod transition;
 mod types;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_commitment::{Signed, SigningKey};
+use tokio::sync::broadcast;
 use uuid::Uuid;
 
+pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
+pub use postgres::PostgresLedger;
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
     SealedSigningKey,
@@ -119,7 +128,10 @@ pub trait Ledger: Send + Sync + 'static {
     /// `NotFound`, `LeaseLost`.
     async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow>;
 
-    /// Has no lease end before `now + lease`: for a server that begins, as no worker could report while none was there.
+    /// Has no lease end before `now + lease`: for a server that begins, or can write again, as no worker could report
+    /// while none could write. Where several servers share the ledger and another of them has looked after leases
+    /// meanwhile, nothing is extended: workers could report to that one, and a server that begins again and again must
+    /// not keep alive what is dead.
     async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()>;
 
     /// Ends the attempts whose lease has expired, and returns their jobs.
@@ -231,4 +243,13 @@ pub trait Ledger: Send + Sync + 'static {
 
     /// Whether the ledger can be read and written.
     async fn check(&self) -> Result<()>;
+
+    /// Whether other servers may use the ledger at the same time.
+    fn is_shared(&self) -> bool;
+
+    /// What other servers change from now on; `None` where there can't be any.
+    fn elsewhere(&self) -> Option<broadcast::Receiver<Elsewhere>>;
+
+    /// Finishes what was begun and closes the database. Later calls fail with `Closed`.
+    async fn close(&self);
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
-use super::{LogFormat, Settings, WorkerDevice};
+use super::{DatabaseUrl, LogFormat, Settings, WorkerDevice};
 
 /// The GuardSplat server: takes jobs over gRPC, keeps them, and gives them to workers.
 ///
@@ -23,6 +23,10 @@ pub struct Flags {
     /// Folder of everything that is kept [default: guardsplat-data]
     #[arg(long, value_name = "FOLDER")]
     pub data_dir: Option<PathBuf>,
+    /// PostgreSQL database of the ledger, as postgres://USER@HOST/DATABASE. All users of this machine see what is said
+    /// here: give a password in the variable, the file, or libpq's PGPASSFILE [default: ledger.sqlite in the folder]
+    #[arg(long, value_name = "URL")]
+    pub database: Option<DatabaseUrl>,
     /// Most bytes of an artifact [default: 4294967296]
     #[arg(long, value_name = "BYTES")]
     pub max_artifact_bytes: Option<u64>,
@@ -78,6 +82,7 @@ impl Flags {
             config: _,
             listen,
             data_dir,
+            database,
             max_artifact_bytes,
             max_queued_jobs,
             max_job_memory_mebibytes,
@@ -96,6 +101,7 @@ impl Flags {
         } = self;
         set(&mut settings.listen, listen);
         set(&mut settings.data_dir, data_dir);
+        set(&mut settings.database, database.map(Some));
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);

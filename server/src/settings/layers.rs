@@ -6,6 +6,7 @@ use config::builder::DefaultState;
 use config::{Config, ConfigBuilder, ConfigError, Environment, File, FileFormat};
 use secrecy::SecretString;
 
+use super::database::without_urls;
 use super::{Flags, Settings, SettingsError};
 use crate::secrets::MASTER_KEY_VARIABLE;
 
@@ -51,7 +52,7 @@ pub fn parse(text: &str) -> Result<Settings, SettingsError> {
 
 fn build(layers: ConfigBuilder<DefaultState>) -> Result<Settings, SettingsError> {
     let settings = layers.build().and_then(Config::try_deserialize);
-    settings.map_err(|error: ConfigError| SettingsError::Unreadable(error.to_string()))
+    settings.map_err(|error: ConfigError| SettingsError::Unreadable(without_urls(&error.to_string())))
 }
 
 fn usual_file() -> Option<PathBuf> {

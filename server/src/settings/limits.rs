@@ -4,6 +4,7 @@ use std::path::Path;
 use tracing_subscriber::EnvFilter;
 
 use super::{Settings, SettingsError};
+use crate::ledger::postgres;
 
 const DAY: u64 = 24 * 60 * 60;
 
@@ -45,6 +46,12 @@ impl Settings {
             if let Some(path) = path {
                 not_empty(field, path)?;
             }
+        }
+        if let Some(database) = &self.database {
+            postgres::check_url(database.secret()).map_err(|reason| SettingsError::Invalid {
+                field: "database",
+                reason,
+            })?;
         }
         // Filters on fields of spans are regular expressions that the library compiles without limits: 70 bytes of one
         // took gigabytes.

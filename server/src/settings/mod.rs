@@ -1,4 +1,5 @@
 //! Settings, in layers: defaults, a file, the environment, flags. Each overrides the one before.
+mod database;
 mod error;
 mod flags;
 mod layers;
@@ -11,6 +12,7 @@ use std::time::Duration;
 use secrecy::SecretString;
 use serde::{Deserialize, Serialize};
 
+pub use database::{DATABASE_VARIABLE, DatabaseUrl};
 pub use error::SettingsError;
 pub use flags::Flags;
 pub use layers::{load, parse};
@@ -23,6 +25,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// Folder of everything that is kept.
     pub data_dir: PathBuf,
+    /// The database of the ledger, for several servers; a file in the folder where none is named.
+    pub database: Option<DatabaseUrl>,
     /// Most bytes of an artifact.
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
@@ -96,6 +100,7 @@ impl Default for Settings {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
             data_dir: "guardsplat-data".into(),
+            database: None,
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
             max_job_memory_mebibytes: 0,

@@ -65,6 +65,10 @@ fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
         ("data_dir", "/data"),
+        (
+            "database",
+            "postgres://somebody:5ec2e7@db.example/ledger?sslmode=verify-full",
+        ),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
         ("max_job_memory_mebibytes", "2000"),
@@ -236,6 +240,40 @@ fn the_master_key_is_not_shown() {
             .master_key
             .is_none()
     );
+}
+
+/// Wherever it stands, and whatever is wrong with it.
+#[test]
+fn the_password_of_the_database_is_not_shown() {
+    let settings = layers("database = \"postgres://a:5ec2e7@db/ledger\"", &[], &[]).unwrap();
+    for shown in [format!("{settings:?}"), serde_json::to_string(&settings).unwrap()] {
+        assert!(shown.contains("@db/ledger") && !shown.contains("5ec2e7"), "{shown}");
+    }
+    for url in [
+        "mysql://a:5ec2e7@db/ledger",
+        "5ec2e7",
+        "postgres://a:5ec2e7@db:port/ledger",
+        "postgres://a:x?5ec2e7@db/ledger",
+        "postgres://db/ledger?passwrod=5ec2e7",
+        "postgres://a:5ec2e7@db/ledger?sslmode=sometimes",
+    ] {
+        for text in [
+            error(&format!("database = \"{url}\""), &[], &[]),
+            error("", &[("GUARDSPLAT_DATABASE", url)], &[]),
+            error("", &[], &["--database", url]),
+        ] {
+            assert!(text.starts_with("setting database: "), "{text}");
+            assert!(!text.contains("5ec2e7"), "{text}");
+        }
+    }
+    for broken in [
+        "database = \"postgres://a:5ec2e7@db/ledger",
+        "database = postgres://a:5ec2e7@db/ledger",
+        "database = [\"postgres://a:5ec2e7@db/ledger\"]",
+    ] {
+        let text = error(broken, &[], &[]);
+        assert!(!text.contains("5ec2e7"), "{text}");
+    }
 }
 
 #[test]

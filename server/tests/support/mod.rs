@@ -1,4 +1,6 @@
 //! Starts the server's program on folders and ports of its own.
+pub mod postgres;
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
@@ -93,11 +95,19 @@ impl Bench {
         String::from_utf8_lossy(&fs::read(self.folder.path().join("server.log")).unwrap_or_default()).into_owned()
     }
 
-    async fn start_as(&self, arguments: &[&str]) -> Server {
+    /// Starts a server, whether or not it will listen.
+    pub fn begin(&self, arguments: &[&str]) -> Server {
         // A file, because a pipe that nobody reads fills up.
         let path = self.folder.path().join("server.log");
         let log = fs::OpenOptions::new().append(true).create(true).open(path).unwrap();
-        let mut child = self.command(arguments).stderr(log).spawn().unwrap();
+        Server {
+            child: self.command(arguments).stderr(log).spawn().unwrap(),
+            address: String::new(),
+        }
+    }
+
+    async fn start_as(&self, arguments: &[&str]) -> Server {
+        let Server { mut child, .. } = self.begin(arguments);
         let mut line = String::new();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         timeout(SOON, stdout.read_line(&mut line)).await.unwrap().unwrap();

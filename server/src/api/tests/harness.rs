@@ -25,9 +25,9 @@ use tonic::transport::Channel;
 use tonic::{Code, Response, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-use crate::api::{Api, Limits, housekeeping, serve};
+use crate::api::{Api, Limits, housekeeping, relay, serve};
 use crate::artifacts::ArtifactStore;
-use crate::ledger::SqliteLedger;
+use crate::ledger::{Ledger, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 
@@ -43,7 +43,7 @@ pub struct Server {
     pub worker: WorkerServiceClient<Channel>,
     pub channel: Channel,
     folder: TempDir,
-    ledger: Arc<SqliteLedger>,
+    ledger: Arc<dyn Ledger>,
     end: oneshot::Sender<()>,
     served: JoinHandle<crate::error::Result<()>>,
     housekeeper: JoinHandle<()>,
@@ -59,10 +59,15 @@ impl Server {
     }
 
     async fn in_folder(folder: TempDir, limits: Limits) -> Self {
-        let ledger = Arc::new(SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap());
+        let ledger = SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap();
+        Self::over(Arc::new(ledger), folder, limits).await
+    }
+
+    /// A server over a ledger that others may use too. The folder has the master key, and its artifacts.
+    pub async fn over(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits) -> Self {
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
-        let notary = Notary::open(&*ledger, &master, 0).await.unwrap();
+        let notary = Notary::open(ledger.as_ref(), &master, 0).await.unwrap();
         let api = Api::new(ledger.clone(), store, master, notary, limits);
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = format!("http://{}", listener.local_addr().unwrap());
@@ -70,6 +75,7 @@ impl Server {
         let shutdown = async { ended.await.unwrap_or_default() };
         let served = tokio::spawn(serve(api.routes().unwrap(), listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
+        tokio::spawn(relay(api.clone()));
         let channel = Channel::from_shared(address).unwrap().connect_lazy();
         Self {
             jobs: JobServiceClient::new(channel.clone()),
@@ -85,6 +91,13 @@ impl Server {
             served,
             housekeeper,
         }
+    }
+
+    /// Another server with the same master key, and a folder of its own.
+    pub async fn twin(&self, ledger: Arc<dyn Ledger>) -> Self {
+        let folder = TempDir::new().unwrap();
+        std::fs::copy(self.folder.path().join("master.key"), folder.path().join("master.key")).unwrap();
+        Self::over(ledger, folder, self.api.limits().clone()).await
     }
 
     /// Stops in good order, and starts another server over the same folder.
@@ -105,7 +118,7 @@ impl Server {
         Self::in_folder(self.folder, limits).await
     }
 
-    pub fn ledger(&self) -> Arc<SqliteLedger> {
+    pub fn ledger(&self) -> Arc<dyn Ledger> {
         self.ledger.clone()
     }
 

@@ -8,7 +8,7 @@ use tonic::Code;
 
 use super::harness::{Server, chunk, first, key_spec, metadata, refused, soon};
 use crate::api::{Limits, clock};
-use crate::ledger::{Ledger, NewArtifact, Origin};
+use crate::ledger::{NewArtifact, Origin};
 
 /// An upload that was begun, and what continues it.
 async fn begin(

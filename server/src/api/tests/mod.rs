@@ -10,6 +10,7 @@ mod keys;
 mod lists;
 mod registry;
 mod search_speed;
+mod several;
 mod submissions;
 mod transport;
 mod watch;

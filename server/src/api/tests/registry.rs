@@ -13,7 +13,6 @@ use uuid::Uuid;
 
 use super::harness::{Server, invalid, key_spec, not_found, refused, sha256};
 use crate::api::Limits;
-use crate::ledger::Ledger;
 use crate::notary;
 
 pub(super) async fn create_owner(server: &Server, display_name: &str, request_id: &str) -> Result<Owner, Status> {

@@ -109,6 +109,21 @@ pub(crate) async fn a_final_failure_is_not_repeated(factory: &dyn Factory) {
     assert!(claim(&*ledger, at(9000)).await.is_none());
 }
 
+pub(crate) async fn a_failure_may_be_told_in_any_words(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    for retryable in [true, false] {
+        let id = queue(&*ledger, at(0)).await;
+        let lease = claim_of(&*ledger, id, at(1)).await;
+        let words = failure("what was \0 read: \u{fffe} \u{1f600}\n");
+        let failed = ledger
+            .fail(id, &lease.token, words, retryable, false, at(2))
+            .await
+            .unwrap();
+        let message = failed.failure.unwrap().message;
+        assert!(message.contains(" read: \u{fffe} \u{1f600}\n"), "{message:?}");
+    }
+}
+
 pub(crate) async fn a_released_job_is_not_charged_and_keeps_its_place(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let first = queue(&*ledger, at(0)).await;
@@ -186,6 +201,36 @@ pub(crate) async fn leases_outlast_the_absence_of_the_server(factory: &dyn Facto
     assert_eq!(ledger.reap(at(1030)).await.unwrap(), [one]);
     assert!(is_lost(&ledger.report(one, &lost.token, None, LEASE, at(1031)).await));
     complete(&*ledger, &alive, &[], at(1031)).await;
+}
+
+pub(crate) async fn expired_leases_are_ended_once(factory: &dyn Factory) {
+    let ledgers = factory.open_several(4).await;
+    let mut ids = Vec::new();
+    for i in 0..40 {
+        ids.push(queue(&*ledgers[0], at(i)).await);
+        claim_of(&*ledgers[0], ids[i as usize], at(100)).await;
+    }
+    // The last one reports in time.
+    let last = queue(&*ledgers[0], at(40)).await;
+    let healthy = claim_of(&*ledgers[0], last, at(120)).await;
+    let tasks = ledgers.iter().cloned().map(|ledger| {
+        tokio::spawn(async move {
+            let mut ended = ledger.reap(at(130)).await.unwrap();
+            ended.extend(ledger.reap(at(130)).await.unwrap());
+            ended
+        })
+    });
+    let mut ended = Vec::new();
+    for task in tasks.collect::<Vec<_>>() {
+        ended.extend(task.await.unwrap());
+    }
+    ended.sort();
+    assert_eq!(ended, ids);
+    for id in ids {
+        let row = job(&*ledgers[1], id).await;
+        assert_eq!((row.state, row.attempt, row.revision), (JobState::Queued, 1, 3));
+    }
+    complete(&*ledgers[2], &healthy, &[], at(131)).await;
 }
 
 pub(crate) async fn a_lost_worker_is_noticed(factory: &dyn Factory) {

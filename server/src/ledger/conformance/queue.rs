@@ -50,13 +50,11 @@ async fn claim_many(ledger: Arc<dyn Ledger>, given: Arc<std::sync::Mutex<Vec<Job
 
 pub(crate) async fn many_claims_never_share_a_job(factory: &dyn Factory) {
     const JOBS: usize = 200;
-    let ledger = factory.open().await;
+    let ledgers = factory.open_several(4).await;
     let given = Arc::new(std::sync::Mutex::new(Vec::new()));
     let mut tasks = Vec::new();
-    for _ in 0..8 {
+    for ledger in ledgers.iter().chain(&ledgers) {
         tasks.push(tokio::spawn(claim_many(ledger.clone(), given.clone(), JOBS)));
-    }
-    for _ in 0..8 {
         let ledger = ledger.clone();
         tasks.push(tokio::spawn(async move {
             for i in 0..JOBS / 8 {

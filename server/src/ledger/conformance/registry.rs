@@ -171,12 +171,12 @@ pub(crate) async fn the_same_request_registers_once(factory: &dyn Factory) {
 }
 
 pub(crate) async fn one_registration_sent_many_times_at_once_is_one_asset(factory: &dyn Factory) {
-    let ledger = factory.open().await;
-    let (owner, key) = owner_and_key(&*ledger).await;
+    let ledgers = factory.open_several(4).await;
+    let (owner, key) = owner_and_key(&*ledgers[0]).await;
     let request_id = Some(Uuid::new_v4());
     let tasks: Vec<_> = (0..20)
-        .map(|_| {
-            let ledger = ledger.clone();
+        .map(|i| {
+            let ledger = ledgers[i % 4].clone();
             let new = NewAsset {
                 request_id,
                 ..new_asset(owner, key)
@@ -190,7 +190,7 @@ pub(crate) async fn one_registration_sent_many_times_at_once_is_one_asset(factor
     }
     made.dedup();
     assert_eq!((made.len(), made[0].payload), (1, 1));
-    assert_eq!(chain(&*ledger).await.len(), 1);
+    assert_eq!(chain(&*ledgers[0]).await.len(), 1);
 }
 
 pub(crate) async fn what_an_asset_needs_must_be_there(factory: &dyn Factory) {
@@ -213,12 +213,14 @@ pub(crate) async fn what_an_asset_needs_must_be_there(factory: &dyn Factory) {
 
 pub(crate) async fn registrations_at_once_make_one_chain_without_gaps(factory: &dyn Factory) {
     const EACH: usize = 20;
-    let ledger = factory.open().await;
-    let (owner, first) = owner_and_key(&*ledger).await;
-    let second = make_key(&*ledger, at(0)).await.1.id;
+    let ledgers = factory.open_several(4).await;
+    let ledger = &ledgers[0];
+    let (owner, first) = owner_and_key(&**ledger).await;
+    let second = make_key(&**ledger, at(0)).await.1.id;
     let tasks: Vec<_> = (0..8)
         .map(|task| {
-            let (ledger, key) = (ledger.clone(), [first, second][task % 2]);
+            // Servers and keys in all pairs.
+            let (ledger, key) = (ledgers[task / 2].clone(), [first, second][task % 2]);
             tokio::spawn(async move {
                 for i in 0..EACH {
                     // Clocks that do not agree.
@@ -230,7 +232,7 @@ pub(crate) async fn registrations_at_once_make_one_chain_without_gaps(factory: &
     for task in tasks {
         task.await.unwrap();
     }
-    let all = chain(&*ledger).await;
+    let all = chain(&**ledger).await;
     assert_eq!(all.len(), 8 * EACH);
     let mut numbers: HashMap<KeyId, Vec<u64>> = HashMap::new();
     for signed in &all {

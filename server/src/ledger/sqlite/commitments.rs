@@ -1,10 +1,10 @@
 //! Rows of commitments, each of which follows on the one before, and of the key that they are signed with.
-use guardsplat_commitment::{Commitment, Hash, Link, Signed, SigningKey};
+use guardsplat_commitment::{Hash, Signed, SigningKey};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 
 use super::super::registry::{AssetRow, CommitmentId, SealedSigningKey};
-use super::super::{LedgerError, Result};
+use super::super::{Result, chain};
 use super::rows;
 
 /// The end of the chain.
@@ -21,21 +21,7 @@ pub(super) async fn append(
     nonce_hash: Hash,
     signer: &SigningKey,
 ) -> Result<()> {
-    let last = head(db).await?.as_ref().map_or(Link::START, Link::at);
-    let signed = signer.sign(Commitment {
-        sequence: last.sequence.saturating_add(1),
-        previous: last.hash,
-        id: asset.commitment,
-        asset: asset.id,
-        owner: asset.owner,
-        sha256: asset.sha256,
-        key: asset.key,
-        payload: u64::try_from(asset.payload).unwrap_or_default(), // the table holds none below 1
-        nonce_hash,
-        // A clock that was set back must not make a chain that nobody believes.
-        time: asset.create_time.max(last.time),
-    });
-    let sequence = i64::try_from(signed.commitment.sequence).unwrap_or(i64::MAX);
+    let (sequence, signed) = chain::next(head(db).await?.as_ref(), asset, nonce_hash, signer);
     sqlx::query(
         "INSERT INTO commitments (sequence, id, asset_id, canonical, hash, signature) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
     )
@@ -69,16 +55,9 @@ pub(super) async fn list(db: &mut SqliteConnection, after: i64, limit: u32) -> R
     found.iter().map(signed).collect()
 }
 
-/// What is read is what was signed: the canonical bytes, and not columns that say the same.
 fn signed(row: &SqliteRow) -> Result<Signed> {
     let canonical: Vec<u8> = row.try_get("canonical")?;
-    let sequence = row.try_get("sequence")?;
-    let commitment =
-        Commitment::from_canonical(&canonical).map_err(|source| LedgerError::BadCommitment { sequence, source })?;
-    Ok(Signed {
-        commitment,
-        signature: rows::bytes(row, "signature")?,
-    })
+    chain::read(row.try_get("sequence")?, &canonical, rows::bytes(row, "signature")?)
 }
 
 pub(super) async fn signing_key(db: &mut SqliteConnection) -> Result<Option<SealedSigningKey>> {

@@ -6,10 +6,11 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
+use super::super::transition::{self, Cancel, Next};
 use super::super::types::{ArtifactId, JobId, JobRow, JobState, NewJob};
-use super::super::{LedgerError, Result};
+use super::super::{LedgerError, Result, again};
 use super::rows;
-use super::transition::{Next, leave};
+use super::transition::leave;
 
 /// A job and the queued jobs before it.
 pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
@@ -32,14 +33,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
         && let Some(row) = by_request(db, request).await?
     {
         let fingerprint: Vec<u8> = row.try_get("fingerprint")?;
-        let job = rows::job(&row)?;
-        // Word for word the same, also when an artifact is gone by now whose content could be compared.
-        let said_again = (job.kind, &job.spec, &job.display_name) == (new.kind, &new.spec, &new.display_name);
-        return if said_again || fingerprint == new.fingerprint {
-            Ok(job)
-        } else {
-            Err(LedgerError::RequestIdReused(request))
-        };
+        return again::job(request, rows::job(&row)?, &fingerprint, &new);
     }
     for input in &new.inputs {
         let visible = sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0")
@@ -167,16 +161,15 @@ async fn positions(db: &mut SqliteConnection) -> Result<HashMap<JobId, i64>> {
 pub(super) async fn cancel(db: &mut SqliteConnection, id: JobId, now: i64) -> Result<JobRow> {
     let row = by_id(db, id).await?.ok_or_else(|| LedgerError::no_job(id))?;
     let job = rows::job(&row)?;
-    match job.state {
-        JobState::Queued => leave(db, id, Next::Cancelled, now).await,
-        JobState::Running if job.cancel_requested => Ok(job),
-        JobState::Running => {
+    match transition::cancel(id, &job)? {
+        Cancel::End => leave(db, id, Next::Cancelled, now).await,
+        Cancel::Asked => Ok(job),
+        Cancel::Ask => {
             let asked = sqlx::query(
                 "UPDATE jobs SET cancel_requested = 1, update_time = ?2, revision = revision + 1 WHERE id = ?1 RETURNING *",
             );
             rows::job(&asked.bind(id.as_bytes().as_slice()).bind(now).fetch_one(db).await?)
         }
-        state => Err(LedgerError::Finished { job: id, state }),
     }
 }
 

@@ -3,11 +3,10 @@ use std::time::Duration;
 
 use sqlx::{Row, SqliteConnection};
 
-use super::super::types::{
-    Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
-};
+use super::super::transition::{Next, after_attempt, after_loss, after_release, end_of};
+use super::super::types::{Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
 use super::super::{LedgerError, Result, token};
-use super::transition::{Next, after_failure, leave};
+use super::transition::leave;
 use super::{artifacts, jobs, keys, rows};
 
 /// One statement takes the first job of the queue, and either counts an attempt and leases it, or fails it because no
@@ -138,32 +137,13 @@ pub(super) async fn fail(
     now: i64,
 ) -> Result<JobRow> {
     let job = leased(db, id, &token).await?;
-    let failure = failure.unwrap_or_else(|| Failure {
-        reason: 0,
-        message: "the worker gave no reason".into(),
-    });
-    let next = match (cancelled, retryable) {
-        (true, _) if job.cancel_requested => Next::Cancelled,
-        (true, _) => return Err(LedgerError::CancelNotRequested(id)),
-        (false, true) => after_failure(&job, failure, now),
-        (false, false) => Next::Failed(failure),
-    };
+    let next = after_attempt(&job, failure, retryable, cancelled, now)?;
     leave(db, id, next, now).await
 }
 
 pub(super) async fn release(db: &mut SqliteConnection, id: JobId, token: Vec<u8>, now: i64) -> Result<JobRow> {
     let job = leased(db, id, &token).await?;
-    leave(
-        db,
-        id,
-        if job.cancel_requested {
-            Next::Cancelled
-        } else {
-            Next::Released
-        },
-        now,
-    )
-    .await
+    leave(db, id, after_release(&job), now).await
 }
 
 pub(super) async fn renew(db: &mut SqliteConnection, lease: Duration, now: i64) -> Result<()> {
@@ -181,24 +161,9 @@ pub(super) async fn reap(db: &mut SqliteConnection, now: i64) -> Result<Vec<JobI
     for row in expired {
         let job = rows::job(&row)?;
         let worker: Option<String> = row.try_get("worker")?;
-        let message = format!(
-            "worker {:?} was lost: it did not report in time",
-            worker.unwrap_or_default()
-        );
-        let next = after_failure(
-            &job,
-            Failure {
-                reason: REASON_WORKER_LOST,
-                message,
-            },
-            now,
-        );
+        let next = after_loss(&job, worker, now);
         leave(db, job.id, next, now).await?;
         reaped.push(job.id);
     }
     Ok(reaped)
-}
-
-fn end_of(lease: Duration, now: i64) -> i64 {
-    now.saturating_add(i64::try_from(lease.as_micros()).unwrap_or(i64::MAX))
 }

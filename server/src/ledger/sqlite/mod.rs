@@ -18,6 +18,7 @@ use std::time::Duration;
 
 use guardsplat_commitment::{Signed, SigningKey};
 use sqlx::SqlitePool;
+use tokio::sync::broadcast;
 use uuid::Uuid;
 
 use super::registry::{
@@ -27,7 +28,7 @@ use super::registry::{
 use super::types::{
     ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
 };
-use super::{Ledger, LedgerError, Result, token};
+use super::{Elsewhere, Ledger, LedgerError, Result, token};
 use writer::Writer;
 
 /// A ledger in one SQLite file.
@@ -52,12 +53,6 @@ impl SqliteLedger {
             readers,
             writer: Writer::start(options, first),
         })
-    }
-
-    /// Finishes what was begun and closes the file. Later calls fail with `Closed`.
-    pub async fn close(&self) {
-        self.writer.close().await;
-        self.readers.close().await;
     }
 }
 
@@ -275,5 +270,18 @@ impl Ledger for SqliteLedger {
         self.queue_depth().await?;
         // An empty transaction of the writer takes the write lock, and writes nothing.
         self.writer.run(|_| Box::pin(async { Ok::<_, LedgerError>(()) })).await
+    }
+
+    fn is_shared(&self) -> bool {
+        false
+    }
+
+    fn elsewhere(&self) -> Option<broadcast::Receiver<Elsewhere>> {
+        None
+    }
+
+    async fn close(&self) {
+        self.writer.close().await;
+        self.readers.close().await;
     }
 }

@@ -4,11 +4,9 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
-use super::super::registry::{
-    AssetFilter, AssetId, AssetRow, Candidate, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow, payloads,
-};
+use super::super::registry::{AssetFilter, AssetId, AssetRow, Candidate, NewAsset, NewOwner, OwnerId, OwnerRow};
 use super::super::types::KeyId;
-use super::super::{LedgerError, Result};
+use super::super::{LedgerError, Result, again, chain};
 use super::{commitments, keys, rows};
 
 /// Assets with the names of their commitments.
@@ -52,12 +50,7 @@ pub(super) async fn create_owner(db: &mut SqliteConnection, new: NewOwner, now: 
     if let Some(request) = new.request_id {
         let query = sqlx::query("SELECT * FROM owners WHERE request_id = ?1").bind(request.as_bytes().as_slice());
         if let Some(row) = query.fetch_optional(&mut *db).await? {
-            let there = owner(&row)?;
-            return if there.display_name == new.display_name {
-                Ok(there)
-            } else {
-                Err(LedgerError::RequestIdReused(request))
-            };
+            return again::owner(request, owner(&row)?, &new);
         }
     }
     let insert = sqlx::query(
@@ -101,45 +94,18 @@ pub(super) async fn create_asset(
     if let Some(request) = new.request_id
         && let Some(there) = find_asset_request(db, request).await?
     {
-        let said_again = (there.owner, there.key, there.sha256, &there.display_name)
-            == (new.owner, new.key, new.sha256, &new.display_name);
-        return if said_again {
-            Ok(there)
-        } else {
-            Err(LedgerError::RequestIdReused(request))
-        };
+        return again::asset(request, there, &new);
     }
     let missing = |kind, id| LedgerError::NotFound { kind, id };
     get_owner(db, new.owner)
         .await?
         .ok_or_else(|| missing("owner", new.owner))?;
     let key = keys::get(db, new.key).await?.ok_or_else(|| missing("key", new.key))?;
-    if key.state != KeyState::Active {
-        return Err(LedgerError::KeyNotActive {
-            key: key.id,
-            state: key.state,
-        });
-    }
     let last: Option<i64> = sqlx::query_scalar(LAST_PAYLOAD)
         .bind(new.key.as_bytes().as_slice())
         .fetch_optional(&mut *db)
         .await?;
-    let last = last.unwrap_or(0);
-    let limit = payloads(key.bits);
-    if last >= limit {
-        return Err(LedgerError::PayloadsUsedUp { key: key.id, limit });
-    }
-    let asset = AssetRow {
-        id: new.id,
-        commitment: new.commitment,
-        owner: new.owner,
-        display_name: new.display_name,
-        sha256: new.sha256,
-        artifact: new.artifact,
-        key: new.key,
-        payload: last + 1,
-        create_time: now,
-    };
+    let asset = chain::numbered(&new, &key, last.unwrap_or(0), now)?;
     insert(db, &asset, &new.sealed_nonce, new.request_id).await?;
     commitments::append(db, &asset, new.nonce_hash, signer).await?;
     Ok(asset)

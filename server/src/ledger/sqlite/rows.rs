@@ -3,9 +3,8 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use uuid::Uuid;
 
-use super::super::registry::KeyState;
-use super::super::types::{ArtifactRow, ArtifactState, Failure, JobKind, JobRow, JobState, KeyRow};
-use super::super::{LedgerError, Result};
+use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
+use super::super::{Result, numbers};
 
 pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
     let reason: Option<i32> = row.try_get("failure_reason")?;
@@ -13,9 +12,9 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
     Ok(JobRow {
         id: id(row, "id")?,
         display_name: row.try_get("display_name")?,
-        kind: kind(row.try_get("kind")?)?,
+        kind: numbers::job_kind(row.try_get("kind")?)?,
         spec: row.try_get("spec")?,
-        state: state(row.try_get("state")?)?,
+        state: numbers::job_state(row.try_get("state")?)?,
         cancel_requested: row.try_get("cancel_requested")?,
         attempt: row.try_get("attempt")?,
         max_attempts: row.try_get("max_attempts")?,
@@ -41,18 +40,7 @@ pub(super) fn artifact(row: &SqliteRow) -> Result<ArtifactRow> {
         job: optional_id(row, "job_id")?,
         secret: row.try_get("secret")?,
         path: row.try_get("path")?,
-        state: match row.try_get("state")? {
-            1 => ArtifactState::Pending,
-            2 => ArtifactState::Stored,
-            3 => ArtifactState::Ready,
-            4 => ArtifactState::Deleted,
-            value => {
-                return Err(LedgerError::Corrupt {
-                    what: "state of an artifact",
-                    value,
-                });
-            }
-        },
+        state: numbers::artifact_state(row.try_get("state")?)?,
         create_time: row.try_get("create_time")?,
     })
 }
@@ -68,17 +56,7 @@ pub(super) fn key(row: &SqliteRow) -> Result<KeyRow> {
         create_time: row.try_get("create_time")?,
         job: id(row, "job_id")?,
         artifact: id(row, "artifact_id")?,
-        state: match row.try_get("state")? {
-            1 => KeyState::Active,
-            2 => KeyState::Retired,
-            3 => KeyState::Revoked,
-            value => {
-                return Err(LedgerError::Corrupt {
-                    what: "state of a key",
-                    value,
-                });
-            }
-        },
+        state: numbers::key_state(row.try_get("state")?)?,
         state_reason: row.try_get("state_reason")?,
         state_time: row.try_get("state_time")?,
     })
@@ -110,30 +88,4 @@ pub(super) fn bytes<const N: usize>(row: &SqliteRow, column: &str) -> Result<[u8
         }
         .into()
     })
-}
-
-fn kind(value: i64) -> Result<JobKind> {
-    match value {
-        1 => Ok(JobKind::Embed),
-        2 => Ok(JobKind::Verify),
-        3 => Ok(JobKind::CreateKey),
-        _ => Err(LedgerError::Corrupt {
-            what: "kind of job",
-            value,
-        }),
-    }
-}
-
-fn state(value: i64) -> Result<JobState> {
-    match value {
-        1 => Ok(JobState::Queued),
-        2 => Ok(JobState::Running),
-        3 => Ok(JobState::Succeeded),
-        4 => Ok(JobState::Failed),
-        5 => Ok(JobState::Cancelled),
-        _ => Err(LedgerError::Corrupt {
-            what: "state of a job",
-            value,
-        }),
-    }
 }

@@ -38,7 +38,7 @@ impl Factory for Folder {
     }
 }
 
-conformance_suite!(Folder::new());
+conformance_suite!(Some(Folder::new()));
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]

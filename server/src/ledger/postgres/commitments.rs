@@ -1,0 +1,106 @@
+//! Rows of commitments, each of which follows on the one before, and of the key that they are signed with.
+use guardsplat_commitment::{Hash, Signed, SigningKey};
+use sqlx::postgres::PgRow;
+use sqlx::{PgConnection, Row};
+
+use super::super::registry::{AssetRow, CommitmentId, SealedSigningKey};
+use super::super::{Result, chain};
+use super::rows;
+
+/// The end of the chain.
+pub(super) const HEAD: &str = "SELECT * FROM commitments ORDER BY sequence DESC LIMIT 1";
+
+/// A page of the chain.
+pub(super) const CHAIN: &str = "SELECT * FROM commitments WHERE sequence > $1 ORDER BY sequence LIMIT $2";
+
+/// Names the lock under which the chain grows; it means nothing else, and is the database's own.
+const LOCK: i64 = 0x6775_6172_6473_706c;
+
+/// Waits until nobody else makes the chain longer, in any server, and keeps it so until the transaction ends. What is
+/// read from here on is what others committed before.
+pub(super) async fn lock(db: &mut PgConnection) -> Result<()> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1)")
+        .bind(LOCK)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Signs a commitment to an asset behind the last one. It must run under [`lock`], in the transaction that makes the
+/// asset, so that nothing comes in between.
+pub(super) async fn append(
+    db: &mut PgConnection,
+    asset: &AssetRow,
+    nonce_hash: Hash,
+    signer: &SigningKey,
+) -> Result<()> {
+    let (sequence, signed) = chain::next(head(db).await?.as_ref(), asset, nonce_hash, signer);
+    sqlx::query(
+        "INSERT INTO commitments (sequence, id, asset_id, canonical, hash, signature) VALUES ($1, $2, $3, $4, $5, $6)",
+    )
+    .bind(sequence)
+    .bind(asset.commitment)
+    .bind(asset.id)
+    .bind(signed.commitment.canonical())
+    .bind(signed.hash().as_slice())
+    .bind(signed.signature.as_slice())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn head(db: &mut PgConnection) -> Result<Option<Signed>> {
+    sqlx::query(HEAD)
+        .fetch_optional(db)
+        .await?
+        .as_ref()
+        .map(signed)
+        .transpose()
+}
+
+pub(super) async fn get(db: &mut PgConnection, id: CommitmentId) -> Result<Option<Signed>> {
+    let query = sqlx::query("SELECT * FROM commitments WHERE id = $1").bind(id);
+    query.fetch_optional(db).await?.as_ref().map(signed).transpose()
+}
+
+pub(super) async fn list(db: &mut PgConnection, after: i64, limit: u32) -> Result<Vec<Signed>> {
+    let found = sqlx::query(CHAIN)
+        .bind(after)
+        .bind(i64::from(limit))
+        .fetch_all(db)
+        .await?;
+    found.iter().map(signed).collect()
+}
+
+fn signed(row: &PgRow) -> Result<Signed> {
+    let canonical: Vec<u8> = row.try_get("canonical")?;
+    chain::read(row.try_get("sequence")?, &canonical, rows::bytes(row, "signature")?)
+}
+
+pub(super) async fn signing_key(db: &mut PgConnection) -> Result<Option<SealedSigningKey>> {
+    let row = sqlx::query("SELECT * FROM signing_keys").fetch_optional(db).await?;
+    row.map(|row| {
+        Ok(SealedSigningKey {
+            public_key: rows::bytes(&row, "public_key")?,
+            sealed: row.try_get("sealed")?,
+        })
+    })
+    .transpose()
+}
+
+/// Keeps the first one for good, and says which that is.
+pub(super) async fn keep_signing_key(
+    db: &mut PgConnection,
+    new: &SealedSigningKey,
+    now: i64,
+) -> Result<SealedSigningKey> {
+    sqlx::query(
+        "INSERT INTO signing_keys (id, public_key, sealed, create_time) VALUES (1, $1, $2, $3) ON CONFLICT DO NOTHING",
+    )
+    .bind(new.public_key.as_slice())
+    .bind(&new.sealed)
+    .bind(now)
+    .execute(&mut *db)
+    .await?;
+    Ok(signing_key(db).await?.unwrap_or_else(|| new.clone()))
+}

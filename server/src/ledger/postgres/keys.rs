@@ -1,0 +1,79 @@
+//! Rows of keys.
+use sqlx::PgConnection;
+use uuid::Uuid;
+
+use super::super::registry::KeyState;
+use super::super::types::{JobId, KeyId, KeyRow, NewKey};
+use super::super::{LedgerError, Result};
+use super::rows;
+
+pub(super) async fn create(db: &mut PgConnection, new: &NewKey, job: JobId, now: i64) -> Result<()> {
+    sqlx::query(
+        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+    )
+    .bind(new.id)
+    .bind(&new.display_name)
+    .bind(i64::from(new.bits))
+    .bind(&new.clip)
+    .bind(&new.clip_sha256)
+    .bind(new.seeded)
+    .bind(now)
+    .bind(job)
+    .bind(new.artifact)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn get(db: &mut PgConnection, id: KeyId) -> Result<Option<KeyRow>> {
+    let query = sqlx::query("SELECT * FROM keys WHERE id = $1").bind(id);
+    query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
+}
+
+/// A key whose state stays what it is until the transaction ends.
+pub(super) async fn get_meanwhile(db: &mut PgConnection, id: KeyId) -> Result<Option<KeyRow>> {
+    let query = sqlx::query("SELECT * FROM keys WHERE id = $1 FOR SHARE").bind(id);
+    query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
+}
+
+pub(super) async fn list(db: &mut PgConnection, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
+    let query = sqlx::query(
+        "SELECT * FROM keys WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3",
+    );
+    let found = query.bind(time).bind(id).bind(i64::from(limit)).fetch_all(db).await?;
+    found.iter().map(rows::key).collect()
+}
+
+pub(super) async fn update_state(
+    db: &mut PgConnection,
+    id: KeyId,
+    next: KeyState,
+    reason: &str,
+    now: i64,
+) -> Result<KeyRow> {
+    let query = sqlx::query("SELECT * FROM keys WHERE id = $1 FOR UPDATE").bind(id);
+    let row = query.fetch_optional(&mut *db).await?;
+    let key = rows::key(&row.ok_or(LedgerError::NotFound { kind: "key", id })?)?;
+    if key.state == next {
+        return Ok(key);
+    }
+    if !key.state.may_become(next) {
+        return Err(LedgerError::KeyStateFinal {
+            key: id,
+            state: key.state,
+            wanted: next,
+        });
+    }
+    let update =
+        sqlx::query("UPDATE keys SET state = $2, state_reason = $3, state_time = $4 WHERE id = $1 RETURNING *");
+    let row = update
+        .bind(id)
+        .bind(next as i32)
+        .bind(reason)
+        .bind(now)
+        .fetch_one(db)
+        .await?;
+    rows::key(&row)
+}

@@ -1,0 +1,165 @@
+//! Jobs as workers see them. Every change under a token locks the job and checks the token in the transaction that
+//! changes.
+use std::time::Duration;
+
+use sqlx::postgres::PgRow;
+use sqlx::{PgConnection, Row};
+
+use super::super::transition::{Next, after_attempt, after_release, end_of};
+use super::super::types::{Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
+use super::super::{LedgerError, Result, token};
+use super::transition::leave;
+use super::{artifacts, jobs, keys, rows};
+
+/// One statement takes the first job of the queue that nobody else is taking, and either counts an attempt and leases
+/// it, or fails it because no attempt is left. So a job that kills its worker is bounded even if nobody lives to tell.
+pub(super) const CLAIM: &str = "WITH next AS MATERIALIZED (\
+        SELECT id AS next_id, attempt < max_attempts AS may FROM jobs \
+        WHERE state = 1 AND (run_after IS NULL OR run_after <= $4) \
+        ORDER BY queue_time, id LIMIT 1 FOR UPDATE SKIP LOCKED) \
+    UPDATE jobs SET \
+    state = CASE WHEN may THEN 2 ELSE 4 END, \
+    worker = CASE WHEN may THEN $1 END, \
+    lease_token = CASE WHEN may THEN $2 END, \
+    lease_expires = CASE WHEN may THEN $3 END, \
+    start_time = CASE WHEN may THEN $4 ELSE start_time END, \
+    end_time = CASE WHEN may THEN NULL ELSE $4 END, \
+    progress = CASE WHEN may THEN NULL ELSE progress END, \
+    failure_reason = CASE WHEN may THEN NULL ELSE $5 END, \
+    failure_message = CASE WHEN may THEN NULL ELSE 'no attempt is left' || coalesce('; ' || failure_message, '') END, \
+    attempt = attempt + CASE WHEN may THEN 1 ELSE 0 END, \
+    run_after = NULL, update_time = $4, revision = revision + 1 \
+    FROM next WHERE id = next_id RETURNING *";
+
+pub(super) async fn claim(db: &mut PgConnection, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
+    let token = token::fresh();
+    loop {
+        let row = sqlx::query(CLAIM)
+            .bind(worker)
+            .bind(token::hash(&token))
+            .bind(end_of(lease, now))
+            .bind(now)
+            .bind(REASON_ATTEMPTS_EXHAUSTED)
+            .fetch_optional(&mut *db)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let job = rows::job(&row)?;
+        if job.state == JobState::Running {
+            return Ok(Some(Lease { job, token }));
+        }
+    }
+}
+
+/// The job, if the token with this hash is its lease.
+pub(super) async fn leased(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+    let query = sqlx::query("SELECT * FROM jobs WHERE id = $1").bind(id);
+    holds(query.fetch_optional(db).await?, id, token)
+}
+
+/// The same, and the lease stays what it is until the transaction ends.
+pub(super) async fn leased_meanwhile(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+    let query = sqlx::query("SELECT * FROM jobs WHERE id = $1 FOR SHARE").bind(id);
+    holds(query.fetch_optional(db).await?, id, token)
+}
+
+/// The same, for whoever is going to change the job.
+async fn leased_alone(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+    holds(jobs::locked(db, id).await?, id, token)
+}
+
+fn holds(row: Option<PgRow>, id: JobId, token: &[u8]) -> Result<JobRow> {
+    let row = row.ok_or_else(|| LedgerError::no_job(id))?;
+    let current: Option<Vec<u8>> = row.try_get("lease_token")?;
+    if current.as_deref() == Some(token) {
+        rows::job(&row)
+    } else {
+        Err(LedgerError::LeaseLost(id))
+    }
+}
+
+pub(super) async fn report(
+    db: &mut PgConnection,
+    id: JobId,
+    token: &[u8],
+    progress: Option<&[u8]>,
+    lease: Duration,
+    now: i64,
+) -> Result<bool> {
+    let job = leased_alone(db, id, token).await?;
+    let news = progress.is_some() && progress != job.progress.as_deref();
+    sqlx::query(
+        "UPDATE jobs SET lease_expires = $2, progress = CASE WHEN $3 THEN $4 ELSE progress END, \
+         update_time = CASE WHEN $3 THEN $5 ELSE update_time END, \
+         revision = revision + CASE WHEN $3 THEN 1 ELSE 0 END WHERE id = $1",
+    )
+    .bind(id)
+    .bind(end_of(lease, now))
+    .bind(news)
+    .bind(progress)
+    .bind(now)
+    .execute(db)
+    .await?;
+    Ok(job.cancel_requested)
+}
+
+pub(super) async fn complete(
+    db: &mut PgConnection,
+    id: JobId,
+    token: &[u8],
+    completion: &Completion,
+    now: i64,
+) -> Result<JobRow> {
+    let Completion {
+        result,
+        outputs,
+        key,
+        fingerprint,
+    } = completion;
+    let row = jobs::locked(db, id).await?;
+    if let Some(row) = &row
+        && completed(row, token, fingerprint)?
+    {
+        return rows::job(row);
+    }
+    holds(row, id, token)?;
+    for output in outputs {
+        artifacts::publish(db, *output, id, token, false, now).await?;
+    }
+    if let Some(key) = key {
+        artifacts::publish(db, key.artifact, id, token, true, now).await?;
+        keys::create(db, key, id, now).await?;
+    }
+    sqlx::query("UPDATE jobs SET completed_token = $2, completed_fingerprint = $3 WHERE id = $1")
+        .bind(id)
+        .bind(token)
+        .bind(fingerprint.as_slice())
+        .execute(&mut *db)
+        .await?;
+    leave(db, id, Next::Succeeded(result.clone()), now).await
+}
+
+/// Whether this attempt completed the job in just this way before.
+fn completed(row: &PgRow, token: &[u8], fingerprint: &[u8]) -> Result<bool> {
+    let by: Option<Vec<u8>> = row.try_get("completed_token")?;
+    let said: Option<Vec<u8>> = row.try_get("completed_fingerprint")?;
+    Ok(by.as_deref() == Some(token) && said.as_deref() == Some(fingerprint))
+}
+
+pub(super) async fn fail(
+    db: &mut PgConnection,
+    id: JobId,
+    token: &[u8],
+    failure: Option<Failure>,
+    retryable: bool,
+    cancelled: bool,
+    now: i64,
+) -> Result<JobRow> {
+    let job = leased_alone(db, id, token).await?;
+    let next = after_attempt(&job, failure, retryable, cancelled, now)?;
+    leave(db, id, next, now).await
+}
+
+pub(super) async fn release(db: &mut PgConnection, id: JobId, token: &[u8], now: i64) -> Result<JobRow> {
+    let job = leased_alone(db, id, token).await?;
+    leave(db, id, after_release(&job), now).await
+}

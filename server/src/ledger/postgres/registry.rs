@@ -1,0 +1,224 @@
+//! Rows of owners and assets.
+use guardsplat_commitment::SigningKey;
+use sqlx::postgres::PgRow;
+use sqlx::{PgConnection, Row};
+use uuid::Uuid;
+
+use super::super::registry::{AssetFilter, AssetId, AssetRow, Candidate, NewAsset, NewOwner, OwnerId, OwnerRow};
+use super::super::types::KeyId;
+use super::super::{LedgerError, Result, again, chain};
+use super::{commitments, keys, rows};
+
+/// Assets with the names of their commitments.
+macro_rules! assets {
+    ($rest:literal) => {
+        concat!(
+            "SELECT a.*, c.id AS commitment_id FROM assets a JOIN commitments c ON c.asset_id = a.id ",
+            $rest
+        )
+    };
+}
+
+/// One asset.
+const ASSET: &str = assets!("WHERE a.id = $1");
+/// The asset that a request made.
+const OF_REQUEST: &str = assets!("WHERE a.request_id = $1");
+
+/// A page of all assets.
+pub(super) const ASSETS: &str =
+    assets!("WHERE (a.create_time, a.id) < ($1, $2) ORDER BY a.create_time DESC, a.id DESC LIMIT $3");
+/// A page of an owner's.
+pub(super) const OF_OWNER: &str = assets!(
+    "WHERE a.owner_id = $4 AND (a.create_time, a.id) < ($1, $2) ORDER BY a.create_time DESC, a.id DESC LIMIT $3"
+);
+/// A page of a key's.
+pub(super) const OF_KEY: &str =
+    assets!("WHERE a.key_id = $5 AND (a.create_time, a.id) < ($1, $2) ORDER BY a.create_time DESC, a.id DESC LIMIT $3");
+/// A page of an owner's that are of a key.
+pub(super) const OF_BOTH: &str = assets!(
+    "WHERE a.owner_id = $4 AND a.key_id = $5 AND (a.create_time, a.id) < ($1, $2) \
+     ORDER BY a.create_time DESC, a.id DESC LIMIT $3"
+);
+
+/// A page of what a search among a key's assets needs.
+pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE key_id = $1 AND payload > $2 ORDER BY payload LIMIT $3";
+
+/// The highest payload number of a key.
+pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = $1 ORDER BY payload DESC LIMIT 1";
+
+pub(super) async fn create_owner(db: &mut PgConnection, new: &NewOwner, now: i64) -> Result<OwnerRow> {
+    if let Some(there) = owner_made_before(db, new).await? {
+        return Ok(there);
+    }
+    let insert = sqlx::query(
+        "INSERT INTO owners (id, display_name, request_id, create_time) VALUES ($1, $2, $3, $4) \
+         ON CONFLICT (request_id) DO NOTHING RETURNING *",
+    );
+    let row = insert
+        .bind(new.id)
+        .bind(&new.display_name)
+        .bind(new.request_id)
+        .bind(now)
+        .fetch_optional(&mut *db)
+        .await?;
+    match row {
+        Some(row) => owner(&row),
+        // The same request, at the same time; by now it has been carried out.
+        None => {
+            let there = owner_made_before(db, new).await?;
+            there.ok_or_else(|| sqlx::Error::RowNotFound.into())
+        }
+    }
+}
+
+async fn owner_made_before(db: &mut PgConnection, new: &NewOwner) -> Result<Option<OwnerRow>> {
+    let Some(request) = new.request_id else { return Ok(None) };
+    let query = sqlx::query("SELECT * FROM owners WHERE request_id = $1").bind(request);
+    let found = query.fetch_optional(db).await?;
+    found.map(|row| again::owner(request, owner(&row)?, new)).transpose()
+}
+
+pub(super) async fn get_owner(db: &mut PgConnection, id: OwnerId) -> Result<Option<OwnerRow>> {
+    let query = sqlx::query("SELECT * FROM owners WHERE id = $1").bind(id);
+    query.fetch_optional(db).await?.as_ref().map(owner).transpose()
+}
+
+pub(super) async fn list_owners(
+    db: &mut PgConnection,
+    before: Option<(i64, OwnerId)>,
+    limit: u32,
+) -> Result<Vec<OwnerRow>> {
+    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
+    let query = sqlx::query(
+        "SELECT * FROM owners WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3",
+    );
+    let found = query.bind(time).bind(id).bind(i64::from(limit));
+    found.fetch_all(db).await?.iter().map(owner).collect()
+}
+
+/// Payload number, asset, and commitment in one transaction, and one such transaction at a time: numbers have no gaps,
+/// and the chain has no forks.
+pub(super) async fn create_asset(
+    db: &mut PgConnection,
+    new: &NewAsset,
+    signer: &SigningKey,
+    now: i64,
+) -> Result<AssetRow> {
+    commitments::lock(db).await?;
+    if let Some(request) = new.request_id
+        && let Some(there) = find_asset_request(db, request).await?
+    {
+        return again::asset(request, there, new);
+    }
+    let missing = |kind, id| LedgerError::NotFound { kind, id };
+    get_owner(db, new.owner)
+        .await?
+        .ok_or_else(|| missing("owner", new.owner))?;
+    // It is not retired before the asset is there.
+    let key = keys::get_meanwhile(db, new.key)
+        .await?
+        .ok_or_else(|| missing("key", new.key))?;
+    let last: Option<i64> = sqlx::query_scalar(LAST_PAYLOAD)
+        .bind(new.key)
+        .fetch_optional(&mut *db)
+        .await?;
+    let asset = chain::numbered(new, &key, last.unwrap_or(0), now)?;
+    insert(db, &asset, &new.sealed_nonce, new.request_id).await?;
+    commitments::append(db, &asset, new.nonce_hash, signer).await?;
+    Ok(asset)
+}
+
+async fn insert(db: &mut PgConnection, asset: &AssetRow, sealed_nonce: &[u8], request: Option<Uuid>) -> Result<()> {
+    sqlx::query(
+        "INSERT INTO assets (id, owner_id, display_name, sha256, artifact_id, key_id, payload, sealed_nonce, \
+         request_id, create_time) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)",
+    )
+    .bind(asset.id)
+    .bind(asset.owner)
+    .bind(&asset.display_name)
+    .bind(asset.sha256.as_slice())
+    .bind(asset.artifact)
+    .bind(asset.key)
+    .bind(asset.payload)
+    .bind(sealed_nonce)
+    .bind(request)
+    .bind(asset.create_time)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn find_asset_request(db: &mut PgConnection, request: Uuid) -> Result<Option<AssetRow>> {
+    let query = sqlx::query(OF_REQUEST).bind(request);
+    query.fetch_optional(db).await?.as_ref().map(asset).transpose()
+}
+
+pub(super) async fn get_asset(db: &mut PgConnection, id: AssetId) -> Result<Option<AssetRow>> {
+    let query = sqlx::query(ASSET).bind(id);
+    query.fetch_optional(db).await?.as_ref().map(asset).transpose()
+}
+
+pub(super) async fn list_assets(
+    db: &mut PgConnection,
+    filter: AssetFilter,
+    before: Option<(i64, AssetId)>,
+    limit: u32,
+) -> Result<Vec<AssetRow>> {
+    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
+    let statement = match (filter.owner, filter.key) {
+        (None, None) => ASSETS,
+        (Some(_), None) => OF_OWNER,
+        (None, Some(_)) => OF_KEY,
+        (Some(_), Some(_)) => OF_BOTH,
+    };
+    let query = sqlx::query(statement)
+        .bind(time)
+        .bind(id)
+        .bind(i64::from(limit))
+        .bind(filter.owner)
+        .bind(filter.key);
+    query.fetch_all(db).await?.iter().map(asset).collect()
+}
+
+pub(super) async fn candidates(db: &mut PgConnection, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
+    let query = sqlx::query(CANDIDATES).bind(key);
+    let found = query.bind(after).bind(i64::from(limit)).fetch_all(db).await?;
+    found.iter().map(candidate_of).collect()
+}
+
+pub(super) async fn candidate(db: &mut PgConnection, asset: AssetId) -> Result<Option<Candidate>> {
+    let query = sqlx::query("SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE id = $1");
+    let found = query.bind(asset).fetch_optional(db).await?;
+    found.as_ref().map(candidate_of).transpose()
+}
+
+fn candidate_of(row: &PgRow) -> Result<Candidate> {
+    Ok(Candidate {
+        asset: row.try_get("id")?,
+        owner: row.try_get("owner_id")?,
+        payload: row.try_get("payload")?,
+        sealed_nonce: row.try_get("sealed_nonce")?,
+    })
+}
+
+fn owner(row: &PgRow) -> Result<OwnerRow> {
+    Ok(OwnerRow {
+        id: row.try_get("id")?,
+        display_name: row.try_get("display_name")?,
+        create_time: row.try_get("create_time")?,
+    })
+}
+
+fn asset(row: &PgRow) -> Result<AssetRow> {
+    Ok(AssetRow {
+        id: row.try_get("id")?,
+        commitment: row.try_get("commitment_id")?,
+        owner: row.try_get("owner_id")?,
+        display_name: row.try_get("display_name")?,
+        sha256: rows::bytes(row, "sha256")?,
+        artifact: row.try_get("artifact_id")?,
+        key: row.try_get("key_id")?,
+        payload: row.try_get("payload")?,
+        create_time: row.try_get("create_time")?,
+    })
+}

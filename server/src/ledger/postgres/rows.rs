@@ -1,0 +1,82 @@
+//! Rows of the tables, read into the ledger's types.
+use sqlx::Row;
+use sqlx::postgres::PgRow;
+
+use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
+use super::super::{Result, numbers};
+
+pub(super) fn job(row: &PgRow) -> Result<JobRow> {
+    let reason: Option<i32> = row.try_get("failure_reason")?;
+    let message: Option<String> = row.try_get("failure_message")?;
+    Ok(JobRow {
+        id: row.try_get("id")?,
+        display_name: row.try_get("display_name")?,
+        kind: numbers::job_kind(number(row, "kind")?)?,
+        spec: row.try_get("spec")?,
+        state: numbers::job_state(number(row, "state")?)?,
+        cancel_requested: row.try_get("cancel_requested")?,
+        attempt: row.try_get("attempt")?,
+        max_attempts: row.try_get("max_attempts")?,
+        progress: row.try_get("progress")?,
+        result: row.try_get("result")?,
+        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+        create_time: row.try_get("create_time")?,
+        update_time: row.try_get("update_time")?,
+        start_time: row.try_get("start_time")?,
+        end_time: row.try_get("end_time")?,
+        run_after: row.try_get("run_after")?,
+        revision: row.try_get("revision")?,
+        queue_position: None,
+    })
+}
+
+pub(super) fn artifact(row: &PgRow) -> Result<ArtifactRow> {
+    Ok(ArtifactRow {
+        id: row.try_get("id")?,
+        display_name: row.try_get("display_name")?,
+        size: row.try_get("size")?,
+        sha256: row.try_get("sha256")?,
+        job: row.try_get("job_id")?,
+        secret: row.try_get("secret")?,
+        path: row.try_get("path")?,
+        state: numbers::artifact_state(number(row, "state")?)?,
+        create_time: row.try_get("create_time")?,
+    })
+}
+
+pub(super) fn key(row: &PgRow) -> Result<KeyRow> {
+    let bits = number(row, "bits")?;
+    Ok(KeyRow {
+        id: row.try_get("id")?,
+        display_name: row.try_get("display_name")?,
+        bits: u32::try_from(bits).map_err(|_| super::super::LedgerError::Corrupt {
+            what: "number of bits",
+            value: bits,
+        })?,
+        clip: row.try_get("clip")?,
+        clip_sha256: row.try_get("clip_sha256")?,
+        seeded: row.try_get("seeded")?,
+        create_time: row.try_get("create_time")?,
+        job: row.try_get("job_id")?,
+        artifact: row.try_get("artifact_id")?,
+        state: numbers::key_state(number(row, "state")?)?,
+        state_reason: row.try_get("state_reason")?,
+        state_time: row.try_get("state_time")?,
+    })
+}
+
+fn number(row: &PgRow, column: &str) -> Result<i64> {
+    Ok(i64::from(row.try_get::<i32, _>(column)?))
+}
+
+/// A value that always has so many bytes.
+pub(super) fn bytes<const N: usize>(row: &PgRow, column: &str) -> Result<[u8; N]> {
+    let bytes: Vec<u8> = row.try_get(column)?;
+    <[u8; N]>::try_from(bytes).map_err(|bytes| {
+        sqlx::Error::ColumnDecode {
+            index: column.to_owned(),
+            source: format!("has {} bytes, not {N}", bytes.len()).into(),
+        }
+        .into()
+    })
+}
