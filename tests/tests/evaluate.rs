@@ -105,8 +105,8 @@ fn codec() -> Vec<u8> {
 #[test]
 fn the_learned_codec_attacks_where_its_weights_are_given() {
     let bench = bench();
-    let line = "evaluate results --scenes one.ply --experiments robustness --bits 16 --seeds 1 --settings hasty.json \
-        --size 32 --views 2 --device cpu";
+    let line = "evaluate results --scenes one.ply --experiments robustness --only standard --bits 16 --seeds 1 \
+        --settings hasty.json --size 32 --views 2 --device cpu";
     let missing = || {
         let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
         report[0]["missing"].to_string()

@@ -49,7 +49,7 @@ pub struct Arguments {
     /// {"steps": 60}}]
     #[arg(long, value_name = "FILE")]
     variants: Option<PathBuf>,
-    /// Only these variants of trade
+    /// Only these variants: those of trade where that is among the experiments, or else of all of them
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
     /// Side of the pictures that are read, in pixels
@@ -158,7 +158,10 @@ fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Opti
         device: compute.name.split(':').next().unwrap_or_default().into(),
         variants: timed(arguments)?,
     };
-    let plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits, &trade)?;
+    let mut plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits, &trade)?;
+    if !arguments.experiments.contains(&Kind::Trade) {
+        plan.keep_only(&arguments.only)?;
+    }
     let options = Options {
         scenes: arguments.scenes.clone(),
         seeds: arguments.seeds.clone(),
@@ -198,7 +201,11 @@ fn timed(arguments: &Arguments) -> Result<Vec<Variant>> {
         None => None,
         Some(path) => Some(std::fs::read_to_string(path).map_err(Error::io(path))?),
     };
-    variants(&base, own.as_deref(), &arguments.only)
+    let only = match arguments.experiments.contains(&Kind::Trade) {
+        true => arguments.only.as_slice(),
+        false => &[],
+    };
+    variants(&base, own.as_deref(), only)
 }
 
 /// The engine for a length and a seed, with a key that is kept in `folder`, and the seconds that making it took.

@@ -7,7 +7,7 @@ use guardsplat_evaluation::report::names;
 use super::trade::Variant;
 use super::trial::Trial;
 use crate::embed::{Learn, Ring, Settings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Bits of most experiments.
 const BITS: usize = 32;
@@ -56,6 +56,25 @@ pub struct Trade {
 }
 
 impl Plan {
+    /// Leaves out all variants but these; no names leave all.
+    ///
+    /// # Errors
+    /// A name that there is no variant of.
+    pub fn keep_only(&mut self, names: &[String]) -> Result<()> {
+        let known = |name: &String| self.wanted.iter().any(|wanted| wanted.variant == *name);
+        if let Some(unknown) = names.iter().find(|name| !known(name)) {
+            let mut all: Vec<&str> = self.wanted.iter().map(|wanted| wanted.variant.as_str()).collect();
+            all.dedup();
+            return Err(Error::BadOption {
+                field: "only",
+                reason: format!("{unknown:?} is none of {}", all.join(", ")),
+            });
+        }
+        self.wanted
+            .retain(|wanted| names.is_empty() || names.contains(&wanted.variant));
+        Ok(())
+    }
+
     fn add(&mut self, experiment: Kind, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
         let same = |w: &&mut Wanted| w.bits == bits && w.variant == variant;
         let claims = experiment == Kind::Claims;
@@ -256,6 +275,21 @@ mod tests {
         ] {
             assert_eq!(names.iter().filter(|n| *n == name).count(), 1, "{name}");
         }
+    }
+
+    #[test]
+    fn variants_can_be_chosen() {
+        let settings = Preset::Standard.settings();
+        let mut plan = plan(&[Kind::Robustness], &settings, &[], &Trade::default()).unwrap();
+        assert_eq!(plan.wanted.len(), 3);
+        let error = plan.keep_only(&["strong".into()]).unwrap_err().to_string();
+        assert!(
+            error.contains("\"strong\" is none of standard, robust, robust to all"),
+            "{error}"
+        );
+        plan.keep_only(&[]).unwrap();
+        plan.keep_only(&[names::ROBUST.into()]).unwrap();
+        assert_eq!(plan.wanted.len(), 1);
     }
 
     #[test]
