@@ -13,11 +13,13 @@ use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use secrecy::{ExposeSecret, SecretString};
 use tokio::process::{Child, Command};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout};
 
+use crate::access::TOKEN_VARIABLE;
 use crate::error::{Error, Result};
 use crate::secrets::MASTER_KEY_VARIABLE;
 use crate::settings::Settings;
@@ -34,6 +36,8 @@ pub struct WorkerProcess {
     pub program: PathBuf,
     /// Its arguments.
     pub arguments: Vec<OsString>,
+    /// The token that it shows, where the server asks for one.
+    pub token: Option<SecretString>,
 }
 
 impl WorkerProcess {
@@ -66,6 +70,7 @@ impl WorkerProcess {
         Ok(Self {
             program,
             arguments: arguments.into_iter().map(OsString::from).collect(),
+            token: None,
         })
     }
 
@@ -74,12 +79,18 @@ impl WorkerProcess {
         command
             .args(&self.arguments)
             .env_remove(MASTER_KEY_VARIABLE)
+            // One that the server itself was given is for other servers.
+            .env_remove(TOKEN_VARIABLE)
             .stdin(Stdio::piped())
             // Standard output is the server's own; what a worker says goes to the log.
             .stdout(io::stderr().as_fd().try_clone_to_owned()?)
             // Ctrl-C at a terminal goes to the server alone, which then ends the worker in good order.
             .process_group(0)
             .kill_on_drop(true);
+        if let Some(token) = &self.token {
+            // Arguments are seen by everybody on the machine, a variable by its owner.
+            command.env(TOKEN_VARIABLE, token.expose_secret());
+        }
         Ok(command)
     }
 }

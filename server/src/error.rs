@@ -95,6 +95,30 @@ pub enum Error {
         /// The job's full name.
         name: String,
     },
+    /// A call without a token, where one is asked for.
+    #[error(
+        "a token is needed, as `authorization: Bearer` and the token in the metadata; guardsplat-server token create \
+         makes one"
+    )]
+    TokenMissing,
+    /// A token that nobody made.
+    #[error("the token is not known")]
+    TokenUnknown,
+    /// A token that was good for a time.
+    #[error("the token has expired")]
+    TokenExpired,
+    /// A token that was taken back.
+    #[error("the token is revoked")]
+    TokenRevoked,
+    /// A token that is not good for what was asked.
+    #[error("the token lacks the scope {}", .needed.join(" or "))]
+    ScopeMissing {
+        /// Scopes of which one would do.
+        needed: Vec<&'static str>,
+    },
+    /// A call that there is not, or that nobody said who may make.
+    #[error("there is no such call; reflection tells which there are")]
+    NoSuchCall,
     /// Too many jobs wait already.
     #[error("{limit} jobs are waiting, and no more are taken")]
     QueueFull {

@@ -12,14 +12,15 @@ use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
-use crate::api::{self, Api, Limits};
+use crate::access;
+use crate::api::{self, Api, Guard, Limits};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::ledger::SqliteLedger;
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
-use crate::settings::Settings;
+use crate::settings::{Access, Settings};
 use folder::DataFolder;
 use health::Health;
 
@@ -40,6 +41,7 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     worker: Option<WorkerProcess>,
+    guard: Guard,
     ledger: Arc<SqliteLedger>,
     api: Api,
     /// Held until the end, so that no other server uses the folder.
@@ -67,9 +69,21 @@ impl Server {
             .await
             .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
         let address = listener.local_addr().map_err(startup)?;
-        let worker = match settings.embedded_worker {
+        let mut worker = match settings.embedded_worker {
             true => Some(WorkerProcess::new(&settings, address)?),
             false => None,
+        };
+        let guard = match settings.access {
+            Access::Open => Guard::open(),
+            Access::Tokens => {
+                // Good for as long as this process lives, and kept nowhere.
+                let own = worker.as_ref().map(|_| access::fresh()).transpose()?;
+                let hash = own.as_ref().map(|own| own.hash);
+                if let (Some(worker), Some(own)) = (&mut worker, own) {
+                    worker.token = Some(own.text);
+                }
+                Guard::tokens(ledger.clone(), hash)
+            }
         };
         let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
@@ -79,6 +93,7 @@ impl Server {
             listener,
             address,
             worker,
+            guard,
             ledger,
             api,
             _folder: folder,
@@ -96,7 +111,7 @@ impl Server {
         let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
         let routes = self.api.routes()?.add_service(health_service);
         let (drain, drained) = oneshot::channel();
-        let mut calls = tokio::spawn(api::serve(routes, self.listener, async {
+        let mut calls = tokio::spawn(api::serve(routes, self.guard, self.listener, async {
             // A sender that is gone says the same.
             let _ = drained.await;
         }));

@@ -8,6 +8,7 @@ use tonic::transport::server::TcpIncoming;
 
 use super::deadline::Deadlines;
 use super::explained::Explained;
+use super::guard::Guard;
 use crate::error::{Error, Result};
 
 /// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
@@ -17,8 +18,13 @@ const KEEPALIVE_ANSWER: Duration = Duration::from_secs(10);
 /// Calls of one connection at a time; more wait. Long answers, such as `WatchJob`'s, count until they end.
 const CALLS_AT_ONCE: u32 = 256;
 
-/// Answers calls until `shutdown`, then finishes those that have begun.
-pub async fn serve(routes: Routes, listener: TcpListener, shutdown: impl Future<Output = ()>) -> Result<()> {
+/// Answers calls that `guard` lets through until `shutdown`, then finishes those that have begun.
+pub async fn serve(
+    routes: Routes,
+    guard: Guard,
+    listener: TcpListener,
+    shutdown: impl Future<Output = ()>,
+) -> Result<()> {
     // Set here because tonic's own setting is for listeners that it makes itself.
     let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
     Server::builder()
@@ -28,6 +34,7 @@ pub async fn serve(routes: Routes, listener: TcpListener, shutdown: impl Future<
         .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
         .layer(Explained)
         .layer(Deadlines)
+        .layer(guard)
         .add_routes(routes)
         .serve_with_incoming_shutdown(incoming, shutdown)
         .await

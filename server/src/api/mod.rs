@@ -1,4 +1,4 @@
-//! The API over gRPC: the five services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+//! The API over gRPC: the six services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -6,6 +6,7 @@ use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
+use guardsplat_proto::v1::token_service_server::TokenServiceServer;
 use guardsplat_proto::v1::worker_service_server::WorkerServiceServer;
 use tonic::Status;
 use tonic::service::Routes;
@@ -27,6 +28,7 @@ mod deadline;
 mod evidence;
 mod explained;
 mod fingerprint;
+mod guard;
 mod housekeeping;
 mod jobs;
 mod keys;
@@ -48,13 +50,16 @@ mod submission;
 mod tests;
 mod text;
 mod token;
+mod tokens;
 mod upload;
 mod watch;
 mod worker;
 
 pub use clock::now;
+pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::serve;
+pub use text::display_name as check_display_name;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
 const MAX_MESSAGE: usize = 4 << 20;
@@ -92,7 +97,7 @@ impl Default for Limits {
     }
 }
 
-/// What the five services share. Cheap to clone.
+/// What the six services share. Cheap to clone.
 #[derive(Clone)]
 pub struct Api {
     shared: Arc<Shared>,
@@ -132,7 +137,7 @@ impl Api {
         }
     }
 
-    /// The five services and reflection. Health, which knows more than the API, is added by the caller.
+    /// The six services and reflection. Health, which knows more than the API, is added by the caller.
     pub fn routes(&self) -> Result<Routes> {
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -146,6 +151,7 @@ impl Api {
                 .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(TokenServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(reflection().build_v1().map_err(failed)?)
                 .add_service(reflection().build_v1alpha().map_err(failed)?),

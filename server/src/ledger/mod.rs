@@ -7,6 +7,7 @@
 //! [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
+pub mod access;
 pub mod candidates;
 #[cfg(test)]
 pub mod conformance;
@@ -23,6 +24,7 @@ use std::time::Duration;
 use guardsplat_commitment::{Signed, SigningKey};
 use uuid::Uuid;
 
+pub use access::{AccessLedger, NewToken, TokenId, TokenRow};
 pub use error::{LedgerError, Result};
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
@@ -38,7 +40,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: Send + Sync + 'static {
+pub trait Ledger: AccessLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.

@@ -2,17 +2,30 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{Args, Parser};
 
-use super::{LogFormat, Settings, WorkerDevice};
+use super::{Access, LogFormat, Settings, WorkerDevice};
+use crate::offline::Command;
 
 /// The GuardSplat server: takes jobs over gRPC, keeps them, and gives them to workers.
 ///
 /// Settings come from, in this order: defaults, a file, environment variables (GUARDSPLAT_ and the setting's name in
 /// capitals), flags. The master key is taken from GUARDSPLAT_MASTER_KEY (64 hexadecimal digits), the file that
 /// --master-key-file names, or master.key in the data folder, which is made at the first start.
-#[derive(Clone, Debug, Default, Parser)]
+#[derive(Clone, Debug, Parser)]
 #[command(name = "guardsplat-server", version, args_override_self = true)]
+pub struct Arguments {
+    /// Settings.
+    #[command(flatten)]
+    pub flags: Flags,
+    /// What to do instead of serving.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+// No comment for people here: clap would put it in place of the program's.
+#[allow(missing_docs)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct Flags {
     /// Settings file [default: /etc/guardsplat/server.toml, if it is there]
     #[arg(long, value_name = "FILE")]
@@ -20,6 +33,12 @@ pub struct Flags {
     /// Address and port to listen on; port 0 takes any that is free [default: 127.0.0.1:50051]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
+    /// Who may call: anybody, or whoever shows a token [default: open]
+    #[arg(long, value_name = "WHO")]
+    pub access: Option<Access>,
+    /// Whether other machines may reach a server that is open to anybody [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub allow_open_network: Option<bool>,
     /// Folder of everything that is kept [default: guardsplat-data]
     #[arg(long, value_name = "FOLDER")]
     pub data_dir: Option<PathBuf>,
@@ -77,6 +96,8 @@ impl Flags {
         let Self {
             config: _,
             listen,
+            access,
+            allow_open_network,
             data_dir,
             max_artifact_bytes,
             max_queued_jobs,
@@ -95,6 +116,8 @@ impl Flags {
             log_filter,
         } = self;
         set(&mut settings.listen, listen);
+        set(&mut settings.access, access);
+        set(&mut settings.allow_open_network, allow_open_network);
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use tracing_subscriber::EnvFilter;
 
-use super::{Settings, SettingsError};
+use super::{Access, Settings, SettingsError};
 
 const DAY: u64 = 24 * 60 * 60;
 
@@ -37,6 +37,7 @@ impl Settings {
                 reason: format!("{:e} is not between 1e-30 and 0.1", self.false_positive_rate),
             });
         }
+        self.check_reach()?;
         not_empty("data_dir", &self.data_dir)?;
         for (field, path) in [
             ("worker_binary", &self.worker_binary),
@@ -59,6 +60,22 @@ impl Settings {
             reason: error.to_string(),
         })?;
         Ok(())
+    }
+
+    /// Refuses to be open to a network by oversight.
+    fn check_reach(&self) -> Result<(), SettingsError> {
+        let open = self.access == Access::Open && !self.listen.ip().is_loopback();
+        if !open || self.allow_open_network {
+            return Ok(());
+        }
+        Err(SettingsError::Invalid {
+            field: "listen",
+            reason: format!(
+                "{} can be reached from other machines, and access = \"open\" lets anybody in; set access = \"tokens\", \
+                 or allow_open_network = true where the network keeps strangers out",
+                self.listen
+            ),
+        })
     }
 }
 

@@ -12,7 +12,7 @@ use secrecy::SecretString;
 use serde::{Deserialize, Serialize};
 
 pub use error::SettingsError;
-pub use flags::Flags;
+pub use flags::{Arguments, Flags};
 pub use layers::{load, parse};
 
 /// Everything that can be set. `deploy/guardsplat-server.toml` says what each is for.
@@ -21,6 +21,10 @@ pub use layers::{load, parse};
 pub struct Settings {
     /// Where the server listens.
     pub listen: SocketAddr,
+    /// Who may call.
+    pub access: Access,
+    /// Whether other machines may reach a server that asks nobody for a token.
+    pub allow_open_network: bool,
     /// Folder of everything that is kept.
     pub data_dir: PathBuf,
     /// Most bytes of an artifact.
@@ -56,6 +60,16 @@ pub struct Settings {
     /// The master key, from the environment only: neither a file of settings nor a flag is a place for a secret.
     #[serde(skip)]
     pub master_key: Option<SecretString>,
+}
+
+/// Who may call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Access {
+    /// Anybody who can reach the server.
+    Open,
+    /// Whoever shows a token.
+    Tokens,
 }
 
 /// What the embedded worker computes on.
@@ -95,6 +109,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
+            access: Access::Open,
+            allow_open_network: false,
             data_dir: "guardsplat-data".into(),
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,

@@ -14,9 +14,9 @@ fn layers(file: &str, variables: &[(&str, &str)], flags: &[&str]) -> Result<Sett
     let path = NamedTempFile::with_suffix(".toml").unwrap();
     fs::write(&path, file).unwrap();
     let config = path.path().to_str().unwrap();
-    let flags = Flags::try_parse_from(["guardsplat-server", "--config", config].iter().chain(flags)).unwrap();
+    let arguments = Arguments::try_parse_from(["guardsplat-server", "--config", config].iter().chain(flags)).unwrap();
     load(
-        flags,
+        arguments.flags,
         variables
             .iter()
             .map(|(name, value)| (name.to_string(), value.to_string())),
@@ -64,6 +64,8 @@ fn each_layer_overrides_the_one_before() {
 fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
+        ("access", "tokens"),
+        ("allow_open_network", "true"),
         ("data_dir", "/data"),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
@@ -87,7 +89,7 @@ fn every_setting_can_be_set_everywhere() {
         all.as_object().unwrap().len(),
         "a setting is missing in this test"
     );
-    let flags = Flags::command();
+    let flags = Arguments::command();
     assert_eq!(
         flags.get_arguments().filter(|a| a.get_id() != "config").count(),
         values.len()
@@ -97,7 +99,7 @@ fn every_setting_can_be_set_everywhere() {
         let flag = format!("--{}", name.replace('_', "-"));
         let by_variable = layers("", &[(&variable, value)], &[]).unwrap();
         let by_flag = layers("", &[], &[&flag, value]).unwrap();
-        let quoted = if value.parse::<u64>().is_ok() || value == "false" {
+        let quoted = if value.parse::<u64>().is_ok() || value.parse::<bool>().is_ok() {
             value.into()
         } else {
             format!("{value:?}")
@@ -161,6 +163,8 @@ fn variables_of_others_do_not_matter() {
     let variables = [
         ("GUARDSPLAT_HOME", "/home"),
         ("GUARDSPLAT_SERVER", "http://localhost:1"),
+        ("GUARDSPLAT_TOKEN", "gst_a_b"),
+        ("GUARDSPLAT_TOKEN_FILE", "/token"),
         ("GUARDSPLAT_SERVICE_HOST", "10.0.0.1"),
         ("GUARDSPLAT_PORT_50051_TCP_ADDR", "10.0.0.1"),
         ("GUARDSPLAT_SERVER_PORT", "tcp://10.0.0.1:50051"),
@@ -213,6 +217,23 @@ fn bad_values_are_told_with_setting_and_limit() {
 }
 
 #[test]
+fn nobody_is_open_to_a_network_by_oversight() {
+    for address in ["0.0.0.0:50051", "[::]:50051", "192.0.2.7:50051"] {
+        let listen = ["--listen", address];
+        let text = error("", &[], &listen);
+        assert!(
+            text.starts_with("setting listen: ") && text.contains("allow_open_network"),
+            "{text}"
+        );
+        layers("access = \"tokens\"", &[], &listen).unwrap();
+        layers("allow_open_network = true", &[], &listen).unwrap();
+    }
+    for address in ["127.0.0.2:1", "[::1]:0"] {
+        layers("", &[], &["--listen", address]).unwrap();
+    }
+}
+
+#[test]
 fn a_file_that_is_missing_or_no_toml_is_named() {
     let flags = Flags {
         config: Some("/nowhere/server.toml".into()),
@@ -240,13 +261,13 @@ fn the_master_key_is_not_shown() {
 
 #[test]
 fn the_command_line_is_sound() {
-    Flags::command().debug_assert();
+    Arguments::command().debug_assert();
 }
 
 #[test]
 fn help_tells_the_defaults() {
     let defaults = serde_json::to_value(Settings::default()).unwrap();
-    let command = Flags::command();
+    let command = Arguments::command();
     for (name, value) in defaults.as_object().unwrap() {
         let flag = command.get_arguments().find(|flag| flag.get_id() == name.as_str());
         let help = flag

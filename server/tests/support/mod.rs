@@ -122,6 +122,27 @@ impl Bench {
         (output.status, last)
     }
 
+    /// Runs the program to its end: exit status, standard output and standard error.
+    pub async fn says(&self, arguments: &[&str]) -> (ExitStatus, String, String) {
+        let output = timeout(SOON, self.command(arguments).stderr(Stdio::piped()).output()).await;
+        let output = output.unwrap().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (output.status, text(output.stdout), text(output.stderr))
+    }
+
+    /// All files that the server keeps.
+    pub fn kept(&self) -> Vec<PathBuf> {
+        let mut folders = vec![self.data()];
+        let mut files = Vec::new();
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() { &mut folders } else { &mut files }.push(path);
+            }
+        }
+        files
+    }
+
     pub async fn start(&self) -> Server {
         self.start_as(&[]).await
     }

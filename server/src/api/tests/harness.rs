@@ -16,6 +16,7 @@ use guardsplat_proto::v1::{
     LeaseJobRequest, LeaseJobResponse, OutputMetadata, UploadArtifactRequest, UploadMetadata, UploadOutputRequest,
     VerifySpec, upload_artifact_request, upload_output_request,
 };
+use secrecy::ExposeSecret;
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 use tokio::net::TcpListener;
@@ -25,9 +26,10 @@ use tonic::transport::Channel;
 use tonic::{Code, Response, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-use crate::api::{Api, Limits, housekeeping, serve};
+use crate::access::{self, Scope};
+use crate::api::{Api, Guard, Limits, housekeeping, serve};
 use crate::artifacts::ArtifactStore;
-use crate::ledger::SqliteLedger;
+use crate::ledger::{AccessLedger, NewToken, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 
@@ -55,10 +57,15 @@ impl Server {
     }
 
     pub async fn with(limits: Limits) -> Self {
-        Self::in_folder(TempDir::new().unwrap(), limits).await
+        Self::in_folder(TempDir::new().unwrap(), limits, false).await
     }
 
-    async fn in_folder(folder: TempDir, limits: Limits) -> Self {
+    /// One that asks for tokens.
+    pub async fn with_tokens() -> Self {
+        Self::in_folder(TempDir::new().unwrap(), Limits::default(), true).await
+    }
+
+    async fn in_folder(folder: TempDir, limits: Limits, tokens: bool) -> Self {
         let ledger = Arc::new(SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap());
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
@@ -68,7 +75,13 @@ impl Server {
         let address = format!("http://{}", listener.local_addr().unwrap());
         let (end, ended) = oneshot::channel();
         let shutdown = async { ended.await.unwrap_or_default() };
-        let served = tokio::spawn(serve(api.routes().unwrap(), listener, shutdown));
+        let guard = match tokens {
+            true => Guard::tokens(ledger.clone(), None),
+            false => Guard::open(),
+        };
+        let (_, health) = tonic_health::server::health_reporter();
+        let routes = api.routes().unwrap().add_service(health);
+        let served = tokio::spawn(serve(routes, guard, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
         let channel = Channel::from_shared(address).unwrap().connect_lazy();
         Self {
@@ -102,7 +115,27 @@ impl Server {
         self.housekeeper.await.unwrap();
         self.ledger.close().await;
         tokio::time::sleep(absence).await;
-        Self::in_folder(self.folder, limits).await
+        Self::in_folder(self.folder, limits, false).await
+    }
+
+    /// A token of a project that is good for these.
+    pub async fn token(&self, project: &str, scopes: &[Scope]) -> String {
+        self.token_until(project, scopes, None).await
+    }
+
+    /// One that ends at a time.
+    pub async fn token_until(&self, project: &str, scopes: &[Scope], expire_time: Option<i64>) -> String {
+        let fresh = access::fresh().unwrap();
+        let new = NewToken {
+            id: fresh.id,
+            hash: fresh.hash,
+            display_name: String::new(),
+            project: project.into(),
+            scopes: scopes.iter().copied().collect(),
+            expire_time,
+        };
+        self.ledger.create_token(new, 0).await.unwrap();
+        fresh.text.expose_secret().to_owned()
     }
 
     pub fn ledger(&self) -> Arc<SqliteLedger> {

@@ -1,6 +1,8 @@
 //! The API over a real socket, with a real ledger and a real folder, called through generated clients.
+mod access;
 mod admission;
 mod artifacts;
+mod calls;
 mod claims;
 mod harness;
 mod housekeeping;

@@ -2,6 +2,7 @@
 //!
 //! `conformance_suite!(factory)` makes a test of each; a function here that the macro doesn't name is dead code, which
 //! the compiler reports.
+mod access;
 mod artifacts;
 mod attempts;
 mod cancelling;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 
 use super::Ledger;
 
+pub(crate) use access::*;
 pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;

@@ -1,4 +1,5 @@
 //! The ledger in a SQLite file: one writer that commits in groups, readers beside it (WAL).
+mod access;
 mod artifacts;
 mod commitments;
 mod jobs;

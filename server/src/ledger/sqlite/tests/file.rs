@@ -133,6 +133,7 @@ async fn a_file_of_the_first_version_is_taken_along() {
     for statement in [
         "ALTER TABLE jobs DROP COLUMN completed_token",
         "ALTER TABLE jobs DROP COLUMN completed_fingerprint",
+        "DROP TABLE tokens",
         "DROP TABLE commitments",
         "DROP TABLE assets",
         "DROP TABLE owners",

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use sqlx::sqlite::SqliteSynchronous;
 use tempfile::TempDir;
 
-use super::super::conformance::{Factory, conformance_suite, model};
+use super::super::conformance::{Factory, access_suite, conformance_suite, model};
 use super::super::{Ledger, SqliteLedger};
 use super::open;
 
@@ -39,6 +39,7 @@ impl Factory for Folder {
 }
 
 conformance_suite!(Folder::new());
+access_suite!(Folder::new());
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]

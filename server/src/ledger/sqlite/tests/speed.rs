@@ -7,7 +7,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{Ledger, NewJob};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
-use super::super::{commitments, registry};
+use super::super::{access, commitments, registry};
 use super::Folder;
 use super::file::raw;
 
@@ -37,6 +37,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (registry::OF_BOTH, "=? AND (create_time,id)<"),
         (registry::CANDIDATES, "(key_id=? AND payload>?)"),
         (registry::LAST_PAYLOAD, "(key_id=?)"),
+        (access::OF_HASH, "(hash=?)"),
+        (
+            access::OF_PROJECT,
+            "INDEX tokens_by_project (project=? AND (create_time,id)<",
+        ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
     for (statement, index) in by_index {
