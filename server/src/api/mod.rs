@@ -37,6 +37,7 @@ mod listen;
 mod message;
 mod names;
 mod output;
+mod own;
 mod page;
 mod problems;
 mod progress;

@@ -1,7 +1,7 @@
 //! What the ledger keeps of tokens: a trait of its own beside [`super::Ledger`], which has it as a supertrait.
 use uuid::Uuid;
 
-use super::Result;
+use super::{ArtifactId, Result};
 use crate::access::Scopes;
 
 /// Name of a token.
@@ -71,6 +71,9 @@ pub trait AccessLedger: Send + Sync + 'static {
     /// # Errors
     /// `NotFound`.
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow>;
+
+    /// Whether a running job reads this artifact.
+    async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool>;
 
     /// Notes that a token is in use; nothing where it is gone. The time never goes back.
     async fn touch_token(&self, id: TokenId, now: i64) -> Result<()>;

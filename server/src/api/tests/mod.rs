@@ -10,6 +10,7 @@ mod jobs;
 mod key_states;
 mod keys;
 mod lists;
+mod projects;
 mod registry;
 mod submissions;
 mod transport;

@@ -1,10 +1,16 @@
-//! What every ledger must do with tokens.
+//! What every ledger must do with tokens and projects.
+use std::sync::Arc;
+
+use guardsplat_commitment::SigningKey;
 use uuid::Uuid;
 
-use super::super::access::{NewToken, TokenRow};
-use super::super::{Ledger, LedgerError};
+use super::super::{
+    ArtifactId, AssetFilter, Completion, JobKind, JobState, Ledger, LedgerError, NewAsset, NewJob, NewKey, NewOwner,
+    NewToken, Origin, TokenRow,
+};
 use super::Factory;
-use super::fixture::{at, refused};
+use super::fixture::*;
+use super::outputs::make_key;
 use crate::access::{Scope, Scopes};
 
 /// Makes a test of each function here, as `conformance_suite!` does of the others.
@@ -15,6 +21,12 @@ macro_rules! access_suite {
             a_revoked_token_stays_revoked
             the_use_of_a_token_is_noted
             tokens_come_in_pages_of_their_project
+            lists_are_of_a_project
+            a_job_names_what_is_of_its_project
+            what_a_job_makes_is_of_its_project
+            an_asset_names_what_is_of_its_project
+            a_request_is_of_a_project
+            what_a_running_job_reads_is_known
         );
     };
 }
@@ -126,4 +138,202 @@ pub async fn tokens_come_in_pages_of_their_project(factory: &dyn Factory) {
     assert_eq!(found, expected);
     assert_eq!(ledger.list_tokens(None, None, 100).await.unwrap().len(), 10);
     assert_eq!(ledger.list_tokens(Some("nobody"), None, 100).await.unwrap(), []);
+}
+
+const THEIRS: &str = "theirs";
+
+/// An upload of another project.
+async fn their_upload(ledger: &dyn Ledger, now: i64) -> ArtifactId {
+    let origin = Origin::Upload { project: THEIRS.into() };
+    let id = ledger
+        .create_artifact(new_artifact(origin, false), now)
+        .await
+        .unwrap()
+        .id;
+    let row = ledger.artifact_ready(id, None, now).await.unwrap();
+    assert_eq!(row.project, THEIRS);
+    id
+}
+
+fn their_job() -> NewJob {
+    NewJob {
+        project: THEIRS.into(),
+        ..new_job()
+    }
+}
+
+pub async fn lists_are_of_a_project(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let ours = queue(&*ledger, at(0)).await;
+    let theirs = ledger.create_job(their_job(), at(1)).await.unwrap();
+    assert_eq!((theirs.project.as_str(), theirs.queue_position), (THEIRS, Some(1)));
+    for states in [&[][..], &[JobState::Queued]] {
+        for (project, id) in [(OURS, ours), (THEIRS, theirs.id)] {
+            let jobs = ledger.list_jobs(project, states, None, 10).await.unwrap();
+            assert_eq!(jobs.iter().map(|job| job.id).collect::<Vec<_>>(), [id]);
+        }
+        assert_eq!(ledger.list_jobs("nobody", states, None, 10).await.unwrap(), []);
+    }
+    let owner = |project: &str| NewOwner {
+        id: Uuid::now_v7(),
+        project: project.into(),
+        display_name: "studio".into(),
+        request_id: None,
+    };
+    let ours = ledger.create_owner(owner(OURS), at(0)).await.unwrap();
+    let theirs = ledger.create_owner(owner(THEIRS), at(0)).await.unwrap();
+    assert_eq!(ledger.list_owners(OURS, None, 10).await.unwrap(), [ours]);
+    assert_eq!(ledger.list_owners(THEIRS, None, 10).await.unwrap(), [theirs]);
+}
+
+pub async fn a_job_names_what_is_of_its_project(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let key = make_key(&*ledger, at(0)).await.1.id;
+    let (ours, theirs) = (upload(&*ledger, at(0)).await, their_upload(&*ledger, at(0)).await);
+    let job = |project: &str, input, key| NewJob {
+        project: project.into(),
+        inputs: vec![input],
+        key,
+        ..new_job()
+    };
+    for (new, kind) in [
+        (job(OURS, theirs, None), "artifact"),
+        (job(THEIRS, ours, None), "artifact"),
+        (job(THEIRS, theirs, Some(key)), "key"),
+    ] {
+        match ledger.create_job(new, at(1)).await {
+            Err(LedgerError::NotFound { kind: told, .. }) => assert_eq!(told, kind),
+            other => panic!("{other:?}"),
+        }
+    }
+    ledger.create_job(job(OURS, ours, Some(key)), at(1)).await.unwrap();
+    ledger.create_job(job(THEIRS, theirs, None), at(1)).await.unwrap();
+}
+
+pub async fn what_a_job_makes_is_of_its_project(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let job = NewJob {
+        kind: JobKind::CreateKey,
+        ..their_job()
+    };
+    let id = ledger.create_job(job, at(0)).await.unwrap().id;
+    let lease = claim_of(&*ledger, id, at(1)).await;
+    let seen = output(&*ledger, &lease, false, at(2)).await;
+    let secret = output(&*ledger, &lease, true, at(2)).await;
+    let key = NewKey {
+        id: Uuid::now_v7(),
+        display_name: String::new(),
+        bits: 8,
+        clip: "clip".into(),
+        clip_sha256: "ab".repeat(32),
+        seeded: false,
+        artifact: secret,
+    };
+    let name = key.id;
+    let completion = Completion {
+        key: Some(key),
+        ..completion(1, &[seen])
+    };
+    ledger.complete(id, &lease.token, completion, at(3)).await.unwrap();
+    for id in [seen, secret] {
+        assert_eq!(ledger.get_any_artifact(id).await.unwrap().unwrap().project, THEIRS);
+    }
+    assert_eq!(ledger.get_key(name).await.unwrap().unwrap().project, THEIRS);
+    assert_eq!(ledger.list_keys(OURS, None, 10).await.unwrap(), []);
+    assert_eq!(ledger.list_keys(THEIRS, None, 10).await.unwrap().len(), 1);
+}
+
+pub async fn an_asset_names_what_is_of_its_project(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let signer = Arc::new(SigningKey::from_seed(&[7; 32]).unwrap());
+    let key = make_key(&*ledger, at(0)).await.1.id;
+    let mut owners = Vec::new();
+    for project in [OURS, THEIRS] {
+        let new = NewOwner {
+            id: Uuid::now_v7(),
+            project: project.into(),
+            display_name: "studio".into(),
+            request_id: None,
+        };
+        owners.push(ledger.create_owner(new, at(0)).await.unwrap().id);
+    }
+    let asset = |project: &str, owner| NewAsset {
+        id: Uuid::now_v7(),
+        project: project.into(),
+        commitment: Uuid::now_v7(),
+        owner,
+        display_name: "a robot".into(),
+        sha256: [3; 32],
+        artifact: None,
+        key,
+        sealed_nonce: vec![1],
+        nonce_hash: [4; 32],
+        request_id: None,
+    };
+    for (new, kind) in [(asset(OURS, owners[1]), "owner"), (asset(THEIRS, owners[1]), "key")] {
+        match ledger.create_asset(new, signer.clone(), at(1)).await {
+            Err(LedgerError::NotFound { kind: told, .. }) => assert_eq!(told, kind),
+            other => panic!("{other:?}"),
+        }
+    }
+    let row = ledger
+        .create_asset(asset(OURS, owners[0]), signer, at(1))
+        .await
+        .unwrap();
+    assert_eq!(row.project, OURS);
+    let filter = AssetFilter {
+        owner: Some(owners[0]),
+        key: None,
+    };
+    for filter in [AssetFilter::default(), filter] {
+        assert_eq!(ledger.list_assets(OURS, filter, None, 5).await.unwrap(), [row.clone()]);
+        assert_eq!(ledger.list_assets(THEIRS, filter, None, 5).await.unwrap(), []);
+    }
+    assert_eq!(ledger.list_commitments(OURS, 0, 5).await.unwrap().len(), 1);
+    assert_eq!(ledger.list_commitments(THEIRS, 0, 5).await.unwrap(), []);
+    assert!(ledger.head(OURS).await.unwrap().is_some());
+    assert_eq!(ledger.head(THEIRS).await.unwrap(), None);
+}
+
+pub async fn a_request_is_of_a_project(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let request_id = Some(Uuid::new_v4());
+    let job = |project: &str| NewJob {
+        project: project.into(),
+        request_id,
+        ..new_job()
+    };
+    let first = ledger.create_job(job(OURS), at(0)).await.unwrap();
+    refused!(
+        ledger.create_job(job(THEIRS), at(1)).await,
+        LedgerError::RequestIdReused(_)
+    );
+    assert_eq!(ledger.create_job(job(OURS), at(1)).await.unwrap().id, first.id);
+    let owner = |project: &str| NewOwner {
+        id: Uuid::now_v7(),
+        project: project.into(),
+        display_name: "studio".into(),
+        request_id,
+    };
+    ledger.create_owner(owner(OURS), at(0)).await.unwrap();
+    refused!(
+        ledger.create_owner(owner(THEIRS), at(1)).await,
+        LedgerError::RequestIdReused(_)
+    );
+}
+
+pub async fn what_a_running_job_reads_is_known(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let (input, other) = (upload(&*ledger, at(0)).await, upload(&*ledger, at(0)).await);
+    let new = NewJob {
+        inputs: vec![input],
+        ..new_job()
+    };
+    let id = ledger.create_job(new, at(0)).await.unwrap().id;
+    let read = async |id| ledger.is_being_read(id).await.unwrap();
+    assert!(!read(input).await, "the job waits");
+    let lease = claim_of(&*ledger, id, at(1)).await;
+    assert_eq!((read(input).await, read(other).await), (true, false));
+    complete(&*ledger, &lease, &[], at(2)).await;
+    assert!(!read(input).await, "the job is over");
 }

@@ -4,7 +4,7 @@ use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
 use super::super::access::{AccessLedger, NewToken, TokenId, TokenRow};
-use super::super::{LedgerError, Result};
+use super::super::{ArtifactId, LedgerError, Result};
 use super::{SqliteLedger, rows};
 use crate::access::Scopes;
 
@@ -52,6 +52,15 @@ impl AccessLedger for SqliteLedger {
 
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow> {
         self.writer.run(move |db| Box::pin(revoke(db, id, now))).await
+    }
+
+    async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool> {
+        let query = sqlx::query(
+            "SELECT 1 FROM job_inputs i JOIN jobs j ON j.id = i.job_id WHERE i.artifact_id = ?1 AND j.state = 2 LIMIT 1",
+        );
+        let query = query.bind(artifact.as_bytes().as_slice());
+        let found = query.fetch_optional(&mut *self.readers.acquire().await?).await?;
+        Ok(found.is_some())
     }
 
     async fn touch_token(&self, id: TokenId, now: i64) -> Result<()> {

@@ -67,5 +67,10 @@ fn migrator() -> Migrator {
             include_str!("../../../migrations/sqlite/0003_registry.sql"),
         ),
         step(4, "tokens", include_str!("../../../migrations/sqlite/0004_tokens.sql")),
+        step(
+            5,
+            "projects",
+            include_str!("../../../migrations/sqlite/0005_projects.sql"),
+        ),
     ])
 }
