@@ -127,6 +127,26 @@ pub enum Error {
         /// When to try again.
         retry_after: Duration,
     },
+    /// Too many calls of a class in too short a time.
+    #[error("{per_minute} {what} a minute are taken from one caller; try again in {} s", .retry_after.as_secs_f64().ceil())]
+    TooManyCalls {
+        /// The class.
+        what: &'static str,
+        /// Most of it in a minute.
+        per_minute: u32,
+        /// When there is room for one more.
+        retry_after: Duration,
+    },
+    /// A project that has as much as it may have.
+    #[error("project {project} has used up its {limit} {what}")]
+    QuotaUsedUp {
+        /// Of what.
+        what: &'static str,
+        /// The project.
+        project: String,
+        /// How much it may have.
+        limit: u64,
+    },
     /// A scene that takes more memory than a job may.
     #[error("{}", does_not_fit(.name, *.gaussians, *.degree, [*.needed, *.likely, *.limit]))]
     SceneDoesNotFit {

@@ -13,7 +13,7 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::access;
-use crate::api::{self, Api, Guard, Limits};
+use crate::api::{self, Api, Guard, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
@@ -73,8 +73,10 @@ impl Server {
             true => Some(WorkerProcess::new(&settings, address)?),
             false => None,
         };
+        let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
+        let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
         let guard = match settings.access {
-            Access::Open => Guard::open(),
+            Access::Open => Guard::open(api.meter()),
             Access::Tokens => {
                 // Good for as long as this process lives, and kept nowhere.
                 let own = worker.as_ref().map(|_| access::fresh()).transpose()?;
@@ -82,11 +84,9 @@ impl Server {
                 if let (Some(worker), Some(own)) = (&mut worker, own) {
                     worker.token = Some(own.text);
                 }
-                Guard::tokens(ledger.clone(), hash)
+                Guard::tokens(api.meter(), ledger.clone(), hash)
             }
         };
-        let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
-        let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,
@@ -174,6 +174,13 @@ fn limits(settings: &Settings) -> Limits {
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
         false_positive_rate: settings.false_positive_rate,
+        max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),
+        max_bytes_of_project: Some(settings.max_artifact_bytes_per_project).filter(|&limit| limit > 0),
+        rates: Rates {
+            submissions: settings.max_submissions_per_minute,
+            claims: settings.max_claims_per_minute,
+            calls: settings.max_calls_per_minute,
+        },
         abandoned_after: settings.abandoned_after(),
     }
 }

@@ -1,4 +1,6 @@
 //! Who calls: the project that everything the call makes belongs to, and what it may do.
+use std::net::IpAddr;
+
 use uuid::Uuid;
 
 use super::{Scope, Scopes};
@@ -19,15 +21,18 @@ pub struct Caller {
     pub scopes: Scopes,
     /// The token it showed; none where none is asked for.
     pub token: Option<Uuid>,
+    /// Where it calls from, if that is known.
+    pub address: Option<IpAddr>,
 }
 
 impl Caller {
     /// Anybody, where no tokens are asked for: all of the one project is theirs.
-    pub fn anybody() -> Self {
+    pub fn anybody(address: Option<IpAddr>) -> Self {
         Self {
             project: DEFAULT_PROJECT.to_owned(),
             scopes: Scopes::all(),
             token: None,
+            address,
         }
     }
 
@@ -35,7 +40,7 @@ impl Caller {
     pub fn own_worker() -> Self {
         Self {
             scopes: [Scope::Worker].into_iter().collect(),
-            ..Self::anybody()
+            ..Self::anybody(None)
         }
     }
 
@@ -79,7 +84,7 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_told() {
-        assert!(Caller::anybody().must(Scope::Admin).is_ok());
+        assert!(Caller::anybody(None).must(Scope::Admin).is_ok());
         let error = Caller::own_worker().must(Scope::Admin).unwrap_err().to_string();
         assert_eq!(error, "the token lacks the scope admin");
     }

@@ -20,9 +20,12 @@ impl Api {
         let limit = self.limits().max_queued;
         let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
         let memory = self.limits().max_job_memory.zip(scene_of(submission));
-        if !full && memory.is_none() || self.is_known(project, submission).await? {
+        let quotas = [self.limits().max_queued_of_project, self.limits().max_bytes_of_project];
+        let unlimited = !full && memory.is_none() && quotas == [None, None];
+        if unlimited || self.is_known(project, submission).await? {
             return Ok(());
         }
+        self.room_for_job(project, submission.kind).await?;
         if full {
             return Err(Error::QueueFull {
                 limit,

@@ -80,6 +80,7 @@ impl Api {
     ) -> Result<ArtifactRow, Status> {
         let metadata = incoming.metadata().await?;
         let announced = upload::announced("metadata", &metadata)?;
+        self.room_for_bytes(&project, announced.size).await?;
         let id = Uuid::now_v7();
         let path = ArtifactPath::upload(id);
         // The writer comes first: it refuses what is too large. It leaves nothing if it is dropped.

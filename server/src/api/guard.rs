@@ -1,6 +1,7 @@
-//! Who may come in: one layer before all services that looks up what a call needs by its path, and who makes it by its
-//! token. No service sees a request that has not passed here, and none looks at a token itself.
+//! Who may come in, and how often: one layer before all services that looks up what a call needs by its path, and who
+//! makes it by its token. No service sees a request that has not passed here, and none looks at a token itself.
 use std::convert::Infallible;
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
@@ -8,9 +9,11 @@ use futures::future::BoxFuture;
 use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::http::{HeaderMap, Request, Response};
+use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
 use tower::{Layer, Service};
 
 use super::clock;
+use super::meter::{Class, Meter, Payer};
 use super::status::chain;
 use crate::access::{self, Caller, Need, Scope};
 use crate::error::{Error, Result};
@@ -27,6 +30,7 @@ const MAX_TOKEN_BYTES: usize = 256;
 #[derive(Clone)]
 pub struct Guard {
     rule: Rule,
+    meter: Arc<Meter>,
 }
 
 #[derive(Clone)]
@@ -42,34 +46,38 @@ enum Rule {
 
 impl Guard {
     /// One that lets everybody in.
-    pub fn open() -> Self {
-        Self { rule: Rule::Open }
+    pub fn open(meter: Arc<Meter>) -> Self {
+        Self {
+            rule: Rule::Open,
+            meter,
+        }
     }
 
     /// One that asks for tokens. `own_worker` is the hash of a token that stands in no ledger, good for a worker.
-    pub fn tokens(ledger: Arc<dyn Ledger>, own_worker: Option<[u8; 32]>) -> Self {
+    pub fn tokens(meter: Arc<Meter>, ledger: Arc<dyn Ledger>, own_worker: Option<[u8; 32]>) -> Self {
         Self {
             rule: Rule::Tokens { ledger, own_worker },
+            meter,
         }
     }
 
     /// Who makes a call, if they may; none for calls that anybody may make.
-    async fn admit(&self, path: &str, headers: &HeaderMap) -> Result<Option<Caller>> {
+    async fn admit(&self, path: &str, headers: &HeaderMap, address: Option<IpAddr>) -> Result<Option<Caller>> {
         let need = access::need(path);
         if need == Some(Need::Nothing) {
             return Ok(None);
         }
-        let caller = match &self.rule {
-            Rule::Open => Caller::anybody(),
-            Rule::Tokens { ledger, own_worker } => {
-                let hash = access::hash(token(headers)?);
-                if *own_worker == Some(hash) {
-                    Caller::own_worker()
-                } else {
-                    known(ledger, &hash).await?
-                }
+        let caller = match self.caller(headers, address).await {
+            Ok(caller) => caller,
+            Err(refusal) => {
+                // Who tries tokens out is slowed down too.
+                self.meter.count(Class::Call, &Payer::at(address))?;
+                return Err(refusal);
             }
         };
+        if let Some(class) = Class::of(path) {
+            self.meter.count(class, &payer(&caller))?;
+        }
         match need {
             // Only those who may come in at all hear that there is nothing.
             None => Err(Error::NoSuchCall),
@@ -81,6 +89,39 @@ impl Guard {
             Some(_) => Ok(Some(caller)),
         }
     }
+
+    async fn caller(&self, headers: &HeaderMap, address: Option<IpAddr>) -> Result<Caller> {
+        match &self.rule {
+            Rule::Open => Ok(Caller::anybody(address)),
+            Rule::Tokens { ledger, own_worker } => {
+                let hash = access::hash(token(headers)?);
+                if *own_worker == Some(hash) {
+                    return Ok(Caller::own_worker());
+                }
+                known(ledger, &hash, address).await
+            }
+        }
+    }
+}
+
+/// Whose calls are counted together with this caller's.
+pub(super) fn payer(caller: &Caller) -> Payer {
+    match caller.token {
+        Some(_) => Payer::Project(caller.project.clone()),
+        None => Payer::at(caller.address),
+    }
+}
+
+/// Where a request comes from.
+fn address<B>(request: &Request<B>) -> Option<IpAddr> {
+    let extensions = request.extensions();
+    let plain = extensions.get::<TcpConnectInfo>();
+    let info = plain.or_else(|| {
+        extensions
+            .get::<TlsConnectInfo<TcpConnectInfo>>()
+            .map(TlsConnectInfo::get_ref)
+    });
+    info.and_then(TcpConnectInfo::remote_addr).map(|address| address.ip())
 }
 
 /// The token that came with a call.
@@ -96,7 +137,7 @@ fn token(headers: &HeaderMap) -> Result<&str> {
 }
 
 /// Whose token has this hash, if it may still be used.
-async fn known(ledger: &Arc<dyn Ledger>, hash: &[u8; 32]) -> Result<Caller> {
+async fn known(ledger: &Arc<dyn Ledger>, hash: &[u8; 32], address: Option<IpAddr>) -> Result<Caller> {
     let row = ledger.find_token(hash).await?.ok_or(Error::TokenUnknown)?;
     let now = clock::now();
     if row.revoke_time.is_some() {
@@ -110,6 +151,7 @@ async fn known(ledger: &Arc<dyn Ledger>, hash: &[u8; 32]) -> Result<Caller> {
         project: row.project,
         scopes: row.scopes,
         token: Some(row.id),
+        address,
     })
 }
 
@@ -167,7 +209,8 @@ where
         let mut inner = std::mem::replace(&mut self.inner, other);
         let guard = self.guard.clone();
         Box::pin(async move {
-            match guard.admit(request.uri().path(), request.headers()).await {
+            let address = address(&request);
+            match guard.admit(request.uri().path(), request.headers(), address).await {
                 Ok(caller) => {
                     // What the services know of the caller is in the extensions, and nothing of the token goes further.
                     request.headers_mut().remove("authorization");

@@ -9,13 +9,14 @@ use prost::Message as _;
 use tonic::{Request, Response, Status};
 use uuid::Uuid;
 
-use super::guard::caller;
+use super::guard::{caller, payer};
+use super::meter::Class;
 use super::names::Kind;
 use super::submission::{self, Submission};
 use super::{Api, clock, convert, fingerprint, keys, message, own, page, watch};
 use crate::access::Caller;
 use crate::error::{Error, Result};
-use crate::ledger::NewJob;
+use crate::ledger::{JobKind, NewJob};
 
 /// A page ends early rather than come near the largest message that clients read by default.
 const MAX_PAGE_BYTES: usize = 2 << 20;
@@ -77,6 +78,9 @@ impl Api {
             if let Some(claim) = &submission.claim {
                 self.check_claim(project, claim, &key, &submission).await?;
             }
+        }
+        if submission.kind == JobKind::Verify {
+            self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
         self.admit(project, &submission).await?;
         let fingerprint = self.fingerprint(project, &submission).await?;

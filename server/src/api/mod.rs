@@ -35,12 +35,14 @@ mod keys;
 mod lease;
 mod listen;
 mod message;
+mod meter;
 mod names;
 mod output;
 mod own;
 mod page;
 mod problems;
 mod progress;
+mod quota;
 mod refusals;
 mod registry;
 mod status;
@@ -60,6 +62,7 @@ pub use clock::now;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::serve;
+pub use meter::{Meter, Rates};
 pub use text::display_name as check_display_name;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
@@ -80,6 +83,12 @@ pub struct Limits {
     pub upload_idle: Duration,
     /// How often a claim may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
+    /// Jobs of one project that may wait; none for no limit but that of all.
+    pub max_queued_of_project: Option<u64>,
+    /// Bytes of artifacts that one project may have; none for no limit.
+    pub max_bytes_of_project: Option<u64>,
+    /// How often a caller may call.
+    pub rates: Rates,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
 }
@@ -93,6 +102,9 @@ impl Default for Limits {
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
             false_positive_rate: 1e-6,
+            max_queued_of_project: None,
+            max_bytes_of_project: None,
+            rates: Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
         }
     }
@@ -110,6 +122,7 @@ struct Shared {
     master: MasterKey,
     notary: Notary,
     limits: Limits,
+    meter: Arc<Meter>,
     changes: changes::Changes,
     reports: progress::Reports,
 }
@@ -129,6 +142,7 @@ impl Api {
             store,
             master,
             notary,
+            meter: Arc::new(Meter::new(limits.rates)),
             limits,
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
@@ -163,6 +177,11 @@ impl Api {
     /// Workers can still hand back and complete what they have.
     pub fn stop(&self) {
         self.shared.changes.stop();
+    }
+
+    /// What counts calls, for the guard.
+    pub fn meter(&self) -> Arc<Meter> {
+        self.shared.meter.clone()
     }
 
     fn ledger(&self) -> &dyn Ledger {

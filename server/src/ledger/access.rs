@@ -45,6 +45,15 @@ pub struct TokenRow {
     pub revoke_time: Option<i64>,
 }
 
+/// What a project takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Usage {
+    /// Its queued jobs.
+    pub queued_jobs: u64,
+    /// Bytes of its artifacts that are all there, published or not, secret ones too.
+    pub artifact_bytes: u64,
+}
+
 /// What the service keeps of those who may call.
 #[tonic::async_trait]
 pub trait AccessLedger: Send + Sync + 'static {
@@ -71,6 +80,9 @@ pub trait AccessLedger: Send + Sync + 'static {
     /// # Errors
     /// `NotFound`.
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow>;
+
+    /// What a project takes now.
+    async fn usage(&self, project: &str) -> Result<Usage>;
 
     /// Whether a running job reads this artifact.
     async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool>;

@@ -24,7 +24,7 @@ use std::time::Duration;
 use guardsplat_commitment::{Signed, SigningKey};
 use uuid::Uuid;
 
-pub use access::{AccessLedger, NewToken, TokenId, TokenRow};
+pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use error::{LedgerError, Result};
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,

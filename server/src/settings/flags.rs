@@ -48,6 +48,21 @@ pub struct Flags {
     /// Most jobs that may wait [default: 10000]
     #[arg(long, value_name = "JOBS")]
     pub max_queued_jobs: Option<u64>,
+    /// Most jobs of one project that may wait; 0 is no limit but that of all [default: 0]
+    #[arg(long, value_name = "JOBS")]
+    pub max_queued_jobs_per_project: Option<u64>,
+    /// Most bytes of artifacts that one project may have; 0 is no limit [default: 0]
+    #[arg(long, value_name = "BYTES")]
+    pub max_artifact_bytes_per_project: Option<u64>,
+    /// Most jobs, uploads and registrations of one caller in a minute; 0 is no limit [default: 6000]
+    #[arg(long, value_name = "CALLS")]
+    pub max_submissions_per_minute: Option<u32>,
+    /// Most jobs of one caller that verify in a minute; 0 is no limit [default: 6000]
+    #[arg(long, value_name = "JOBS")]
+    pub max_claims_per_minute: Option<u32>,
+    /// Most other calls of one caller in a minute; 0 is no limit [default: 60000]
+    #[arg(long, value_name = "CALLS")]
+    pub max_calls_per_minute: Option<u32>,
     /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
     #[arg(long, value_name = "MEBIBYTES")]
     pub max_job_memory_mebibytes: Option<u64>,
@@ -101,6 +116,11 @@ impl Flags {
             data_dir,
             max_artifact_bytes,
             max_queued_jobs,
+            max_queued_jobs_per_project,
+            max_artifact_bytes_per_project,
+            max_submissions_per_minute,
+            max_claims_per_minute,
+            max_calls_per_minute,
             max_job_memory_mebibytes,
             lease_seconds,
             max_attempts,
@@ -121,6 +141,14 @@ impl Flags {
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
+        set(&mut settings.max_queued_jobs_per_project, max_queued_jobs_per_project);
+        set(
+            &mut settings.max_artifact_bytes_per_project,
+            max_artifact_bytes_per_project,
+        );
+        set(&mut settings.max_submissions_per_minute, max_submissions_per_minute);
+        set(&mut settings.max_claims_per_minute, max_claims_per_minute);
+        set(&mut settings.max_calls_per_minute, max_calls_per_minute);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);

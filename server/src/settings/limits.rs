@@ -13,6 +13,26 @@ impl Settings {
         let numbers = [
             ("max_artifact_bytes", self.max_artifact_bytes, 1, 1 << 40),
             ("max_queued_jobs", self.max_queued_jobs, 1, 1_000_000),
+            (
+                "max_queued_jobs_per_project",
+                self.max_queued_jobs_per_project,
+                0,
+                1_000_000,
+            ),
+            (
+                "max_artifact_bytes_per_project",
+                self.max_artifact_bytes_per_project,
+                0,
+                1 << 60,
+            ),
+            (
+                "max_submissions_per_minute",
+                self.max_submissions_per_minute.into(),
+                0,
+                1_000_000,
+            ),
+            ("max_claims_per_minute", self.max_claims_per_minute.into(), 0, 1_000_000),
+            ("max_calls_per_minute", self.max_calls_per_minute.into(), 0, 1_000_000),
             ("max_job_memory_mebibytes", self.max_job_memory_mebibytes, 0, 1 << 24),
             ("lease_seconds", self.lease_seconds, 1, DAY),
             ("max_attempts", self.max_attempts.into(), 1, 100),

@@ -31,6 +31,16 @@ pub struct Settings {
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
     pub max_queued_jobs: u64,
+    /// Most jobs of one project that may wait; 0 for no limit but that of all.
+    pub max_queued_jobs_per_project: u64,
+    /// Most bytes of artifacts that one project may have; 0 for no limit.
+    pub max_artifact_bytes_per_project: u64,
+    /// Most jobs, uploads and registrations of one caller in a minute; 0 for no limit.
+    pub max_submissions_per_minute: u32,
+    /// Most jobs of one caller that verify in a minute; 0 for no limit.
+    pub max_claims_per_minute: u32,
+    /// Most other calls of one caller in a minute; 0 for no limit.
+    pub max_calls_per_minute: u32,
     /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
     pub max_job_memory_mebibytes: u64,
     /// Seconds until a worker that says nothing is given up.
@@ -114,6 +124,11 @@ impl Default for Settings {
             data_dir: "guardsplat-data".into(),
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
+            max_queued_jobs_per_project: 0,
+            max_artifact_bytes_per_project: 0,
+            max_submissions_per_minute: 6_000,
+            max_claims_per_minute: 6_000,
+            max_calls_per_minute: 60_000,
             max_job_memory_mebibytes: 0,
             lease_seconds: 30,
             max_attempts: 3,

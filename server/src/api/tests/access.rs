@@ -110,7 +110,10 @@ fn the_table_has_the_calls_there_are() {
 async fn a_call_that_nobody_thought_of_is_refused() {
     let server = Server::with_tokens().await;
     let token = server.token("studio", &Scope::ALL).await;
-    for guard in [Guard::open(), Guard::tokens(server.ledger(), None)] {
+    for guard in [
+        Guard::open(server.api.meter()),
+        Guard::tokens(server.api.meter(), server.ledger(), None),
+    ] {
         let inner = service_fn(|_: Request<Body>| async {
             panic!("came in");
             #[allow(unreachable_code)]

@@ -62,7 +62,11 @@ impl Server {
 
     /// One that asks for tokens.
     pub async fn with_tokens() -> Self {
-        Self::in_folder(TempDir::new().unwrap(), Limits::default(), true).await
+        Self::with_tokens_and(Limits::default()).await
+    }
+
+    pub async fn with_tokens_and(limits: Limits) -> Self {
+        Self::in_folder(TempDir::new().unwrap(), limits, true).await
     }
 
     async fn in_folder(folder: TempDir, limits: Limits, tokens: bool) -> Self {
@@ -76,8 +80,8 @@ impl Server {
         let (end, ended) = oneshot::channel();
         let shutdown = async { ended.await.unwrap_or_default() };
         let guard = match tokens {
-            true => Guard::tokens(ledger.clone(), None),
-            false => Guard::open(),
+            true => Guard::tokens(api.meter(), ledger.clone(), None),
+            false => Guard::open(api.meter()),
         };
         let (_, health) = tonic_health::server::health_reporter();
         let routes = api.routes().unwrap().add_service(health);

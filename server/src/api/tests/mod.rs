@@ -9,6 +9,7 @@ mod housekeeping;
 mod jobs;
 mod key_states;
 mod keys;
+mod limits;
 mod lists;
 mod projects;
 mod registry;

@@ -6,7 +6,7 @@ use uuid::Uuid;
 
 use super::super::{
     ArtifactId, AssetFilter, Completion, JobKind, JobState, Ledger, LedgerError, NewAsset, NewJob, NewKey, NewOwner,
-    NewToken, Origin, TokenRow,
+    NewToken, Origin, TokenRow, Usage,
 };
 use super::Factory;
 use super::fixture::*;
@@ -27,6 +27,7 @@ macro_rules! access_suite {
             an_asset_names_what_is_of_its_project
             a_request_is_of_a_project
             what_a_running_job_reads_is_known
+            what_a_project_takes_is_counted
         );
     };
 }
@@ -336,4 +337,32 @@ pub async fn what_a_running_job_reads_is_known(factory: &dyn Factory) {
     assert_eq!((read(input).await, read(other).await), (true, false));
     complete(&*ledger, &lease, &[], at(2)).await;
     assert!(!read(input).await, "the job is over");
+}
+
+pub async fn what_a_project_takes_is_counted(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    let used = async |project: &str| ledger.usage(project).await.unwrap();
+    assert_eq!(used(THEIRS).await, Usage::default());
+    let first = their_upload(&*ledger, at(0)).await;
+    their_upload(&*ledger, at(0)).await;
+    upload(&*ledger, at(0)).await;
+    // One that is on its way counts for nothing yet.
+    let origin = Origin::Upload { project: THEIRS.into() };
+    ledger
+        .create_artifact(new_artifact(origin, false), at(0))
+        .await
+        .unwrap();
+    let job = ledger.create_job(their_job(), at(1)).await.unwrap().id;
+    let both = Usage {
+        queued_jobs: 1,
+        artifact_bytes: 20,
+    };
+    assert_eq!(used(THEIRS).await, both);
+    ledger.delete_artifact(first, at(2)).await.unwrap();
+    claim_of(&*ledger, job, at(2)).await;
+    let less = Usage {
+        queued_jobs: 0,
+        artifact_bytes: 10,
+    };
+    assert_eq!(used(THEIRS).await, less);
 }

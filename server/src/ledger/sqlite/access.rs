@@ -3,7 +3,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
-use super::super::access::{AccessLedger, NewToken, TokenId, TokenRow};
+use super::super::access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 use super::super::{ArtifactId, LedgerError, Result};
 use super::{SqliteLedger, rows};
 use crate::access::Scopes;
@@ -14,6 +14,11 @@ pub(super) const OF_HASH: &str = "SELECT * FROM tokens WHERE hash = ?1";
 /// A page of a project's.
 pub(super) const OF_PROJECT: &str = "SELECT * FROM tokens WHERE project = ?4 AND (create_time, id) < (?1, ?2) \
     ORDER BY create_time DESC, id DESC LIMIT ?3";
+
+/// What a project takes; both from indexes alone.
+pub(super) const USAGE: &str = "SELECT \
+    (SELECT count(*) FROM jobs WHERE project = ?1 AND state = 1) AS queued_jobs, \
+    (SELECT coalesce(sum(size), 0) FROM artifacts WHERE project = ?1 AND state IN (2, 3)) AS artifact_bytes";
 
 /// A page of all; there are few, and only an operator lists them.
 const ALL: &str = "SELECT * FROM tokens WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3";
@@ -52,6 +57,16 @@ impl AccessLedger for SqliteLedger {
 
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow> {
         self.writer.run(move |db| Box::pin(revoke(db, id, now))).await
+    }
+
+    async fn usage(&self, project: &str) -> Result<Usage> {
+        let query = sqlx::query(USAGE).bind(project);
+        let row = query.fetch_one(&mut *self.readers.acquire().await?).await?;
+        let number = |column| Ok::<_, LedgerError>(u64::try_from(row.try_get::<i64, _>(column)?).unwrap_or_default());
+        Ok(Usage {
+            queued_jobs: number("queued_jobs")?,
+            artifact_bytes: number("artifact_bytes")?,
+        })
     }
 
     async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool> {

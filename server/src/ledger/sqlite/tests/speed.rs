@@ -53,6 +53,10 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             access::OF_PROJECT,
             "INDEX tokens_by_project (project=? AND (create_time,id)<",
         ),
+        (
+            access::USAGE,
+            "COVERING INDEX artifacts_by_project (project=? AND state=?)",
+        ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
     for (statement, index) in by_index {
