@@ -11,3 +11,4 @@ pub mod offline;
 pub mod run;
 pub mod secrets;
 pub mod settings;
+pub mod tls;

@@ -3,17 +3,18 @@ mod folder;
 mod health;
 
 use std::io::Write as _;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
+use futures::FutureExt as _;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::access;
-use crate::api::{self, Api, Guard, Limits, Rates};
+use crate::api::{self, Api, Door, Guard, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
@@ -21,6 +22,7 @@ use crate::ledger::SqliteLedger;
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::settings::{Access, Settings};
+use crate::tls;
 use folder::DataFolder;
 use health::Health;
 
@@ -31,7 +33,8 @@ const LEAST_DRAIN: Duration = Duration::from_secs(1);
 pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Result<()> {
     let server = Server::open(settings).await?;
     // Nobody may be reading, which is no reason to stop.
-    let _ = writeln!(std::io::stdout(), "listening on http://{}", server.address());
+    let scheme = if server.door.tls.is_some() { "https" } else { "http" };
+    let _ = writeln!(std::io::stdout(), "listening on {scheme}://{}", server.address());
     server.run(shutdown).await
 }
 
@@ -41,7 +44,9 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     worker: Option<WorkerProcess>,
-    guard: Guard,
+    door: Door,
+    /// Where the own worker comes in while the door for all others speaks TLS.
+    side: Option<(TcpListener, Guard)>,
     ledger: Arc<SqliteLedger>,
     api: Api,
     /// Held until the end, so that no other server uses the folder.
@@ -69,31 +74,43 @@ impl Server {
             .await
             .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
         let address = listener.local_addr().map_err(startup)?;
-        let mut worker = match settings.embedded_worker {
-            true => Some(WorkerProcess::new(&settings, address)?),
-            false => None,
-        };
         let notary = Notary::open(&*ledger, &master, api::now()).await.map_err(startup)?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
+        let tls = tls::load(&settings)?;
+        let mut worker = None;
+        let mut side = None;
+        let mut own_token = None;
+        if settings.embedded_worker {
+            // Good for as long as this process lives, and kept nowhere.
+            let own = access::fresh()?;
+            let mut reached = address;
+            if tls.is_some() {
+                // The certificate is made out to a name that others know, which the worker need not: it has a listener of
+                // its own that nobody else on this machine gets past either.
+                let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.map_err(startup)?;
+                reached = listener.local_addr().map_err(startup)?;
+                side = Some((listener, Guard::own_worker(api.meter(), own.hash)));
+            }
+            let mut process = WorkerProcess::new(&settings, reached)?;
+            if tls.is_some() || settings.access == Access::Tokens {
+                own_token = Some(own.hash);
+                process.token = Some(own.text);
+            }
+            worker = Some(process);
+        }
         let guard = match settings.access {
             Access::Open => Guard::open(api.meter()),
-            Access::Tokens => {
-                // Good for as long as this process lives, and kept nowhere.
-                let own = worker.as_ref().map(|_| access::fresh()).transpose()?;
-                let hash = own.as_ref().map(|own| own.hash);
-                if let (Some(worker), Some(own)) = (&mut worker, own) {
-                    worker.token = Some(own.text);
-                }
-                Guard::tokens(api.meter(), ledger.clone(), hash)
-            }
+            Access::Tokens => Guard::tokens(api.meter(), ledger.clone(), own_token),
         };
+        let door = Door { guard, tls };
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,
             listener,
             address,
             worker,
-            guard,
+            door,
+            side,
             ledger,
             api,
             _folder: folder,
@@ -111,10 +128,13 @@ impl Server {
         let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
         let routes = self.api.routes()?.add_service(health_service);
         let (drain, drained) = oneshot::channel();
-        let mut calls = tokio::spawn(api::serve(routes, self.guard, self.listener, async {
-            // A sender that is gone says the same.
-            let _ = drained.await;
-        }));
+        // A sender that is gone says the same.
+        let drained = drained.map(|_| ()).shared();
+        let side = self.side.map(|(listener, guard)| {
+            let door = Door { guard, tls: None };
+            tokio::spawn(api::serve(routes.clone(), door, listener, drained.clone()))
+        });
+        let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
         let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
         let worker = self
             .worker
@@ -136,7 +156,12 @@ impl Server {
             Some(ended) => Some(ended),
             None => {
                 let _ = drain.send(());
-                drain_until(calls, limit.max(Instant::now() + LEAST_DRAIN)).await
+                let limit = limit.max(Instant::now() + LEAST_DRAIN);
+                if let Some(side) = side {
+                    // Its one caller has ended before.
+                    drain_until(side, limit).await;
+                }
+                drain_until(calls, limit).await
             }
         };
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {

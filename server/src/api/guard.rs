@@ -37,6 +37,8 @@ pub struct Guard {
 enum Rule {
     /// Anybody, as the one project.
     Open,
+    /// The server's own worker, by the hash of its token.
+    OwnWorker([u8; 32]),
     /// Whoever shows a token that the ledger knows; and the server's own worker, by the hash of its token.
     Tokens {
         ledger: Arc<dyn Ledger>,
@@ -57,6 +59,14 @@ impl Guard {
     pub fn tokens(meter: Arc<Meter>, ledger: Arc<dyn Ledger>, own_worker: Option<[u8; 32]>) -> Self {
         Self {
             rule: Rule::Tokens { ledger, own_worker },
+            meter,
+        }
+    }
+
+    /// One that lets nobody in but a worker with this token.
+    pub fn own_worker(meter: Arc<Meter>, hash: [u8; 32]) -> Self {
+        Self {
+            rule: Rule::OwnWorker(hash),
             meter,
         }
     }
@@ -93,6 +103,10 @@ impl Guard {
     async fn caller(&self, headers: &HeaderMap, address: Option<IpAddr>) -> Result<Caller> {
         match &self.rule {
             Rule::Open => Ok(Caller::anybody(address)),
+            Rule::OwnWorker(own) => match access::hash(token(headers)?) == *own {
+                true => Ok(Caller::own_worker()),
+                false => Err(Error::TokenUnknown),
+            },
             Rule::Tokens { ledger, own_worker } => {
                 let hash = access::hash(token(headers)?);
                 if *own_worker == Some(hash) {

@@ -61,7 +61,7 @@ mod worker;
 pub use clock::now;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
-pub use listen::serve;
+pub use listen::{Door, serve};
 pub use meter::{Meter, Rates};
 pub use text::display_name as check_display_name;
 

@@ -39,6 +39,15 @@ pub struct Flags {
     /// Whether other machines may reach a server that is open to anybody [default: false]
     #[arg(long, value_name = "true|false")]
     pub allow_open_network: Option<bool>,
+    /// File of the server's certificate (PEM), with which it speaks TLS only [default: none, without TLS]
+    #[arg(long, value_name = "FILE")]
+    pub tls_certificate: Option<PathBuf>,
+    /// File of the certificate's key (PEM) [default: none]
+    #[arg(long, value_name = "FILE")]
+    pub tls_key: Option<PathBuf>,
+    /// File of the certificates (PEM) that clients' must be signed by [default: none, clients need none]
+    #[arg(long, value_name = "FILE")]
+    pub tls_client_ca: Option<PathBuf>,
     /// Folder of everything that is kept [default: guardsplat-data]
     #[arg(long, value_name = "FOLDER")]
     pub data_dir: Option<PathBuf>,
@@ -113,6 +122,9 @@ impl Flags {
             listen,
             access,
             allow_open_network,
+            tls_certificate,
+            tls_key,
+            tls_client_ca,
             data_dir,
             max_artifact_bytes,
             max_queued_jobs,
@@ -138,6 +150,9 @@ impl Flags {
         set(&mut settings.listen, listen);
         set(&mut settings.access, access);
         set(&mut settings.allow_open_network, allow_open_network);
+        set(&mut settings.tls_certificate, tls_certificate.map(Some));
+        set(&mut settings.tls_key, tls_key.map(Some));
+        set(&mut settings.tls_client_ca, tls_client_ca.map(Some));
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);

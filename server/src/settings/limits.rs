@@ -58,8 +58,12 @@ impl Settings {
             });
         }
         self.check_reach()?;
+        self.check_tls()?;
         not_empty("data_dir", &self.data_dir)?;
         for (field, path) in [
+            ("tls_certificate", &self.tls_certificate),
+            ("tls_key", &self.tls_key),
+            ("tls_client_ca", &self.tls_client_ca),
             ("worker_binary", &self.worker_binary),
             ("master_key_file", &self.master_key_file),
         ] {
@@ -84,7 +88,9 @@ impl Settings {
 
     /// Refuses to be open to a network by oversight.
     fn check_reach(&self) -> Result<(), SettingsError> {
-        let open = self.access == Access::Open && !self.listen.ip().is_loopback();
+        // Certificates of clients keep strangers out too.
+        let anybody = self.access == Access::Open && self.tls_client_ca.is_none();
+        let open = anybody && !self.listen.ip().is_loopback();
         if !open || self.allow_open_network {
             return Ok(());
         }
@@ -96,6 +102,22 @@ impl Settings {
                 self.listen
             ),
         })
+    }
+
+    /// Refuses half of what TLS needs.
+    fn check_tls(&self) -> Result<(), SettingsError> {
+        let missing = |field: &'static str, with: &str| {
+            Err(SettingsError::Invalid {
+                field,
+                reason: format!("is missing, and {with} is of no use without it"),
+            })
+        };
+        match (&self.tls_certificate, &self.tls_key, &self.tls_client_ca) {
+            (Some(_), None, _) => missing("tls_key", "tls_certificate"),
+            (None, Some(_), _) => missing("tls_certificate", "tls_key"),
+            (None, None, Some(_)) => missing("tls_certificate", "tls_client_ca"),
+            (Some(_), Some(_), _) | (None, None, None) => Ok(()),
+        }
     }
 }
 

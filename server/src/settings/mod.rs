@@ -25,6 +25,12 @@ pub struct Settings {
     pub access: Access,
     /// Whether other machines may reach a server that asks nobody for a token.
     pub allow_open_network: bool,
+    /// File of the server's certificate; with it the server speaks TLS only.
+    pub tls_certificate: Option<PathBuf>,
+    /// File of the certificate's key.
+    pub tls_key: Option<PathBuf>,
+    /// File of the certificates that clients' must be signed by; with it nobody is let in without one.
+    pub tls_client_ca: Option<PathBuf>,
     /// Folder of everything that is kept.
     pub data_dir: PathBuf,
     /// Most bytes of an artifact.
@@ -121,6 +127,9 @@ impl Default for Settings {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
             access: Access::Open,
             allow_open_network: false,
+            tls_certificate: None,
+            tls_key: None,
+            tls_client_ca: None,
             data_dir: "guardsplat-data".into(),
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,

@@ -66,6 +66,9 @@ fn every_setting_can_be_set_everywhere() {
         ("listen", "[::1]:7000"),
         ("access", "tokens"),
         ("allow_open_network", "true"),
+        ("tls_certificate", "/c.pem"),
+        ("tls_key", "/k.pem"),
+        ("tls_client_ca", "/ca.pem"),
         ("data_dir", "/data"),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
@@ -102,14 +105,21 @@ fn every_setting_can_be_set_everywhere() {
     for (name, value) in values {
         let variable = format!("GUARDSPLAT_{}", name.to_uppercase());
         let flag = format!("--{}", name.replace('_', "-"));
-        let by_variable = layers("", &[(&variable, value)], &[]).unwrap();
-        let by_flag = layers("", &[], &[&flag, value]).unwrap();
+        // Those of TLS go together.
+        let besides = match name {
+            "tls_certificate" => "tls_key = \"/k.pem\"\n",
+            "tls_key" => "tls_certificate = \"/c.pem\"\n",
+            "tls_client_ca" => "tls_key = \"/k.pem\"\ntls_certificate = \"/c.pem\"\n",
+            _ => "",
+        };
+        let by_variable = layers(besides, &[(&variable, value)], &[]).unwrap();
+        let by_flag = layers(besides, &[], &[&flag, value]).unwrap();
         let quoted = if value.parse::<u64>().is_ok() || value.parse::<bool>().is_ok() {
             value.into()
         } else {
             format!("{value:?}")
         };
-        let by_file = layers(&format!("{name} = {quoted}"), &[], &[]).unwrap();
+        let by_file = layers(&format!("{besides}{name} = {quoted}"), &[], &[]).unwrap();
         let shown = |settings: &Settings| serde_json::to_value(settings).unwrap()[name].clone();
         assert_ne!(shown(&by_flag), all[name], "{name} stays at its default");
         assert_eq!(shown(&by_variable), shown(&by_flag), "{name}");
@@ -236,6 +246,18 @@ fn nobody_is_open_to_a_network_by_oversight() {
     for address in ["127.0.0.2:1", "[::1]:0"] {
         layers("", &[], &["--listen", address]).unwrap();
     }
+}
+
+#[test]
+fn half_of_tls_is_told() {
+    let missing = |file: &str| error(file, &[], &[]);
+    assert!(missing("tls_key = \"k\"").starts_with("setting tls_certificate: is missing"));
+    assert!(missing("tls_certificate = \"c\"").starts_with("setting tls_key: is missing"));
+    assert!(missing("tls_client_ca = \"a\"").starts_with("setting tls_certificate: is missing"));
+    let both = "tls_key = \"k\"\ntls_certificate = \"c\"";
+    let listen = ["--listen", "0.0.0.0:1"];
+    assert!(error(both, &[], &listen).starts_with("setting listen: "));
+    layers(&format!("{both}\ntls_client_ca = \"a\""), &[], &listen).unwrap();
 }
 
 #[test]

@@ -101,9 +101,13 @@ impl Bench {
         let mut line = String::new();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         timeout(SOON, stdout.read_line(&mut line)).await.unwrap().unwrap();
-        let address = line.trim().strip_prefix("listening on http://").unwrap_or_else(|| {
-            panic!("said {line:?} and {}", self.server_log());
-        });
+        let address = line
+            .trim()
+            .rsplit_once("://")
+            .map(|(_, address)| address)
+            .unwrap_or_else(|| {
+                panic!("said {line:?} and {}", self.server_log());
+            });
         Server {
             child,
             address: address.into(),

@@ -27,7 +27,7 @@ use tonic::{Code, Response, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
 use crate::access::{self, Scope};
-use crate::api::{Api, Guard, Limits, housekeeping, serve};
+use crate::api::{Api, Door, Guard, Limits, housekeeping, serve};
 use crate::artifacts::ArtifactStore;
 use crate::ledger::{AccessLedger, NewToken, SqliteLedger};
 use crate::notary::Notary;
@@ -85,7 +85,7 @@ impl Server {
         };
         let (_, health) = tonic_health::server::health_reporter();
         let routes = api.routes().unwrap().add_service(health);
-        let served = tokio::spawn(serve(routes, guard, listener, shutdown));
+        let served = tokio::spawn(serve(routes, Door { guard, tls: None }, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
         let channel = Channel::from_shared(address).unwrap().connect_lazy();
         Self {

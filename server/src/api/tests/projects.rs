@@ -138,11 +138,11 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
     use Foreign::{ByLease, Missing, NamesNothing, Own};
     let one = |message: Vec<u8>, name: &str| Missing(vec![(message, name.to_owned())]);
     macro_rules! named {
-        ($request:ident, $field:ident) => {
+        ($request:ident, $field:ident $(, $more:ident: $value:expr)*) => {
             one(
                 $request {
                     name: other.$field.clone(),
-                    ..Default::default()
+                    $($more: $value,)*
                 }
                 .encode_to_vec(),
                 &other.$field,
@@ -200,9 +200,9 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         }
         "GetJob" => named!(GetJobRequest, job),
         "CancelJob" => named!(CancelJobRequest, job),
-        "WatchJob" => named!(WatchJobRequest, job),
+        "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
-        "DownloadArtifact" => named!(DownloadArtifactRequest, artifact),
+        "DownloadArtifact" => named!(DownloadArtifactRequest, artifact, offset: 0),
         "GetArtifact" => named!(GetArtifactRequest, artifact),
         "DeleteArtifact" => named!(DeleteArtifactRequest, artifact),
         "GetKey" => named!(GetKeyRequest, key),

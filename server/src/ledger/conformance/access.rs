@@ -287,7 +287,8 @@ pub async fn an_asset_names_what_is_of_its_project(factory: &dyn Factory) {
         key: None,
     };
     for filter in [AssetFilter::default(), filter] {
-        assert_eq!(ledger.list_assets(OURS, filter, None, 5).await.unwrap(), [row.clone()]);
+        let listed = ledger.list_assets(OURS, filter, None, 5).await.unwrap();
+        assert_eq!(listed, std::slice::from_ref(&row));
         assert_eq!(ledger.list_assets(THEIRS, filter, None, 5).await.unwrap(), []);
     }
     assert_eq!(ledger.list_commitments(OURS, 0, 5).await.unwrap().len(), 1);
