@@ -26,6 +26,14 @@ use crate::settings::Settings;
 
 /// Name of the worker's program beside the server's.
 const PROGRAM: &str = "guardsplat-worker";
+/// Variables with which a worker finds other servers; the server that starts it is none of those.
+const OF_CLIENTS: [&str; 5] = [
+    TOKEN_VARIABLE,
+    "GUARDSPLAT_TOKEN_FILE",
+    "GUARDSPLAT_CA",
+    "GUARDSPLAT_CERT",
+    "GUARDSPLAT_CERT_KEY",
+];
 /// Most bytes of the host in the worker's name.
 const HOST_BYTES: usize = 32;
 
@@ -79,14 +87,15 @@ impl WorkerProcess {
         command
             .args(&self.arguments)
             .env_remove(MASTER_KEY_VARIABLE)
-            // One that the server itself was given is for other servers.
-            .env_remove(TOKEN_VARIABLE)
             .stdin(Stdio::piped())
             // Standard output is the server's own; what a worker says goes to the log.
             .stdout(io::stderr().as_fd().try_clone_to_owned()?)
             // Ctrl-C at a terminal goes to the server alone, which then ends the worker in good order.
             .process_group(0)
             .kill_on_drop(true);
+        for variable in OF_CLIENTS {
+            command.env_remove(variable);
+        }
         if let Some(token) = &self.token {
             // Arguments are seen by everybody on the machine, a variable by its owner.
             command.env(TOKEN_VARIABLE, token.expose_secret());

@@ -102,8 +102,9 @@ async fn the_server_s_own_worker_is_let_in() {
     let mut bench = Bench::new();
     bench.variable("GUARDSPLAT_ACCESS", "tokens");
     bench.variable("GUARDSPLAT_TOKEN", "gst_of_another_server");
+    bench.variable("GUARDSPLAT_CA", "/ca/of/another.pem");
     let server = bench
-        .start_with_worker("echo \"$GUARDSPLAT_TOKEN\" > $LOG; echo \"$@\" >> $LOG; exec sleep 60")
+        .start_with_worker("echo \"$GUARDSPLAT_TOKEN$GUARDSPLAT_CA\" > $LOG; echo \"$@\" >> $LOG; exec sleep 60")
         .await;
     let log = until(|| bench.log(), |log| log.lines().count() == 2).await;
     let (token, arguments) = log.split_once('\n').unwrap();
