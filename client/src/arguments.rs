@@ -1,6 +1,7 @@
 //! The command line: what there is to say.
 use std::path::PathBuf;
 
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use uuid::Uuid;
 
@@ -47,16 +48,16 @@ pub struct Global {
     #[arg(long, global = true, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub timeout: Option<u64>,
     /// File of certificates (PEM) that an https server's is checked with, instead of those of public authorities
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CA")]
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CA", value_parser = file())]
     pub ca: Option<PathBuf>,
     /// File of the certificate (PEM) to show to a server that asks for one
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT")]
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT", value_parser = file())]
     pub cert: Option<PathBuf>,
     /// File of that certificate's key (PEM)
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT_KEY")]
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT_KEY", value_parser = file())]
     pub cert_key: Option<PathBuf>,
     /// File of the token to show to a server that asks for one; GUARDSPLAT_TOKEN goes before it
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_TOKEN_FILE")]
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_TOKEN_FILE", value_parser = file())]
     pub token_file: Option<PathBuf>,
     /// Prints JSON on standard output
     #[arg(long, global = true)]
@@ -116,6 +117,11 @@ pub struct Submission {
     /// Ctrl-C while waiting cancels the job; without this, it goes on
     #[arg(long, conflicts_with = "no_wait")]
     pub cancel_on_interrupt: bool,
+}
+
+/// Takes the name of a file, an empty one too: that is how a variable is unset in many places.
+fn file() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
 }
 
 pub fn display_name(text: &str) -> Result<String, String> {

@@ -101,6 +101,18 @@ fn the_client_shows_its_token_and_says_it_nowhere() {
         assert_eq!(ran.code, 0, "{}", ran.err);
         assert!(!ran.out.contains("gst_") && !ran.err.contains("gst_"));
     }
+    let mut unset = command("key list");
+    for name in [
+        "GUARDSPLAT_TOKEN",
+        "GUARDSPLAT_TOKEN_FILE",
+        "GUARDSPLAT_CA",
+        "GUARDSPLAT_CERT",
+        "GUARDSPLAT_CERT_KEY",
+    ] {
+        unset.env(name, "");
+    }
+    let unset = finish(unset.spawn().unwrap());
+    assert_eq!(unset.code, 0, "{}", unset.err);
     let mut bad = command("key list");
     let bad = finish(bad.env("GUARDSPLAT_TOKEN", "5ec2e7 5ec2e7").spawn().unwrap());
     assert_eq!(bad.code, 1);
