@@ -2,12 +2,13 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 6] = [
+const FILES: [&str; 7] = [
     "guardsplat/v1/artifact_service.proto",
     "guardsplat/v1/job.proto",
     "guardsplat/v1/job_service.proto",
     "guardsplat/v1/key_service.proto",
     "guardsplat/v1/registry_service.proto",
+    "guardsplat/v1/token_service.proto",
     "guardsplat/v1/worker_service.proto",
 ];
 

@@ -1,6 +1,7 @@
 //! The command line: what there is to say.
 use std::path::PathBuf;
 
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use uuid::Uuid;
 
@@ -26,13 +27,15 @@ From nothing to a verdict:
   guardsplat embed scene.ply -o marked.ply --key website --asset assets/ID
   guardsplat verify suspect.ply --key website --search
 
-The configuration file may set `server` and `timeout`; flags and GUARDSPLAT_SERVER go before it.";
+The configuration file may set `server`, `timeout`, `ca`, `cert`, `cert_key` and `token_file`; flags and variables
+(GUARDSPLAT_SERVER, GUARDSPLAT_CA and so on) go before it. A token is taken from GUARDSPLAT_TOKEN or a file, and is never
+an argument, which everybody on the machine could see.";
 
 /// Longest display name of a job, in characters.
 pub const LONGEST_NAME: usize = 63;
 
 /// What every command understands.
-#[derive(Args)]
+#[derive(Args, Default)]
 #[command(next_help_heading = "Options of every command")]
 pub struct Global {
     /// Address of the server [default: http://127.0.0.1:50051]
@@ -44,6 +47,18 @@ pub struct Global {
     /// How long a server that is silent or was lost is waited for, in seconds [default: 60]
     #[arg(long, global = true, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub timeout: Option<u64>,
+    /// File of certificates (PEM) that an https server's is checked with, instead of those of public authorities
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CA", value_parser = file())]
+    pub ca: Option<PathBuf>,
+    /// File of the certificate (PEM) to show to a server that asks for one
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT", value_parser = file())]
+    pub cert: Option<PathBuf>,
+    /// File of that certificate's key (PEM)
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT_KEY", value_parser = file())]
+    pub cert_key: Option<PathBuf>,
+    /// File of the token to show to a server that asks for one; GUARDSPLAT_TOKEN goes before it
+    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_TOKEN_FILE", value_parser = file())]
+    pub token_file: Option<PathBuf>,
     /// Prints JSON on standard output
     #[arg(long, global = true)]
     pub json: bool,
@@ -76,6 +91,9 @@ pub enum Command {
     /// Originals that are registered
     #[command(subcommand)]
     Asset(commands::asset::Command),
+    /// Tokens of the project: who may call for it, and what
+    #[command(subcommand)]
+    Token(commands::token::Command),
     /// Signed evidence that jobs with an asset or a claim leave
     #[command(subcommand)]
     Report(commands::report::Command),
@@ -101,7 +119,12 @@ pub struct Submission {
     pub cancel_on_interrupt: bool,
 }
 
-fn display_name(text: &str) -> Result<String, String> {
+/// Takes the name of a file, an empty one too: that is how a variable is unset in many places.
+fn file() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
+}
+
+pub fn display_name(text: &str) -> Result<String, String> {
     match text.chars().count() {
         0..=LONGEST_NAME => Ok(text.to_owned()),
         length => Err(format!("{length} characters, at most {LONGEST_NAME} are taken")),
@@ -142,6 +165,9 @@ mod tests {
             "asset create F --owner O --key K --display-name N",
             "asset list --owner O --key K --limit 3",
             "asset show A",
+            "token create --scope embed --scope verify --expires 90d --display-name N",
+            "token list --json",
+            "token revoke T",
             "report open J -o F",
             "report check F --public-key P",
             "report key",
@@ -176,6 +202,9 @@ mod tests {
                 "{two}"
             );
         }
+        assert!(wrong("token create").contains("--scope"));
+        assert!(wrong("token create --scope worker").contains("guardsplat-server token create"));
+        assert!(wrong("token create --scope embed --expires soon").contains("--expires"));
         assert!(wrong("verify A --key K --views 0").contains("1..=10000"));
         assert!(wrong("key create --bits 151").contains("1..=150"));
         assert!(wrong("embed IN -o O --key K --message 0 --size 8").contains("16..=4096"));

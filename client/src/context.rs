@@ -2,8 +2,8 @@
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
+use guardsplat_proto::connect::Channel;
 use tokio::time::timeout;
-use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
 
 use crate::arguments::Global;

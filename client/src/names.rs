@@ -33,6 +33,14 @@ pub fn asset(text: &str) -> Result<String> {
     })
 }
 
+/// `tokens/ID`, from that or from the id alone.
+pub fn token(text: &str) -> Result<String> {
+    whole("tokens", text).ok_or_else(|| Error::BadOption {
+        field: "TOKEN",
+        reason: format!("`{text}` is not the name of a token, which is tokens/ and an id"),
+    })
+}
+
 /// `owners/ID`, from that or from the id alone; `None` is for what may be a display name.
 pub fn owner(text: &str) -> Option<String> {
     whole("owners", text)

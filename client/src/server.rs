@@ -1,8 +1,9 @@
 //! The connection to the server.
 use std::time::Duration;
 
+use guardsplat_proto::connect::{Channel, ConnectError, Target};
 use tokio::sync::OnceCell;
-use tonic::transport::{Channel, Endpoint};
+use tonic::transport::Endpoint;
 use tonic::{Code, Status};
 
 use crate::error::{Error, Result, root_cause};
@@ -16,6 +17,7 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// A server, connected to when it is first needed.
 pub struct Server {
     endpoint: Endpoint,
+    target: Target,
     channel: OnceCell<Channel>,
     /// Its address.
     pub url: String,
@@ -24,20 +26,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// Checks the address; nothing is sent.
+    /// Checks the address, and reads certificates; nothing is sent.
     pub fn new(settings: &Settings) -> Result<Self> {
-        let url = settings.server.trim_end_matches('/').to_owned();
-        let bad = |reason: String| Error::BadOption {
-            field: "--server",
-            reason: format!("{url}: {reason}"),
-        };
-        if url.starts_with("https:") {
-            return Err(bad("this client speaks plain http; put TLS in front of both".into()));
-        }
-        if !url.starts_with("http://") {
-            return Err(bad("an address looks like http://127.0.0.1:50051".into()));
-        }
-        let endpoint = Endpoint::from_shared(url.clone()).map_err(|e| bad(root_cause(&e)))?;
+        let target = settings.target.clone();
+        let endpoint = target.endpoint().map_err(|error| Error::BadOption {
+            field: field(&error),
+            reason: error.to_string(),
+        })?;
         let endpoint = endpoint
             .connect_timeout(CONNECT.min(settings.timeout))
             .http2_keep_alive_interval(KEEP_ALIVE)
@@ -45,8 +40,9 @@ impl Server {
             .tcp_nodelay(true);
         Ok(Self {
             endpoint,
+            url: target.url.clone(),
+            target,
             channel: OnceCell::new(),
-            url,
             timeout: settings.timeout,
         })
     }
@@ -56,12 +52,23 @@ impl Server {
     /// A server that is not there at first is told at once: waiting for it would only hide a wrong address.
     pub async fn channel(&self) -> Result<Channel> {
         let connect = async || {
-            self.endpoint.connect().await.map_err(|e| Error::NoServer {
+            let channel = self.endpoint.connect().await.map_err(|e| Error::NoServer {
                 url: self.url.clone(),
                 reason: root_cause(&e),
-            })
+            })?;
+            Ok(self.target.authorised(channel))
         };
         self.channel.get_or_try_init(connect).await.cloned()
+    }
+}
+
+/// The option that an error is about.
+fn field(error: &ConnectError) -> &'static str {
+    match error {
+        ConnectError::Address { .. } | ConnectError::Plain { .. } => "--server",
+        ConnectError::HalfAnIdentity => "--cert",
+        ConnectError::Unreadable { .. } | ConnectError::Tls(_) => "--ca or --cert",
+        ConnectError::NoToken { .. } => "--token-file",
     }
 }
 
@@ -83,15 +90,19 @@ mod tests {
 
     fn server(url: &str) -> Result<Server> {
         Server::new(&Settings {
-            server: url.into(),
+            target: Target {
+                url: url.into(),
+                ..Target::default()
+            },
             timeout: Duration::from_secs(1),
         })
     }
 
     #[test]
     fn addresses_are_checked() {
-        assert_eq!(server("http://h:1/").unwrap().url, "http://h:1");
-        for wrong in ["https://h:1", "h:1", "", "http://", "http://a b"] {
+        assert_eq!(server("http://h:1").unwrap().url, "http://h:1");
+        server("https://h:1").unwrap();
+        for wrong in ["h:1", "", "http://", "http://a b"] {
             let error = server(wrong).err().unwrap().to_string();
             assert!(error.contains("--server"), "{wrong}: {error}");
         }

@@ -1,7 +1,8 @@
-//! Where the server is and how long it is waited for: defaults, a file, the environment, flags.
+//! Where the server is, how it is reached and how long it is waited for: defaults, a file, the environment, flags.
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use guardsplat_proto::connect::{TOKEN_VARIABLE, Target, Token};
 use serde::Deserialize;
 
 use crate::arguments::Global;
@@ -15,10 +16,10 @@ const DEFAULT_TIMEOUT_SECONDS: u64 = 60;
 const MOST_SECONDS: u64 = 86_400;
 
 /// What the commands need to know.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Settings {
-    /// Address of the server.
-    pub server: String,
+    /// The server.
+    pub target: Target,
     /// How long a silent or lost server is waited for.
     pub timeout: Duration,
 }
@@ -29,6 +30,10 @@ pub struct Settings {
 struct File {
     server: Option<String>,
     timeout: Option<u64>,
+    ca: Option<PathBuf>,
+    cert: Option<PathBuf>,
+    cert_key: Option<PathBuf>,
+    token_file: Option<PathBuf>,
 }
 
 impl Settings {
@@ -43,10 +48,23 @@ impl Settings {
         };
         // An empty variable is how one is unset in many places.
         let given = global.server.clone().filter(|server| !server.trim().is_empty());
-        let server = given.or(file.server);
+        let server = given.or(file.server).unwrap_or_else(|| DEFAULT_SERVER.into());
+        let path = |given: &Option<PathBuf>, file| given.clone().filter(|path| !path.as_os_str().is_empty()).or(file);
+        let token_file = path(&global.token_file, file.token_file);
+        let variable = std::env::var(TOKEN_VARIABLE).ok();
+        let token = Token::find(variable.as_deref(), token_file.as_deref()).map_err(|error| Error::BadOption {
+            field: "--token-file",
+            reason: error.to_string(),
+        })?;
         let seconds = global.timeout.or(file.timeout).unwrap_or(DEFAULT_TIMEOUT_SECONDS);
         Ok(Self {
-            server: server.unwrap_or_else(|| DEFAULT_SERVER.into()),
+            target: Target {
+                url: server.trim_end_matches('/').to_owned(),
+                ca: path(&global.ca, file.ca),
+                certificate: path(&global.cert, file.cert),
+                certificate_key: path(&global.cert_key, file.cert_key),
+                token,
+            },
             timeout: Duration::from_secs(seconds),
         })
     }
@@ -90,23 +108,41 @@ mod tests {
             server: server.map(Into::into),
             config: Some(file.path().into()),
             timeout,
-            json: false,
+            ..Global::default()
         })
     }
 
     #[test]
     fn flags_win_over_the_file_and_the_file_over_defaults() {
         let settings = load("server = \"http://a:1\"\ntimeout = 5", None, None).unwrap();
-        assert_eq!(settings.server, "http://a:1");
+        assert_eq!(settings.target.url, "http://a:1");
         assert_eq!(settings.timeout, Duration::from_secs(5));
         let settings = load("server = \"http://a:1\"\ntimeout = 5", Some("http://b:2"), Some(7)).unwrap();
-        assert_eq!(settings.server, "http://b:2");
+        assert_eq!(settings.target.url, "http://b:2");
         assert_eq!(settings.timeout, Duration::from_secs(7));
         let unset = load("server = \"http://a:1\"", Some(""), None).unwrap();
-        assert_eq!(unset.server, "http://a:1");
+        assert_eq!(unset.target.url, "http://a:1");
         let settings = load("", None, None).unwrap();
-        assert_eq!(settings.server, DEFAULT_SERVER);
+        assert_eq!(settings.target.url, DEFAULT_SERVER);
         assert_eq!(settings.timeout, Duration::from_secs(60));
+    }
+
+    #[test]
+    fn what_tls_needs_comes_from_the_file_and_flags_go_before_it() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "ca = \"a.pem\"\ncert = \"c.pem\"\ncert_key = \"k.pem\"").unwrap();
+        let settings = Settings::load(&Global {
+            config: Some(file.path().into()),
+            ca: Some("b.pem".into()),
+            cert: Some("".into()),
+            ..Global::default()
+        });
+        let target = settings.unwrap().target;
+        assert_eq!(target.ca, Some("b.pem".into()));
+        assert_eq!(
+            (target.certificate, target.certificate_key),
+            (Some("c.pem".into()), Some("k.pem".into()))
+        );
     }
 
     #[test]
@@ -120,10 +156,8 @@ mod tests {
     #[test]
     fn a_file_that_was_named_must_be_there() {
         let missing = Settings::load(&Global {
-            server: None,
             config: Some("/nonexistent/client.toml".into()),
-            timeout: None,
-            json: false,
+            ..Global::default()
         });
         assert!(missing.unwrap_err().to_string().contains("/nonexistent/client.toml"));
     }

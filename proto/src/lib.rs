@@ -1,5 +1,8 @@
 //! The GuardSplat API, compiled from `proto/guardsplat/v1`.
 
+#[cfg(feature = "connect")]
+pub mod connect;
+
 /// Messages, clients and servers of `guardsplat.v1`.
 #[allow(missing_docs, clippy::all)] // generated; the .proto files are documented
 pub mod v1 {

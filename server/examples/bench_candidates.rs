@@ -4,6 +4,7 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use futures::{StreamExt, TryStreamExt, stream};
+use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
     Completion, JobKind, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
     candidates,
@@ -29,6 +30,7 @@ async fn main() -> Outcome<()> {
     let key = make_key(&ledger).await?;
     let owner = NewOwner {
         id: Uuid::now_v7(),
+        project: DEFAULT_PROJECT.into(),
         display_name: "studio".into(),
         request_id: None,
     };
@@ -41,6 +43,7 @@ async fn main() -> Outcome<()> {
         let nonce = notary::new_nonce(master, id)?;
         let new = NewAsset {
             id,
+            project: DEFAULT_PROJECT.into(),
             commitment: Uuid::now_v7(),
             owner,
             display_name: "a robot".into(),
@@ -101,6 +104,7 @@ fn worst(times: &[Duration]) -> f64 {
 async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
     let job = NewJob {
         id: Uuid::now_v7(),
+        project: DEFAULT_PROJECT.into(),
         display_name: "key".into(),
         kind: JobKind::CreateKey,
         spec: Vec::new(),

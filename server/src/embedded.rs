@@ -13,17 +13,27 @@ use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use secrecy::{ExposeSecret, SecretString};
 use tokio::process::{Child, Command};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout};
 
+use crate::access::TOKEN_VARIABLE;
 use crate::error::{Error, Result};
 use crate::secrets::MASTER_KEY_VARIABLE;
 use crate::settings::{DATABASE_VARIABLE, Settings};
 
 /// Name of the worker's program beside the server's.
 const PROGRAM: &str = "guardsplat-worker";
+/// Variables with which a worker finds other servers; the server that starts it is none of those.
+const OF_CLIENTS: [&str; 5] = [
+    TOKEN_VARIABLE,
+    "GUARDSPLAT_TOKEN_FILE",
+    "GUARDSPLAT_CA",
+    "GUARDSPLAT_CERT",
+    "GUARDSPLAT_CERT_KEY",
+];
 /// Most bytes of the host in the worker's name.
 const HOST_BYTES: usize = 32;
 
@@ -34,6 +44,8 @@ pub struct WorkerProcess {
     pub program: PathBuf,
     /// Its arguments.
     pub arguments: Vec<OsString>,
+    /// The token that it shows, where the server asks for one.
+    pub token: Option<SecretString>,
 }
 
 impl WorkerProcess {
@@ -66,6 +78,7 @@ impl WorkerProcess {
         Ok(Self {
             program,
             arguments: arguments.into_iter().map(OsString::from).collect(),
+            token: None,
         })
     }
 
@@ -82,6 +95,13 @@ impl WorkerProcess {
             // Ctrl-C at a terminal goes to the server alone, which then ends the worker in good order.
             .process_group(0)
             .kill_on_drop(true);
+        for variable in OF_CLIENTS {
+            command.env_remove(variable);
+        }
+        if let Some(token) = &self.token {
+            // Arguments are seen by everybody on the machine, a variable by its owner.
+            command.env(TOKEN_VARIABLE, token.expose_secret());
+        }
         Ok(command)
     }
 }

@@ -95,6 +95,30 @@ pub enum Error {
         /// The job's full name.
         name: String,
     },
+    /// A call without a token, where one is asked for.
+    #[error(
+        "a token is needed, as `authorization: Bearer` and the token in the metadata; guardsplat-server token create \
+         makes one"
+    )]
+    TokenMissing,
+    /// A token that nobody made.
+    #[error("the token is not known")]
+    TokenUnknown,
+    /// A token that was good for a time.
+    #[error("the token has expired")]
+    TokenExpired,
+    /// A token that was taken back.
+    #[error("the token is revoked")]
+    TokenRevoked,
+    /// A token that is not good for what was asked.
+    #[error("the token lacks the scope {}", .needed.join(" or "))]
+    ScopeMissing {
+        /// Scopes of which one would do.
+        needed: Vec<&'static str>,
+    },
+    /// A call that there is not, or that nobody said who may make.
+    #[error("there is no such call; reflection tells which there are")]
+    NoSuchCall,
     /// Too many jobs wait already.
     #[error("{limit} jobs are waiting, and no more are taken")]
     QueueFull {
@@ -102,6 +126,26 @@ pub enum Error {
         limit: u64,
         /// When to try again.
         retry_after: Duration,
+    },
+    /// Too many calls of a class in too short a time.
+    #[error("{per_minute} {what} a minute are taken from one caller; try again in {} s", .retry_after.as_secs_f64().ceil())]
+    TooManyCalls {
+        /// The class.
+        what: &'static str,
+        /// Most of it in a minute.
+        per_minute: u32,
+        /// When there is room for one more.
+        retry_after: Duration,
+    },
+    /// A project that has as much as it may have.
+    #[error("project {project} has used up its {limit} {what}")]
+    QuotaUsedUp {
+        /// Of what.
+        what: &'static str,
+        /// The project.
+        project: String,
+        /// How much it may have.
+        limit: u64,
     },
     /// A scene that takes more memory than a job may.
     #[error("{}", does_not_fit(.name, *.gaussians, *.degree, [*.needed, *.likely, *.limit]))]

@@ -1,4 +1,5 @@
 //! The GuardSplat server: API, job ledger, keys and claims. No GPU code.
+pub mod access;
 pub mod api;
 pub mod artifacts;
 pub mod embedded;
@@ -6,6 +7,8 @@ pub mod error;
 pub mod ledger;
 pub mod marks;
 pub mod notary;
+pub mod offline;
 pub mod run;
 pub mod secrets;
 pub mod settings;
+pub mod tls;

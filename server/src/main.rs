@@ -4,8 +4,8 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use guardsplat_server::run;
-use guardsplat_server::settings::{self, Flags, LogFormat, Settings};
+use guardsplat_server::settings::{self, Arguments, LogFormat, Settings};
+use guardsplat_server::{offline, run};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
@@ -13,14 +13,16 @@ use tracing_subscriber::EnvFilter;
 const LAST_WORK: Duration = Duration::from_secs(2);
 
 fn main() -> ExitCode {
-    let flags = Flags::parse();
+    let Arguments { flags, command } = Arguments::parse();
     // A variable that is not text is none of ours, or names a file that will not be found.
     let environment = std::env::vars_os()
         .filter_map(|(name, value)| Some((name.into_string().ok()?, value.to_string_lossy().into_owned())));
     match settings::load(flags, environment)
         .map_err(|error| error.to_string())
-        .and_then(start)
-    {
+        .and_then(|settings| match command {
+            Some(command) => beside(settings, command),
+            None => start(settings),
+        }) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             say(&format!("error: {error}"));
@@ -32,6 +34,24 @@ fn main() -> ExitCode {
 /// Prints a line on standard error; unlike `eprintln!` it goes on when nobody listens there any more.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Does something else than serving.
+fn beside(settings: Settings, command: offline::Command) -> Result<(), String> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| format!("starting threads: {error}"))?;
+    let said = runtime
+        .block_on(offline::run(&settings, command))
+        .map_err(|error| in_full(&error))?;
+    for line in &said.err {
+        say(line);
+    }
+    for line in &said.out {
+        writeln!(std::io::stdout(), "{line}").map_err(|error| format!("standard output: {error}"))?;
+    }
+    Ok(())
 }
 
 fn start(settings: Settings) -> Result<(), String> {

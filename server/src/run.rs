@@ -1,26 +1,30 @@
 //! The server as a whole: opens what it keeps, answers calls, looks after its worker, and stops in good order.
 mod folder;
 mod health;
+pub(crate) mod ledger;
 
 use std::io::Write as _;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use futures::FutureExt as _;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
-use crate::api::{self, Api, Limits};
+use crate::access;
+use crate::api::{self, Api, Door, Guard, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
-use crate::ledger::{Ledger, LedgerError, PostgresLedger, SqliteLedger};
+use crate::ledger::Ledger;
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
-use crate::settings::Settings;
+use crate::settings::{Access, Settings};
+use crate::tls;
 use folder::DataFolder;
 use health::Health;
 
@@ -36,7 +40,8 @@ pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Re
         () = &mut shutdown => return Ok(()),
     };
     // Nobody may be reading, which is no reason to stop.
-    let _ = writeln!(std::io::stdout(), "listening on http://{}", server.address());
+    let scheme = if server.door.tls.is_some() { "https" } else { "http" };
+    let _ = writeln!(std::io::stdout(), "listening on {scheme}://{}", server.address());
     server.run(shutdown).await
 }
 
@@ -46,6 +51,9 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     worker: Option<WorkerProcess>,
+    door: Door,
+    /// Where the own worker comes in while the door for all others speaks TLS.
+    side: Option<(TcpListener, Guard)>,
     ledger: Arc<dyn Ledger>,
     api: Api,
     /// Held until the end, so that no other server uses the folder.
@@ -64,25 +72,50 @@ impl Server {
         let master = secrets::load(source, folder.path()).map_err(startup)?;
         let store =
             ArtifactStore::open(&folder.path().join("artifacts"), settings.max_artifact_bytes).map_err(startup)?;
-        let ledger = ledger(&settings, &folder).await.map_err(startup)?;
+        let ledger = ledger::open(&settings, folder.path()).await.map_err(startup)?;
         let listener = TcpListener::bind(settings.listen)
             .await
             .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
         let address = listener.local_addr().map_err(startup)?;
-        let worker = match settings.embedded_worker {
-            true => Some(WorkerProcess::new(&settings, address)?),
-            false => None,
-        };
         let notary = Notary::open(ledger.as_ref(), &master, api::now())
             .await
             .map_err(startup)?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
+        let tls = tls::load(&settings)?;
+        let mut worker = None;
+        let mut side = None;
+        let mut own_token = None;
+        if settings.embedded_worker {
+            // Good for as long as this process lives, and kept nowhere.
+            let own = access::fresh()?;
+            let mut reached = address;
+            if tls.is_some() {
+                // The certificate is made out to a name that others know, which the worker need not: it has a listener of
+                // its own that nobody else on this machine gets past either.
+                let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.map_err(startup)?;
+                reached = listener.local_addr().map_err(startup)?;
+                side = Some((listener, Guard::own_worker(api.meter(), own.hash)));
+            }
+            let mut process = WorkerProcess::new(&settings, reached)?;
+            if tls.is_some() || settings.access == Access::Tokens {
+                own_token = Some(own.hash);
+                process.token = Some(own.text);
+            }
+            worker = Some(process);
+        }
+        let guard = match settings.access {
+            Access::Open => Guard::open(api.meter()),
+            Access::Tokens => Guard::tokens(api.meter(), ledger.clone(), own_token),
+        };
+        let door = Door { guard, tls };
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,
             listener,
             address,
             worker,
+            door,
+            side,
             ledger,
             api,
             _folder: folder,
@@ -100,10 +133,13 @@ impl Server {
         let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
         let routes = self.api.routes()?.add_service(health_service);
         let (drain, drained) = oneshot::channel();
-        let mut calls = tokio::spawn(api::serve(routes, self.listener, async {
-            // A sender that is gone says the same.
-            let _ = drained.await;
-        }));
+        // A sender that is gone says the same.
+        let drained = drained.map(|_| ()).shared();
+        let side = self.side.map(|(listener, guard)| {
+            let door = Door { guard, tls: None };
+            tokio::spawn(api::serve(routes.clone(), door, listener, drained.clone()))
+        });
+        let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
         let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
         // It ends with the API.
         tokio::spawn(api::relay(self.api.clone()));
@@ -127,7 +163,12 @@ impl Server {
             Some(ended) => Some(ended),
             None => {
                 let _ = drain.send(());
-                drain_until(calls, limit.max(Instant::now() + LEAST_DRAIN)).await
+                let limit = limit.max(Instant::now() + LEAST_DRAIN);
+                if let Some(side) = side {
+                    // Its one caller has ended before.
+                    drain_until(side, limit).await;
+                }
+                drain_until(calls, limit).await
             }
         };
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
@@ -142,17 +183,6 @@ impl Server {
             None => Ok(()),
         }
     }
-}
-
-/// The ledger that the settings name.
-async fn ledger(settings: &Settings, folder: &DataFolder) -> Result<Arc<dyn Ledger>, LedgerError> {
-    let Some(database) = &settings.database else {
-        return Ok(Arc::new(
-            SqliteLedger::open(&folder.path().join("ledger.sqlite")).await?,
-        ));
-    };
-    tracing::info!(%database, "the ledger is in a database");
-    Ok(Arc::new(PostgresLedger::open(database.secret()).await?))
 }
 
 type Calls = JoinHandle<Result<()>>;
@@ -176,12 +206,19 @@ fn limits(settings: &Settings) -> Limits {
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
         false_positive_rate: settings.false_positive_rate,
+        max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),
+        max_bytes_of_project: Some(settings.max_artifact_bytes_per_project).filter(|&limit| limit > 0),
+        rates: Rates {
+            submissions: settings.max_submissions_per_minute,
+            claims: settings.max_claims_per_minute,
+            calls: settings.max_calls_per_minute,
+        },
         abandoned_after: settings.abandoned_after(),
     }
 }
 
 /// Why the server can't start, with all causes that are not part of the text before.
-fn startup(error: impl std::error::Error) -> Error {
+pub(crate) fn startup(error: impl std::error::Error) -> Error {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {

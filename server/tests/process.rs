@@ -1,5 +1,7 @@
 //! The server as a process: it starts, answers, looks after its worker, stops in good order, and starts again.
 mod support;
+mod tls;
+mod tokens;
 
 use std::os::unix::process::ExitStatusExt;
 use std::time::Duration;

@@ -8,6 +8,7 @@ pub mod key;
 pub mod owner;
 pub mod report;
 pub mod suspects;
+pub mod token;
 pub mod verify;
 
 use crate::arguments::Command;
@@ -25,6 +26,7 @@ pub async fn run(context: &Context, command: Command) -> Result<Exit> {
         Command::Artifact(command) => artifact::run(context, &command).await,
         Command::Owner(command) => owner::run(context, &command).await,
         Command::Asset(command) => asset::run(context, &command).await,
+        Command::Token(command) => token::run(context, &command).await,
         Command::Report(command) => report::run(context, &command).await,
         Command::Completions(arguments) => Ok(completions::run(&arguments)),
     }

@@ -4,6 +4,7 @@ mod embed;
 mod job;
 mod key;
 mod registry;
+mod token;
 mod verify;
 
 pub use artifact::ArtifactReport;
@@ -11,6 +12,7 @@ pub use embed::EmbedReport;
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};
 pub use registry::{AssetReport, OwnerReport};
+pub use token::TokenReport;
 pub use verify::VerifyReport;
 
 /// A value of an enum as a word: `STATE_QUEUED` without `STATE_` is `queued`.

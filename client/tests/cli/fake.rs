@@ -8,11 +8,15 @@ use guardsplat_proto::v1::job::{Result as Outcome, Spec, State as JobState};
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
-use guardsplat_proto::v1::{Artifact, Asset, CreateJobRequest, EmbedResult, Failure, Job, Key, Owner, WatchJobRequest};
+use guardsplat_proto::v1::token_service_server::TokenServiceServer;
+use guardsplat_proto::v1::{
+    Artifact, Asset, CreateJobRequest, EmbedResult, Failure, Job, Key, Owner, Token, WatchJobRequest,
+};
 use sha2::{Digest, Sha256};
-use tonic::Status;
+use tonic::service::InterceptorLayer;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
+use tonic::{Request, Status};
 use uuid::Uuid;
 
 /// The key that is there.
@@ -58,6 +62,10 @@ pub struct State {
     pub owners: Vec<Owner>,
     /// All that was to be registered.
     pub registered: Vec<Asset>,
+    /// Tokens that were made.
+    pub tokens: Vec<Token>,
+    /// What calls showed as authorisation, in their order.
+    pub shown: Vec<Option<String>>,
     /// The public key, in hexadecimal.
     pub public_key: String,
 
@@ -110,11 +118,20 @@ impl Fake {
                 let address = incoming.local_addr().unwrap();
                 let fake = Fake { address, state: shared };
                 sender.send(address).unwrap();
+                let noting = fake.clone();
+                let note = move |request: Request<()>| {
+                    let shown = request.metadata().get("authorization");
+                    let shown = shown.map(|shown| shown.to_str().unwrap().to_owned());
+                    noting.state().shown.push(shown);
+                    Ok(request)
+                };
                 Server::builder()
+                    .layer(InterceptorLayer::new(note))
                     .add_service(ArtifactServiceServer::new(fake.clone()))
                     .add_service(JobServiceServer::new(fake.clone()))
                     .add_service(KeyServiceServer::new(fake.clone()))
-                    .add_service(RegistryServiceServer::new(fake))
+                    .add_service(RegistryServiceServer::new(fake.clone()))
+                    .add_service(TokenServiceServer::new(fake))
                     .serve_with_incoming(incoming)
                     .await
                     .unwrap();

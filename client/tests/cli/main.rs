@@ -11,4 +11,5 @@ mod proxy;
 mod resume;
 mod run;
 mod services;
+mod tokens;
 mod verify;

@@ -89,6 +89,8 @@ impl Bench {
             .args(line.split_whitespace())
             .current_dir(self.folder.path())
             .env_remove("GUARDSPLAT_SERVER")
+            .env_remove("GUARDSPLAT_TOKEN")
+            .env_remove("GUARDSPLAT_TOKEN_FILE")
             .env("XDG_CONFIG_HOME", self.folder.path().join("config"))
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

@@ -15,12 +15,13 @@ pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/api.md");
 const PREFACE: &str = include_str!("preface.md");
 const PACKAGE: &str = "guardsplat.v1";
 /// The order that a reader wants.
-const FILES: [&str; 6] = [
+const FILES: [&str; 7] = [
     "job_service",
     "job",
     "artifact_service",
     "key_service",
     "registry_service",
+    "token_service",
     "worker_service",
 ];
 

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use guardsplat_scene::{HEAD, Summary};
 
-use super::Api;
 use super::names::Kind;
 use super::submission::Submission;
+use super::{Api, own};
 use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobKind};
@@ -16,13 +16,16 @@ const QUEUE_RETRY: Duration = Duration::from_secs(10);
 
 impl Api {
     /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
-    pub(super) async fn admit(&self, submission: &Submission) -> Result<()> {
+    pub(super) async fn admit(&self, project: &str, submission: &Submission) -> Result<()> {
         let limit = self.limits().max_queued;
         let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
         let memory = self.limits().max_job_memory.zip(scene_of(submission));
-        if !full && memory.is_none() || self.is_known(submission).await? {
+        let quotas = [self.limits().max_queued_of_project, self.limits().max_bytes_of_project];
+        let unlimited = !full && memory.is_none() && quotas == [None, None];
+        if unlimited || self.is_known(project, submission).await? {
             return Ok(());
         }
+        self.room_for_job(project, submission.kind).await?;
         if full {
             return Err(Error::QueueFull {
                 limit,
@@ -30,7 +33,7 @@ impl Api {
             });
         }
         if let Some((limit, scene)) = memory
-            && let Some(summary) = self.summary(scene).await?
+            && let Some(summary) = self.summary(project, scene).await?
         {
             check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
         }
@@ -38,17 +41,20 @@ impl Api {
     }
 
     /// Whether a request made a job before.
-    pub(super) async fn is_known(&self, submission: &Submission) -> Result<bool> {
+    pub(super) async fn is_known(&self, project: &str, submission: &Submission) -> Result<bool> {
         match submission.request_id {
-            Some(request) => Ok(self.ledger().find_request(request).await?.is_some()),
+            Some(request) => {
+                let job = self.ledger().find_request(own::request(project, request)).await?;
+                Ok(job.is_some_and(|job| job.project == project))
+            }
             None => Ok(false),
         }
     }
 
     /// What the first bytes of an artifact tell of a scene. What is none, or not there any more, is for others to
     /// refuse, who know more of it.
-    async fn summary(&self, id: ArtifactId) -> Result<Option<Summary>> {
-        let Some(row) = self.ledger().get_artifact(id).await? else {
+    async fn summary(&self, project: &str, id: ArtifactId) -> Result<Option<Summary>> {
+        let Some(row) = self.find_artifact(project, id).await? else {
             return Ok(None);
         };
         let path = ArtifactPath::parse(&row.path)?;

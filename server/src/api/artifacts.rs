@@ -8,6 +8,7 @@ use guardsplat_proto::v1::{
 use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
 
+use super::guard::caller;
 use super::names::Kind;
 use super::status::chain;
 use super::upload::{self, Incoming};
@@ -22,8 +23,9 @@ impl ArtifactService for Api {
         &self,
         request: Request<Streaming<UploadArtifactRequest>>,
     ) -> Result<Response<Artifact>, Status> {
+        let project = caller(&request)?.project;
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
-        let row = self.within_upload_time(self.receive_upload(incoming)).await?;
+        let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
         Ok(Response::new(convert::artifact(row)))
     }
 
@@ -33,8 +35,10 @@ impl ArtifactService for Api {
         &self,
         request: Request<DownloadArtifactRequest>,
     ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
+        let caller = caller(&request)?;
         let DownloadArtifactRequest { name, offset } = request.into_inner();
-        let row = self.artifact(&name).await?;
+        let id = Kind::Artifact.parse("name", &name)?;
+        let row = self.readable_artifact(&caller, id).await?;
         let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
         let path = ArtifactPath::parse(&row.path).map_err(Error::from)?;
         let bytes = self.store().read(&path, offset).await.map_err(Error::from)?;
@@ -48,12 +52,14 @@ impl ArtifactService for Api {
     }
 
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
-        let row = self.artifact(&request.get_ref().name).await?;
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let row = self.own_artifact(&caller(&request)?.project, id).await?;
         Ok(Response::new(convert::artifact(row)))
     }
 
     async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
-        let row = self.artifact(&request.get_ref().name).await?;
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let row = self.own_artifact(&caller(&request)?.project, id).await?;
         self.ledger()
             .delete_artifact(row.id, clock::now())
             .await
@@ -67,18 +73,14 @@ impl ArtifactService for Api {
 }
 
 impl Api {
-    /// A visible artifact by its name.
-    async fn artifact(&self, name: &str) -> Result<ArtifactRow> {
-        let id = Kind::Artifact.parse("name", name)?;
-        self.ledger()
-            .get_artifact(id)
-            .await?
-            .ok_or_else(|| Kind::Artifact.not_found(id))
-    }
-
-    async fn receive_upload(&self, mut incoming: Incoming<UploadArtifactRequest>) -> Result<ArtifactRow, Status> {
+    async fn receive_upload(
+        &self,
+        project: String,
+        mut incoming: Incoming<UploadArtifactRequest>,
+    ) -> Result<ArtifactRow, Status> {
         let metadata = incoming.metadata().await?;
         let announced = upload::announced("metadata", &metadata)?;
+        self.room_for_bytes(&project, announced.size).await?;
         let id = Uuid::now_v7();
         let path = ArtifactPath::upload(id);
         // The writer comes first: it refuses what is too large. It leaves nothing if it is dropped.
@@ -88,7 +90,7 @@ impl Api {
             display_name: metadata.display_name,
             size: metadata.size_bytes,
             sha256: metadata.sha256,
-            origin: Origin::Upload,
+            origin: Origin::Upload { project },
             secret: false,
             path: path.to_string(),
         };

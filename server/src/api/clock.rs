@@ -23,6 +23,13 @@ pub fn timestamp(micros: i64) -> Timestamp {
     }
 }
 
+/// A timestamp of the API in microseconds since the epoch; `None` when it is malformed or far out of reach.
+pub fn micros_of(time: &Timestamp) -> Option<i64> {
+    let nanos = i64::from(time.nanos);
+    let micros = time.seconds.checked_mul(1_000_000)?.checked_add(nanos / 1000)?;
+    (0..1_000_000_000).contains(&nanos).then_some(micros)
+}
+
 /// A duration of the API, none of it negative; `None` when it is malformed or negative.
 pub fn duration(given: prost_types::Duration) -> Option<Duration> {
     let nanos = u32::try_from(given.nanos).ok().filter(|&n| n < 1_000_000_000)?;
@@ -57,6 +64,15 @@ mod tests {
                 nanos: 999_999_000
             }
         );
+    }
+
+    #[test]
+    fn timestamps_are_read_back() {
+        for micros in [0, 1_500_001, -1, 1_700_000_000_000_000] {
+            assert_eq!(micros_of(&timestamp(micros)), Some(micros));
+        }
+        let of = |seconds, nanos| micros_of(&Timestamp { seconds, nanos });
+        assert_eq!((of(i64::MAX, 0), of(0, -1), of(0, 1_000_000_000)), (None, None, None));
     }
 
     #[test]

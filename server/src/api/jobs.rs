@@ -9,11 +9,14 @@ use prost::Message as _;
 use tonic::{Request, Response, Status};
 use uuid::Uuid;
 
+use super::guard::{caller, payer};
+use super::meter::Class;
 use super::names::Kind;
 use super::submission::{self, Submission};
-use super::{Api, clock, convert, fingerprint, keys, message, page, watch};
+use super::{Api, clock, convert, fingerprint, keys, message, own, page, watch};
+use crate::access::Caller;
 use crate::error::{Error, Result};
-use crate::ledger::NewJob;
+use crate::ledger::{JobKind, NewJob};
 
 /// A page ends early rather than come near the largest message that clients read by default.
 const MAX_PAGE_BYTES: usize = 2 << 20;
@@ -21,23 +24,26 @@ const MAX_PAGE_BYTES: usize = 2 << 20;
 #[tonic::async_trait]
 impl JobService for Api {
     async fn create_job(&self, request: Request<CreateJobRequest>) -> Result<Response<Job>, Status> {
-        Ok(Response::new(self.submit(request.into_inner()).await?))
+        let caller = caller(&request)?;
+        Ok(Response::new(self.submit(request.into_inner(), &caller).await?))
     }
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
-        let row = self.ledger().get_job(id).await.map_err(Error::from)?;
-        Ok(Response::new(convert::job(
-            row.ok_or_else(|| Kind::Job.not_found(id))?,
-        )?))
+        let row = self.own_job(&caller(&request)?.project, id).await?;
+        Ok(Response::new(convert::job(row)?))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
-        Ok(Response::new(self.list(&request.into_inner()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.list(&project, request.get_ref()).await?))
     }
 
     async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<Job>, Status> {
+        let caller = caller(&request)?;
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
+        let job = self.own_job(&caller.project, id).await?;
+        caller.must(own::scope_of(job.kind))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
         self.changes().job(id);
         self.changes().queue_moved();
@@ -47,69 +53,74 @@ impl JobService for Api {
     type WatchJobStream = BoxStream<'static, Result<WatchJobResponse, Status>>;
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
+        let project = caller(&request)?.project;
         let WatchJobRequest { name, cursor } = request.into_inner();
-        Ok(Response::new(watch::watch(self.clone(), &name, &cursor).await?))
+        let watching = watch::watch(self.clone(), project, &name, &cursor);
+        Ok(Response::new(watching.await?))
     }
 }
 
 impl Api {
-    async fn submit(&self, request: CreateJobRequest) -> Result<Job> {
+    async fn submit(&self, request: CreateJobRequest, caller: &Caller) -> Result<Job> {
         let submission = submission::check(request)?;
+        caller.must(own::scope_of(submission.kind))?;
+        let project = caller.project.as_str();
         if let Some(id) = submission.key {
-            let key = self
-                .ledger()
-                .get_key(id)
-                .await?
-                .ok_or_else(|| Kind::Key.not_found(id))?;
+            let key = self.own_key(project, id).await?;
             if let Some((field, text)) = &submission.message {
                 message::check(field, text, key.bits)?;
             }
             if let Err(error) = keys::usable(&key, submission.kind)
-                && !self.is_known(&submission).await?
+                && !self.is_known(project, &submission).await?
             {
                 return Err(error);
             }
             if let Some(claim) = &submission.claim {
-                self.check_claim(claim, &key, &submission).await?;
+                self.check_claim(project, claim, &key, &submission).await?;
             }
         }
-        self.admit(&submission).await?;
-        let fingerprint = self.fingerprint(&submission).await?;
+        if submission.kind == JobKind::Verify {
+            self.shared.meter.count(Class::Claim, &payer(caller))?;
+        }
+        self.admit(project, &submission).await?;
+        let fingerprint = self.fingerprint(project, &submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
+            project: project.to_owned(),
             display_name: submission.display_name,
             kind: submission.kind,
             spec: submission.spec,
             inputs: submission.inputs,
             key: submission.key,
-            request_id: submission.request_id,
+            request_id: submission.request_id.map(|id| own::request(project, id)),
             fingerprint,
             max_attempts: self.limits().max_attempts,
         };
-        let row = self.ledger().create_job(new, clock::now()).await?;
+        let row = self.ledger().create_job(new, clock::now()).await;
+        let row = row.map_err(|error| own::as_asked(error, submission.request_id))?;
         self.changes().queue_grew();
         convert::job(row)
     }
 
     /// What a request is known by when it is sent again; needed only where it has a name.
-    async fn fingerprint(&self, submission: &Submission) -> Result<[u8; 32]> {
+    async fn fingerprint(&self, project: &str, submission: &Submission) -> Result<[u8; 32]> {
         let mut inputs = Vec::new();
         if submission.request_id.is_some() {
             for &id in &submission.inputs {
-                inputs.push((id, self.ledger().get_artifact(id).await?));
+                inputs.push((id, self.find_artifact(project, id).await?));
             }
         }
         Ok(fingerprint::whole(&submission.asked, &inputs))
     }
 
-    async fn list(&self, request: &ListJobsRequest) -> Result<ListJobsResponse> {
+    async fn list(&self, project: &str, request: &ListJobsRequest) -> Result<ListJobsResponse> {
         let size = page::size(request.page_size)?;
         let states = convert::states(&request.states)?;
         let numbers: Vec<u8> = states.iter().map(|&state| state as u8).collect();
         let query: [&[u8]; 2] = [b"jobs", &numbers];
         let before = page::position(&query, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_jobs(&states, before, size + 1).await?;
+        let rows = self.ledger().list_jobs(project, &states, before, size + 1).await?;
         let (count, mut bytes) = (rows.len(), 0);
         let mut jobs = Vec::with_capacity(count.min(size as usize));
         let mut last = None;

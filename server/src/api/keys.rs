@@ -4,6 +4,7 @@ use guardsplat_proto::v1::key_service_server::KeyService;
 use guardsplat_proto::v1::{GetKeyRequest, Key, ListKeysRequest, ListKeysResponse, UpdateKeyStateRequest};
 use tonic::{Request, Response, Status};
 
+use super::guard::caller;
 use super::names::Kind;
 use super::problems::Problems;
 use super::{Api, clock, convert, page, text};
@@ -17,24 +18,29 @@ const QUERY: &[&[u8]] = &[b"keys"];
 impl KeyService for Api {
     async fn get_key(&self, request: Request<GetKeyRequest>) -> Result<Response<Key>, Status> {
         let id = Kind::Key.parse("name", &request.get_ref().name)?;
-        let row = self.ledger().get_key(id).await.map_err(Error::from)?;
-        Ok(Response::new(convert::key(row.ok_or_else(|| Kind::Key.not_found(id))?)))
+        let row = self.own_key(&caller(&request)?.project, id).await?;
+        Ok(Response::new(convert::key(row)))
     }
 
     async fn list_keys(&self, request: Request<ListKeysRequest>) -> Result<Response<ListKeysResponse>, Status> {
+        let project = caller(&request)?.project;
         let ListKeysRequest { page_size, page_token } = request.into_inner();
         let size = page::size(page_size)?;
         let before = page::position(QUERY, &page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_keys(before, size + 1).await.map_err(Error::from)?;
+        let rows = self.ledger().list_keys(&project, before, size + 1).await;
+        let rows = rows.map_err(Error::from)?;
         let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (row.create_time, row.id));
         Ok(Response::new(ListKeysResponse {
             keys: rows.into_iter().map(convert::key).collect(),
             next_page_token,
         }))
     }
+
     async fn update_key_state(&self, request: Request<UpdateKeyStateRequest>) -> Result<Response<Key>, Status> {
+        let project = caller(&request)?.project;
         let (id, next, reason) = checked(request.into_inner())?;
+        self.own_key(&project, id).await?;
         let updated = self.ledger().update_key_state(id, next, &reason, clock::now()).await;
         let row = updated.map_err(Error::from)?;
         tracing::info!(key = %id, state = row.state.word(), reason = row.state_reason, "state of a key");

@@ -1,4 +1,4 @@
-//! The API over gRPC: the five services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+//! The API over gRPC: the six services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -6,6 +6,7 @@ use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
+use guardsplat_proto::v1::token_service_server::TokenServiceServer;
 use guardsplat_proto::v1::worker_service_server::WorkerServiceServer;
 use tonic::Status;
 use tonic::service::Routes;
@@ -27,17 +28,21 @@ mod deadline;
 mod evidence;
 mod explained;
 mod fingerprint;
+mod guard;
 mod housekeeping;
 mod jobs;
 mod keys;
 mod lease;
 mod listen;
 mod message;
+mod meter;
 mod names;
 mod output;
+mod own;
 mod page;
 mod problems;
 mod progress;
+mod quota;
 mod refusals;
 mod registry;
 mod relay;
@@ -49,14 +54,18 @@ mod submission;
 mod tests;
 mod text;
 mod token;
+mod tokens;
 mod upload;
 mod watch;
 mod worker;
 
 pub use clock::now;
+pub use guard::Guard;
 pub use housekeeping::housekeeping;
-pub use listen::serve;
+pub use listen::{Door, serve};
+pub use meter::{Meter, Rates};
 pub use relay::relay;
+pub use text::display_name as check_display_name;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
 const MAX_MESSAGE: usize = 4 << 20;
@@ -76,6 +85,12 @@ pub struct Limits {
     pub upload_idle: Duration,
     /// How often a claim may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
+    /// Jobs of one project that may wait; none for no limit but that of all.
+    pub max_queued_of_project: Option<u64>,
+    /// Bytes of artifacts that one project may have; none for no limit.
+    pub max_bytes_of_project: Option<u64>,
+    /// How often a caller may call.
+    pub rates: Rates,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
 }
@@ -89,12 +104,15 @@ impl Default for Limits {
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
             false_positive_rate: 1e-6,
+            max_queued_of_project: None,
+            max_bytes_of_project: None,
+            rates: Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
         }
     }
 }
 
-/// What the five services share. Cheap to clone.
+/// What the six services share. Cheap to clone.
 #[derive(Clone)]
 pub struct Api {
     shared: Arc<Shared>,
@@ -106,6 +124,7 @@ struct Shared {
     master: MasterKey,
     notary: Notary,
     limits: Limits,
+    meter: Arc<Meter>,
     changes: changes::Changes,
     reports: progress::Reports,
 }
@@ -125,6 +144,7 @@ impl Api {
             store,
             master,
             notary,
+            meter: Arc::new(Meter::new(limits.rates)),
             limits,
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
@@ -134,7 +154,7 @@ impl Api {
         }
     }
 
-    /// The five services and reflection. Health, which knows more than the API, is added by the caller.
+    /// The six services and reflection. Health, which knows more than the API, is added by the caller.
     pub fn routes(&self) -> Result<Routes> {
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -148,6 +168,7 @@ impl Api {
                 .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(TokenServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(reflection().build_v1().map_err(failed)?)
                 .add_service(reflection().build_v1alpha().map_err(failed)?),
@@ -158,6 +179,11 @@ impl Api {
     /// Workers can still hand back and complete what they have.
     pub fn stop(&self) {
         self.shared.changes.stop();
+    }
+
+    /// What counts calls, for the guard.
+    pub fn meter(&self) -> Arc<Meter> {
+        self.shared.meter.clone()
     }
 
     fn ledger(&self) -> &dyn Ledger {

@@ -18,17 +18,20 @@ pub enum Kind {
     Asset,
     /// What was signed of an asset.
     Commitment,
+    /// What callers show.
+    Token,
 }
 
 impl Kind {
     /// Everything that has a name.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Job,
         Self::Artifact,
         Self::Key,
         Self::Owner,
         Self::Asset,
         Self::Commitment,
+        Self::Token,
     ];
 
     /// The collection, the first segment of the name.
@@ -40,6 +43,7 @@ impl Kind {
             Self::Owner => "owners",
             Self::Asset => "assets",
             Self::Commitment => "commitments",
+            Self::Token => "tokens",
         }
     }
 
@@ -52,6 +56,7 @@ impl Kind {
             Self::Owner => "owner",
             Self::Asset => "asset",
             Self::Commitment => "commitment",
+            Self::Token => "token",
         }
     }
 

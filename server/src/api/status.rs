@@ -3,7 +3,7 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use tonic::{Code, Status};
-use tonic_types::{ErrorDetails, FieldViolation, PreconditionViolation, StatusExt};
+use tonic_types::{ErrorDetails, FieldViolation, PreconditionViolation, QuotaViolation, StatusExt};
 
 use crate::error::Error;
 
@@ -40,7 +40,15 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::KeyStateFinal { .. } => (Code::FailedPrecondition, "KEY_STATE_FINAL"),
         Error::PayloadsUsedUp { .. } => (Code::ResourceExhausted, "PAYLOADS_USED_UP"),
         Error::LeaseLost { .. } => (Code::Aborted, "LEASE_LOST"),
+        Error::TokenMissing => (Code::Unauthenticated, "TOKEN_MISSING"),
+        Error::TokenUnknown => (Code::Unauthenticated, "TOKEN_UNKNOWN"),
+        Error::TokenExpired => (Code::Unauthenticated, "TOKEN_EXPIRED"),
+        Error::TokenRevoked => (Code::Unauthenticated, "TOKEN_REVOKED"),
+        Error::ScopeMissing { .. } => (Code::PermissionDenied, "SCOPE_MISSING"),
+        Error::NoSuchCall => (Code::Unimplemented, "UNIMPLEMENTED"),
         Error::QueueFull { .. } => (Code::ResourceExhausted, "QUEUE_FULL"),
+        Error::TooManyCalls { .. } => (Code::ResourceExhausted, "TOO_MANY_CALLS"),
+        Error::QuotaUsedUp { .. } => (Code::ResourceExhausted, "QUOTA_USED_UP"),
         Error::NoSpace => (Code::ResourceExhausted, "NO_SPACE"),
         Error::UploadStalled(_) => (Code::Aborted, "UPLOAD_STALLED"),
         Error::UploadTooSlow(_) => (Code::Aborted, "UPLOAD_TOO_SLOW"),
@@ -62,6 +70,11 @@ fn metadata(error: &Error) -> HashMap<String, String> {
         Error::KeyStateFinal { name, state, .. } => vec![("name", name.clone()), ("state", (*state).to_owned())],
         Error::PayloadsUsedUp { name, limit } => vec![("name", name.clone()), ("limit", limit.to_string())],
         Error::RequestIdReused { request_id } => vec![("request_id", request_id.to_string())],
+        Error::TooManyCalls { what, per_minute, .. } => {
+            vec![("class", (*what).to_owned()), ("limit", per_minute.to_string())]
+        }
+        Error::QuotaUsedUp { limit, project, .. } => vec![("project", project.clone()), ("limit", limit.to_string())],
+        Error::ScopeMissing { needed } => vec![("scopes", needed.join(","))],
         Error::QueueFull { limit, .. } => vec![("limit", limit.to_string())],
         Error::SceneDoesNotFit {
             name,
@@ -111,6 +124,16 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         }
         Error::QueueFull { retry_after, .. } => {
             details.set_retry_info(Some(*retry_after));
+        }
+        Error::TooManyCalls { what, retry_after, .. } => {
+            details.set_quota_failure(vec![QuotaViolation::new(*what, error.to_string())]);
+            details.set_retry_info(Some(*retry_after));
+        }
+        Error::QuotaUsedUp { project, .. } => {
+            details.set_quota_failure(vec![QuotaViolation::new(
+                format!("project:{project}"),
+                error.to_string(),
+            )]);
         }
         Error::Stopping | Error::Unavailable { .. } => {
             details.set_retry_info(Some(SOON));

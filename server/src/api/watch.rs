@@ -57,13 +57,19 @@ impl Seen {
 
 /// Begins to watch. The ledger is read when the stream is: one who reads slowly skips what happened in between, and
 /// holds up nobody.
-pub async fn watch(api: Api, name: &str, cursor: &str) -> Result<BoxStream<'static, Result<WatchJobResponse, Status>>> {
+pub async fn watch(
+    api: Api,
+    project: String,
+    name: &str,
+    cursor: &str,
+) -> Result<BoxStream<'static, Result<WatchJobResponse, Status>>> {
     let id = Kind::Job.parse("name", name)?;
     let seen = Seen::parse(id, cursor)?;
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
     let watcher = Watcher {
         api,
+        project,
         listener,
         id,
         seen,
@@ -84,6 +90,7 @@ pub async fn watch(api: Api, name: &str, cursor: &str) -> Result<BoxStream<'stat
 
 struct Watcher {
     api: Api,
+    project: String,
     listener: Listener,
     id: JobId,
     seen: Option<Seen>,
@@ -92,8 +99,7 @@ struct Watcher {
 
 impl Watcher {
     async fn row(&self) -> Result<JobRow> {
-        let row = self.api.ledger().get_job(self.id).await?;
-        row.ok_or_else(|| Kind::Job.not_found(self.id))
+        self.api.own_job(&self.project, self.id).await
     }
 
     async fn next(&mut self) -> Result<Option<WatchJobResponse>> {

@@ -28,6 +28,7 @@ impl Bench {
         WorkerProcess {
             program: "/bin/sh".into(),
             arguments,
+            token: None,
         }
     }
 
@@ -145,6 +146,7 @@ async fn a_program_that_cannot_be_started_is_tried_again() {
     let worker = WorkerProcess {
         program: program.clone(),
         arguments: Vec::new(),
+        token: None,
     };
     let worker = EmbeddedWorker::start(worker, QUICK);
     sleep(Duration::from_millis(50)).await;

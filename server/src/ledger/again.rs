@@ -1,4 +1,5 @@
-//! Requests that were carried out before: the same one gets what the first made, another one under its id is refused.
+//! Requests that were carried out before: the same one gets what the first made, another one under its id,
+//! or the same of another project, is refused.
 use uuid::Uuid;
 
 use super::registry::{AssetRow, NewAsset, NewOwner, OwnerRow};
@@ -9,19 +10,29 @@ use super::{LedgerError, Result};
 pub(super) fn job(request: Uuid, there: JobRow, fingerprint: &[u8], new: &NewJob) -> Result<JobRow> {
     // Word for word the same, also when an artifact is gone by now whose content could be compared.
     let said_again = (there.kind, &there.spec, &there.display_name) == (new.kind, &new.spec, &new.display_name);
-    same(request, there, said_again || fingerprint == new.fingerprint)
+    let same_project = there.project == new.project;
+    same(
+        request,
+        there,
+        same_project && (said_again || fingerprint == new.fingerprint),
+    )
 }
 
 /// The owner that was registered under the request id, if this is the same request.
 pub(super) fn owner(request: Uuid, there: OwnerRow, new: &NewOwner) -> Result<OwnerRow> {
-    let said_again = there.display_name == new.display_name;
+    let said_again = (&there.display_name, &there.project) == (&new.display_name, &new.project);
     same(request, there, said_again)
 }
 
 /// The asset that was registered under the request id, if this is the same request.
 pub(super) fn asset(request: Uuid, there: AssetRow, new: &NewAsset) -> Result<AssetRow> {
-    let said_again = (there.owner, there.key, there.sha256, &there.display_name)
-        == (new.owner, new.key, new.sha256, &new.display_name);
+    let said_again = (
+        there.owner,
+        there.key,
+        there.sha256,
+        &there.display_name,
+        &there.project,
+    ) == (new.owner, new.key, new.sha256, &new.display_name, &new.project);
     same(request, there, said_again)
 }
 

@@ -22,6 +22,7 @@ pub(super) fn numbered(new: &NewAsset, key: &KeyRow, last: i64, now: i64) -> Res
     }
     Ok(AssetRow {
         id: new.id,
+        project: new.project.clone(),
         commitment: new.commitment,
         owner: new.owner,
         display_name: new.display_name.clone(),

@@ -7,6 +7,7 @@
 //! [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
+pub mod access;
 mod again;
 pub mod candidates;
 mod chain;
@@ -30,6 +31,7 @@ use guardsplat_commitment::{Signed, SigningKey};
 use tokio::sync::broadcast;
 use uuid::Uuid;
 
+pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
 pub use postgres::PostgresLedger;
@@ -47,14 +49,14 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: Send + Sync + 'static {
+pub trait Ledger: AccessLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.
     ///
     /// # Errors
-    /// `RequestIdReused` for the same request id with another request, `NotFound` for an input or a key that isn't
-    /// there (or isn't visible).
+    /// `RequestIdReused` for the same request id with another request, or of another project; `NotFound` for an input or
+    /// a key that isn't there (or isn't visible, or is another project's).
     async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow>;
 
     /// The job that was made under a request id, whatever has become of it.
@@ -63,9 +65,15 @@ pub trait Ledger: Send + Sync + 'static {
     /// One job as it stands, with its position in the queue.
     async fn get_job(&self, id: JobId) -> Result<Option<JobRow>>;
 
-    /// Jobs in one of `states` (in any, when empty), newest first; those after `before` (the `create_time` and id of
-    /// the last job of the page before).
-    async fn list_jobs(&self, states: &[JobState], before: Option<(i64, JobId)>, limit: u32) -> Result<Vec<JobRow>>;
+    /// Jobs of a project in one of `states` (in any, when empty), newest first; those after `before` (the `create_time`
+    /// and id of the last job of the page before).
+    async fn list_jobs(
+        &self,
+        project: &str,
+        states: &[JobState],
+        before: Option<(i64, JobId)>,
+        limit: u32,
+    ) -> Result<Vec<JobRow>>;
 
     /// Ends a queued job; asks for the end of a running one.
     ///
@@ -173,8 +181,8 @@ pub trait Ledger: Send + Sync + 'static {
     /// One key.
     async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>>;
 
-    /// Keys, newest first; those after `before`, as with `list_jobs`.
-    async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>>;
+    /// Keys of a project, newest first; those after `before`, as with `list_jobs`.
+    async fn list_keys(&self, project: &str, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>>;
 
     /// Retires or revokes a key, for a reason. One that is in that state stays as it is.
     ///
@@ -191,22 +199,22 @@ pub trait Ledger: Send + Sync + 'static {
     /// Registers an owner. The same request id with the same display name gives the one that the first call made.
     ///
     /// # Errors
-    /// `RequestIdReused` for the same request id with another name.
+    /// `RequestIdReused` for the same request id with another name, or of another project.
     async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow>;
 
     /// One owner.
     async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>>;
 
-    /// Owners, newest first; those after `before`, as with `list_jobs`.
-    async fn list_owners(&self, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>>;
+    /// Owners of a project, newest first; those after `before`, as with `list_jobs`.
+    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>>;
 
     /// Registers an asset: gives it the next payload number of its key, and appends a commitment to the chain, signed by
     /// `signer`, at once. The same request id with the same owner, key, hash and display name gives the asset that the
     /// first call made, with the nonce of then.
     ///
     /// # Errors
-    /// `RequestIdReused` for the same request id with another asset, `NotFound` for an owner or a key that isn't there,
-    /// `KeyNotActive`, `PayloadsUsedUp`.
+    /// `RequestIdReused` for the same request id with another asset, or of another project; `NotFound` for an owner or a
+    /// key that isn't there or is another project's; `KeyNotActive`, `PayloadsUsedUp`.
     async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow>;
 
     /// The asset that was registered under a request id.
@@ -215,9 +223,10 @@ pub trait Ledger: Send + Sync + 'static {
     /// One asset.
     async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>>;
 
-    /// Assets, newest first; those after `before`, as with `list_jobs`.
+    /// Assets of a project, newest first; those after `before`, as with `list_jobs`.
     async fn list_assets(
         &self,
+        project: &str,
         filter: AssetFilter,
         before: Option<(i64, AssetId)>,
         limit: u32,
@@ -232,11 +241,12 @@ pub trait Ledger: Send + Sync + 'static {
     /// One commitment.
     async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>>;
 
-    /// Commitments in the order of the chain, those behind the one at place `after`.
-    async fn list_commitments(&self, after: i64, limit: u32) -> Result<Vec<Signed>>;
+    /// Commitments to assets of a project in the order of the chain, those behind the one at place `after`. The chain is
+    /// one for all projects, so there may be others in between.
+    async fn list_commitments(&self, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>>;
 
-    /// The last commitment of the chain.
-    async fn head(&self) -> Result<Option<Signed>>;
+    /// The last commitment of the chain that is to an asset of a project.
+    async fn head(&self, project: &str) -> Result<Option<Signed>>;
 
     /// How many jobs are queued.
     async fn queue_depth(&self) -> Result<i64>;

@@ -45,6 +45,8 @@ impl KeyState {
 pub struct NewOwner {
     /// Its name.
     pub id: OwnerId,
+    /// The project that registers it.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// Names the request, so that it can be repeated.
@@ -56,6 +58,8 @@ pub struct NewOwner {
 pub struct OwnerRow {
     /// Its name.
     pub id: OwnerId,
+    /// The project that registered it.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// When it was registered.
@@ -67,6 +71,8 @@ pub struct OwnerRow {
 pub struct NewAsset {
     /// Its name.
     pub id: AssetId,
+    /// The project that registers it; owner and key must be of the same.
+    pub project: String,
     /// Name of its commitment.
     pub commitment: CommitmentId,
     /// Whose it is.
@@ -92,6 +98,8 @@ pub struct NewAsset {
 pub struct AssetRow {
     /// Its name.
     pub id: AssetId,
+    /// The project that registered it.
+    pub project: String,
     /// Its commitment.
     pub commitment: CommitmentId,
     /// Whose it is.

@@ -64,6 +64,8 @@ pub struct Failure {
 pub struct JobRow {
     /// Its name.
     pub id: JobId,
+    /// Whose it is.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// What it does.
@@ -105,6 +107,8 @@ pub struct JobRow {
 pub struct NewJob {
     /// Its name.
     pub id: JobId,
+    /// Whose it is; so must be the artifacts and the key that it names.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// What it does.
@@ -142,8 +146,11 @@ impl fmt::Debug for Lease {
 #[derive(Clone)]
 pub enum Origin {
     /// A client sends it.
-    Upload,
-    /// An attempt of a job made it.
+    Upload {
+        /// Whose it is.
+        project: String,
+    },
+    /// An attempt of a job made it, whose project's it is.
     Output {
         /// The job.
         job: JobId,
@@ -155,7 +162,7 @@ pub enum Origin {
 impl fmt::Debug for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Upload => f.write_str("Upload"),
+            Self::Upload { project } => f.debug_struct("Upload").field("project", project).finish(),
             Self::Output { job, .. } => f.debug_struct("Output").field("job", job).finish_non_exhaustive(),
         }
     }
@@ -198,6 +205,8 @@ pub enum ArtifactState {
 pub struct ArtifactRow {
     /// Its name.
     pub id: ArtifactId,
+    /// Whose it is.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// Length in bytes.
@@ -253,6 +262,8 @@ pub struct Completion {
 pub struct KeyRow {
     /// Its name.
     pub id: KeyId,
+    /// Whose it is: the project of the job that made it.
+    pub project: String,
     /// What people call it.
     pub display_name: String,
     /// Bits of its messages.

@@ -3,7 +3,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::{
-    artifact_service_server, job_service_server, key_service_server, registry_service_server, worker_service_server,
+    artifact_service_server, job_service_server, key_service_server, registry_service_server, token_service_server,
+    worker_service_server,
 };
 use tokio::task::JoinHandle;
 use tokio::time::{interval, timeout};
@@ -17,12 +18,13 @@ use crate::ledger::Ledger;
 pub const EVERY: Duration = Duration::from_secs(5);
 
 /// The server as a whole, and each of its services: one can't do without the ledger more than another.
-const SERVICES: [&str; 6] = [
+const SERVICES: [&str; 7] = [
     "",
     artifact_service_server::SERVICE_NAME,
     job_service_server::SERVICE_NAME,
     key_service_server::SERVICE_NAME,
     registry_service_server::SERVICE_NAME,
+    token_service_server::SERVICE_NAME,
     worker_service_server::SERVICE_NAME,
 ];
 

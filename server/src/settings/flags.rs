@@ -2,17 +2,30 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{Args, Parser};
 
-use super::{DatabaseUrl, LogFormat, Settings, WorkerDevice};
+use super::{Access, DatabaseUrl, LogFormat, Settings, WorkerDevice};
+use crate::offline::Command;
 
 /// The GuardSplat server: takes jobs over gRPC, keeps them, and gives them to workers.
 ///
 /// Settings come from, in this order: defaults, a file, environment variables (GUARDSPLAT_ and the setting's name in
 /// capitals), flags. The master key is taken from GUARDSPLAT_MASTER_KEY (64 hexadecimal digits), the file that
 /// --master-key-file names, or master.key in the data folder, which is made at the first start.
-#[derive(Clone, Debug, Default, Parser)]
+#[derive(Clone, Debug, Parser)]
 #[command(name = "guardsplat-server", version, args_override_self = true)]
+pub struct Arguments {
+    /// Settings.
+    #[command(flatten)]
+    pub flags: Flags,
+    /// What to do instead of serving.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+// No comment for people here: clap would put it in place of the program's.
+#[allow(missing_docs)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct Flags {
     /// Settings file [default: /etc/guardsplat/server.toml, if it is there]
     #[arg(long, value_name = "FILE")]
@@ -20,6 +33,21 @@ pub struct Flags {
     /// Address and port to listen on; port 0 takes any that is free [default: 127.0.0.1:50051]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
+    /// Who may call: anybody, or whoever shows a token [default: open]
+    #[arg(long, value_name = "WHO")]
+    pub access: Option<Access>,
+    /// Whether other machines may reach a server that is open to anybody [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub allow_open_network: Option<bool>,
+    /// File of the server's certificate (PEM), with which it speaks TLS only [default: none, without TLS]
+    #[arg(long, value_name = "FILE")]
+    pub tls_certificate: Option<PathBuf>,
+    /// File of the certificate's key (PEM) [default: none]
+    #[arg(long, value_name = "FILE")]
+    pub tls_key: Option<PathBuf>,
+    /// File of the certificates (PEM) that clients' must be signed by [default: none, clients need none]
+    #[arg(long, value_name = "FILE")]
+    pub tls_client_ca: Option<PathBuf>,
     /// Folder of everything that is kept [default: guardsplat-data]
     #[arg(long, value_name = "FOLDER")]
     pub data_dir: Option<PathBuf>,
@@ -33,6 +61,21 @@ pub struct Flags {
     /// Most jobs that may wait [default: 10000]
     #[arg(long, value_name = "JOBS")]
     pub max_queued_jobs: Option<u64>,
+    /// Most jobs of one project that may wait; 0 is no limit but that of all [default: 0]
+    #[arg(long, value_name = "JOBS")]
+    pub max_queued_jobs_per_project: Option<u64>,
+    /// Most bytes of artifacts that one project may have; 0 is no limit [default: 0]
+    #[arg(long, value_name = "BYTES")]
+    pub max_artifact_bytes_per_project: Option<u64>,
+    /// Most jobs, uploads and registrations of one caller in a minute; 0 is no limit [default: 6000]
+    #[arg(long, value_name = "CALLS")]
+    pub max_submissions_per_minute: Option<u32>,
+    /// Most jobs of one caller that verify in a minute; 0 is no limit [default: 6000]
+    #[arg(long, value_name = "JOBS")]
+    pub max_claims_per_minute: Option<u32>,
+    /// Most other calls of one caller in a minute; 0 is no limit [default: 60000]
+    #[arg(long, value_name = "CALLS")]
+    pub max_calls_per_minute: Option<u32>,
     /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
     #[arg(long, value_name = "MEBIBYTES")]
     pub max_job_memory_mebibytes: Option<u64>,
@@ -81,10 +124,20 @@ impl Flags {
         let Self {
             config: _,
             listen,
+            access,
+            allow_open_network,
+            tls_certificate,
+            tls_key,
+            tls_client_ca,
             data_dir,
             database,
             max_artifact_bytes,
             max_queued_jobs,
+            max_queued_jobs_per_project,
+            max_artifact_bytes_per_project,
+            max_submissions_per_minute,
+            max_claims_per_minute,
+            max_calls_per_minute,
             max_job_memory_mebibytes,
             lease_seconds,
             max_attempts,
@@ -100,10 +153,23 @@ impl Flags {
             log_filter,
         } = self;
         set(&mut settings.listen, listen);
+        set(&mut settings.access, access);
+        set(&mut settings.allow_open_network, allow_open_network);
+        set(&mut settings.tls_certificate, tls_certificate.map(Some));
+        set(&mut settings.tls_key, tls_key.map(Some));
+        set(&mut settings.tls_client_ca, tls_client_ca.map(Some));
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.database, database.map(Some));
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
+        set(&mut settings.max_queued_jobs_per_project, max_queued_jobs_per_project);
+        set(
+            &mut settings.max_artifact_bytes_per_project,
+            max_artifact_bytes_per_project,
+        );
+        set(&mut settings.max_submissions_per_minute, max_submissions_per_minute);
+        set(&mut settings.max_claims_per_minute, max_claims_per_minute);
+        set(&mut settings.max_calls_per_minute, max_calls_per_minute);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);

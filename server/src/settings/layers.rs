@@ -15,7 +15,19 @@ const USUAL_FILE: &str = "/etc/guardsplat/server.toml";
 /// What the names of environment variables begin with.
 const PREFIX: &str = "GUARDSPLAT_";
 /// Variables with this beginning that other programs of the project read, so that one environment serves them all.
-const OTHERS: &[&str] = &["CLIP", "CONFIG", "HOME", "MODELS", "SCENES", "SERVER"];
+const OTHERS: &[&str] = &[
+    "CA",
+    "CERT",
+    "CERT_KEY",
+    "CLIP",
+    "CONFIG",
+    "HOME",
+    "MODELS",
+    "SCENES",
+    "SERVER",
+    "TOKEN",
+    "TOKEN_FILE",
+];
 
 /// Loads all layers and checks them. The environment is an argument so that tests can have their own.
 pub fn load(flags: Flags, environment: impl IntoIterator<Item = (String, String)>) -> Result<Settings, SettingsError> {

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use tracing_subscriber::EnvFilter;
 
-use super::{Settings, SettingsError};
+use super::{Access, Settings, SettingsError};
 use crate::ledger::postgres;
 
 const DAY: u64 = 24 * 60 * 60;
@@ -14,6 +14,26 @@ impl Settings {
         let numbers = [
             ("max_artifact_bytes", self.max_artifact_bytes, 1, 1 << 40),
             ("max_queued_jobs", self.max_queued_jobs, 1, 1_000_000),
+            (
+                "max_queued_jobs_per_project",
+                self.max_queued_jobs_per_project,
+                0,
+                1_000_000,
+            ),
+            (
+                "max_artifact_bytes_per_project",
+                self.max_artifact_bytes_per_project,
+                0,
+                1 << 60,
+            ),
+            (
+                "max_submissions_per_minute",
+                self.max_submissions_per_minute.into(),
+                0,
+                1_000_000,
+            ),
+            ("max_claims_per_minute", self.max_claims_per_minute.into(), 0, 1_000_000),
+            ("max_calls_per_minute", self.max_calls_per_minute.into(), 0, 1_000_000),
             ("max_job_memory_mebibytes", self.max_job_memory_mebibytes, 0, 1 << 24),
             ("lease_seconds", self.lease_seconds, 1, DAY),
             ("max_attempts", self.max_attempts.into(), 1, 100),
@@ -38,8 +58,13 @@ impl Settings {
                 reason: format!("{:e} is not between 1e-30 and 0.1", self.false_positive_rate),
             });
         }
+        self.check_reach()?;
+        self.check_tls()?;
         not_empty("data_dir", &self.data_dir)?;
         for (field, path) in [
+            ("tls_certificate", &self.tls_certificate),
+            ("tls_key", &self.tls_key),
+            ("tls_client_ca", &self.tls_client_ca),
             ("worker_binary", &self.worker_binary),
             ("master_key_file", &self.master_key_file),
         ] {
@@ -66,6 +91,40 @@ impl Settings {
             reason: error.to_string(),
         })?;
         Ok(())
+    }
+
+    /// Refuses to be open to a network by oversight.
+    fn check_reach(&self) -> Result<(), SettingsError> {
+        // Certificates of clients keep strangers out too.
+        let anybody = self.access == Access::Open && self.tls_client_ca.is_none();
+        let open = anybody && !self.listen.ip().is_loopback();
+        if !open || self.allow_open_network {
+            return Ok(());
+        }
+        Err(SettingsError::Invalid {
+            field: "listen",
+            reason: format!(
+                "{} can be reached from other machines, and access = \"open\" lets anybody in; set access = \"tokens\", \
+                 or allow_open_network = true where the network keeps strangers out",
+                self.listen
+            ),
+        })
+    }
+
+    /// Refuses half of what TLS needs.
+    fn check_tls(&self) -> Result<(), SettingsError> {
+        let missing = |field: &'static str, with: &str| {
+            Err(SettingsError::Invalid {
+                field,
+                reason: format!("is missing, and {with} is of no use without it"),
+            })
+        };
+        match (&self.tls_certificate, &self.tls_key, &self.tls_client_ca) {
+            (Some(_), None, _) => missing("tls_key", "tls_certificate"),
+            (None, Some(_), _) => missing("tls_certificate", "tls_key"),
+            (None, None, Some(_)) => missing("tls_certificate", "tls_client_ca"),
+            (Some(_), Some(_), _) | (None, None, None) => Ok(()),
+        }
     }
 }
 

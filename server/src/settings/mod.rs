@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 pub use database::{DATABASE_VARIABLE, DatabaseUrl};
 pub use error::SettingsError;
-pub use flags::Flags;
+pub use flags::{Arguments, Flags};
 pub use layers::{load, parse};
 
 /// Everything that can be set. `deploy/guardsplat-server.toml` says what each is for.
@@ -23,6 +23,16 @@ pub use layers::{load, parse};
 pub struct Settings {
     /// Where the server listens.
     pub listen: SocketAddr,
+    /// Who may call.
+    pub access: Access,
+    /// Whether other machines may reach a server that asks nobody for a token.
+    pub allow_open_network: bool,
+    /// File of the server's certificate; with it the server speaks TLS only.
+    pub tls_certificate: Option<PathBuf>,
+    /// File of the certificate's key.
+    pub tls_key: Option<PathBuf>,
+    /// File of the certificates that clients' must be signed by; with it nobody is let in without one.
+    pub tls_client_ca: Option<PathBuf>,
     /// Folder of everything that is kept.
     pub data_dir: PathBuf,
     /// The database of the ledger, for several servers; a file in the folder where none is named.
@@ -31,6 +41,16 @@ pub struct Settings {
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
     pub max_queued_jobs: u64,
+    /// Most jobs of one project that may wait; 0 for no limit but that of all.
+    pub max_queued_jobs_per_project: u64,
+    /// Most bytes of artifacts that one project may have; 0 for no limit.
+    pub max_artifact_bytes_per_project: u64,
+    /// Most jobs, uploads and registrations of one caller in a minute; 0 for no limit.
+    pub max_submissions_per_minute: u32,
+    /// Most jobs of one caller that verify in a minute; 0 for no limit.
+    pub max_claims_per_minute: u32,
+    /// Most other calls of one caller in a minute; 0 for no limit.
+    pub max_calls_per_minute: u32,
     /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
     pub max_job_memory_mebibytes: u64,
     /// Seconds until a worker that says nothing is given up.
@@ -60,6 +80,16 @@ pub struct Settings {
     /// The master key, from the environment only: neither a file of settings nor a flag is a place for a secret.
     #[serde(skip)]
     pub master_key: Option<SecretString>,
+}
+
+/// Who may call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Access {
+    /// Anybody who can reach the server.
+    Open,
+    /// Whoever shows a token.
+    Tokens,
 }
 
 /// What the embedded worker computes on.
@@ -99,10 +129,20 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
+            access: Access::Open,
+            allow_open_network: false,
+            tls_certificate: None,
+            tls_key: None,
+            tls_client_ca: None,
             data_dir: "guardsplat-data".into(),
             database: None,
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
+            max_queued_jobs_per_project: 0,
+            max_artifact_bytes_per_project: 0,
+            max_submissions_per_minute: 6_000,
+            max_claims_per_minute: 6_000,
+            max_calls_per_minute: 60_000,
             max_job_memory_mebibytes: 0,
             lease_seconds: 30,
             max_attempts: 3,

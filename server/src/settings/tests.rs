@@ -14,9 +14,9 @@ fn layers(file: &str, variables: &[(&str, &str)], flags: &[&str]) -> Result<Sett
     let path = NamedTempFile::with_suffix(".toml").unwrap();
     fs::write(&path, file).unwrap();
     let config = path.path().to_str().unwrap();
-    let flags = Flags::try_parse_from(["guardsplat-server", "--config", config].iter().chain(flags)).unwrap();
+    let arguments = Arguments::try_parse_from(["guardsplat-server", "--config", config].iter().chain(flags)).unwrap();
     load(
-        flags,
+        arguments.flags,
         variables
             .iter()
             .map(|(name, value)| (name.to_string(), value.to_string())),
@@ -64,6 +64,11 @@ fn each_layer_overrides_the_one_before() {
 fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
+        ("access", "tokens"),
+        ("allow_open_network", "true"),
+        ("tls_certificate", "/c.pem"),
+        ("tls_key", "/k.pem"),
+        ("tls_client_ca", "/ca.pem"),
         ("data_dir", "/data"),
         (
             "database",
@@ -71,6 +76,11 @@ fn every_setting_can_be_set_everywhere() {
         ),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
+        ("max_queued_jobs_per_project", "11"),
+        ("max_artifact_bytes_per_project", "12"),
+        ("max_submissions_per_minute", "13"),
+        ("max_claims_per_minute", "14"),
+        ("max_calls_per_minute", "15"),
         ("max_job_memory_mebibytes", "2000"),
         ("lease_seconds", "6"),
         ("max_attempts", "7"),
@@ -91,7 +101,7 @@ fn every_setting_can_be_set_everywhere() {
         all.as_object().unwrap().len(),
         "a setting is missing in this test"
     );
-    let flags = Flags::command();
+    let flags = Arguments::command();
     assert_eq!(
         flags.get_arguments().filter(|a| a.get_id() != "config").count(),
         values.len()
@@ -99,14 +109,21 @@ fn every_setting_can_be_set_everywhere() {
     for (name, value) in values {
         let variable = format!("GUARDSPLAT_{}", name.to_uppercase());
         let flag = format!("--{}", name.replace('_', "-"));
-        let by_variable = layers("", &[(&variable, value)], &[]).unwrap();
-        let by_flag = layers("", &[], &[&flag, value]).unwrap();
-        let quoted = if value.parse::<u64>().is_ok() || value == "false" {
+        // Those of TLS go together.
+        let besides = match name {
+            "tls_certificate" => "tls_key = \"/k.pem\"\n",
+            "tls_key" => "tls_certificate = \"/c.pem\"\n",
+            "tls_client_ca" => "tls_key = \"/k.pem\"\ntls_certificate = \"/c.pem\"\n",
+            _ => "",
+        };
+        let by_variable = layers(besides, &[(&variable, value)], &[]).unwrap();
+        let by_flag = layers(besides, &[], &[&flag, value]).unwrap();
+        let quoted = if value.parse::<u64>().is_ok() || value.parse::<bool>().is_ok() {
             value.into()
         } else {
             format!("{value:?}")
         };
-        let by_file = layers(&format!("{name} = {quoted}"), &[], &[]).unwrap();
+        let by_file = layers(&format!("{besides}{name} = {quoted}"), &[], &[]).unwrap();
         let shown = |settings: &Settings| serde_json::to_value(settings).unwrap()[name].clone();
         assert_ne!(shown(&by_flag), all[name], "{name} stays at its default");
         assert_eq!(shown(&by_variable), shown(&by_flag), "{name}");
@@ -165,6 +182,8 @@ fn variables_of_others_do_not_matter() {
     let variables = [
         ("GUARDSPLAT_HOME", "/home"),
         ("GUARDSPLAT_SERVER", "http://localhost:1"),
+        ("GUARDSPLAT_TOKEN", "gst_a_b"),
+        ("GUARDSPLAT_TOKEN_FILE", "/token"),
         ("GUARDSPLAT_SERVICE_HOST", "10.0.0.1"),
         ("GUARDSPLAT_PORT_50051_TCP_ADDR", "10.0.0.1"),
         ("GUARDSPLAT_SERVER_PORT", "tcp://10.0.0.1:50051"),
@@ -214,6 +233,35 @@ fn bad_values_are_told_with_setting_and_limit() {
         let text = error(file, &[], &[]);
         assert!(text.contains(field), "{file}: {text}");
     }
+}
+
+#[test]
+fn nobody_is_open_to_a_network_by_oversight() {
+    for address in ["0.0.0.0:50051", "[::]:50051", "192.0.2.7:50051"] {
+        let listen = ["--listen", address];
+        let text = error("", &[], &listen);
+        assert!(
+            text.starts_with("setting listen: ") && text.contains("allow_open_network"),
+            "{text}"
+        );
+        layers("access = \"tokens\"", &[], &listen).unwrap();
+        layers("allow_open_network = true", &[], &listen).unwrap();
+    }
+    for address in ["127.0.0.2:1", "[::1]:0"] {
+        layers("", &[], &["--listen", address]).unwrap();
+    }
+}
+
+#[test]
+fn half_of_tls_is_told() {
+    let missing = |file: &str| error(file, &[], &[]);
+    assert!(missing("tls_key = \"k\"").starts_with("setting tls_certificate: is missing"));
+    assert!(missing("tls_certificate = \"c\"").starts_with("setting tls_key: is missing"));
+    assert!(missing("tls_client_ca = \"a\"").starts_with("setting tls_certificate: is missing"));
+    let both = "tls_key = \"k\"\ntls_certificate = \"c\"";
+    let listen = ["--listen", "0.0.0.0:1"];
+    assert!(error(both, &[], &listen).starts_with("setting listen: "));
+    layers(&format!("{both}\ntls_client_ca = \"a\""), &[], &listen).unwrap();
 }
 
 #[test]
@@ -278,13 +326,13 @@ fn the_password_of_the_database_is_not_shown() {
 
 #[test]
 fn the_command_line_is_sound() {
-    Flags::command().debug_assert();
+    Arguments::command().debug_assert();
 }
 
 #[test]
 fn help_tells_the_defaults() {
     let defaults = serde_json::to_value(Settings::default()).unwrap();
-    let command = Flags::command();
+    let command = Arguments::command();
     for (name, value) in defaults.as_object().unwrap() {
         let flag = command.get_arguments().find(|flag| flag.get_id() == name.as_str());
         let help = flag

@@ -111,9 +111,13 @@ impl Bench {
         let mut line = String::new();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         timeout(SOON, stdout.read_line(&mut line)).await.unwrap().unwrap();
-        let address = line.trim().strip_prefix("listening on http://").unwrap_or_else(|| {
-            panic!("said {line:?} and {}", self.server_log());
-        });
+        let address = line
+            .trim()
+            .rsplit_once("://")
+            .map(|(_, address)| address)
+            .unwrap_or_else(|| {
+                panic!("said {line:?} and {}", self.server_log());
+            });
         Server {
             child,
             address: address.into(),
@@ -130,6 +134,27 @@ impl Bench {
         // The log comes before.
         let last = text.lines().last().unwrap_or_default().to_owned();
         (output.status, last)
+    }
+
+    /// Runs the program to its end: exit status, standard output and standard error.
+    pub async fn says(&self, arguments: &[&str]) -> (ExitStatus, String, String) {
+        let output = timeout(SOON, self.command(arguments).stderr(Stdio::piped()).output()).await;
+        let output = output.unwrap().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (output.status, text(output.stdout), text(output.stderr))
+    }
+
+    /// All files that the server keeps.
+    pub fn kept(&self) -> Vec<PathBuf> {
+        let mut folders = vec![self.data()];
+        let mut files = Vec::new();
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() { &mut folders } else { &mut files }.push(path);
+            }
+        }
+        files
     }
 
     pub async fn start(&self) -> Server {

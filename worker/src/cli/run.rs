@@ -2,6 +2,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
+use guardsplat_proto::connect::{TOKEN_VARIABLE, Target, Token};
 use guardsplat_worker::device::DeviceChoice;
 
 use super::{Budget, Exit};
@@ -9,9 +11,21 @@ use crate::jobs;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Address of the server, such as http://127.0.0.1:50051
+    /// Address of the server, such as http://127.0.0.1:50051, or https:// with TLS. A token is taken from GUARDSPLAT_TOKEN
     #[arg(long, value_name = "URL")]
     server: String,
+    /// File of certificates (PEM) that an https server's is checked with, instead of those of public authorities
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_CA", value_parser = file())]
+    ca: Option<PathBuf>,
+    /// File of the certificate (PEM) to show to a server that asks for one
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_CERT", value_parser = file())]
+    cert: Option<PathBuf>,
+    /// File of that certificate's key (PEM)
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_CERT_KEY", value_parser = file())]
+    cert_key: Option<PathBuf>,
+    /// File of the token to show to a server that asks for one; GUARDSPLAT_TOKEN goes before it
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_TOKEN_FILE", value_parser = file())]
+    token_file: Option<PathBuf>,
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
@@ -28,9 +42,30 @@ pub struct Arguments {
     work_dir: Option<PathBuf>,
 }
 
+/// Takes the name of a file, an empty one too: that is how a variable is unset in many places.
+fn file() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
+}
+
 pub fn run(arguments: Arguments) -> Exit {
+    let variable = std::env::var(TOKEN_VARIABLE).ok();
+    let path = |given: Option<PathBuf>| given.filter(|path| !path.as_os_str().is_empty());
+    let token_file = path(arguments.token_file);
+    let token = match Token::find(variable.as_deref(), token_file.as_deref()) {
+        Ok(token) => token,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Exit::Failed;
+        }
+    };
     let options = jobs::Options {
-        server: arguments.server,
+        server: Target {
+            url: arguments.server,
+            ca: path(arguments.ca),
+            certificate: path(arguments.cert),
+            certificate_key: path(arguments.cert_key),
+            token,
+        },
         device: arguments.device,
         memory: arguments.budget.bytes(),
         name: arguments.name,

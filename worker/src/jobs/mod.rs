@@ -20,6 +20,7 @@ mod worker;
 
 use std::path::PathBuf;
 
+use guardsplat_proto::connect::Target;
 use guardsplat_worker::device::DeviceChoice;
 
 use accelerator::Accelerator;
@@ -33,8 +34,8 @@ const HOST_CHARACTERS: usize = 40;
 
 /// What a worker is started with.
 pub struct Options {
-    /// The server's address.
-    pub server: String,
+    /// The server, and how it is reached.
+    pub server: Target,
     /// Where to compute.
     pub device: DeviceChoice,
     /// Bytes of memory that a job may take; all that the machine has unless given.
@@ -68,7 +69,7 @@ async fn work(options: &Options) -> Result<()> {
     let folder = Folder::new(&parent)?;
     let (accelerator, device) = Accelerator::start(options.device, options.memory).await?;
     let name = options.name.clone().unwrap_or_else(default_name);
-    tracing::info!(worker = name, device, server = options.server, "ready for jobs");
+    tracing::info!(worker = name, device, server = options.server.url, "ready for jobs");
     let mut worker = Worker {
         server,
         leaving,

@@ -1,9 +1,9 @@
 //! The connection to the server: calls that are made again until they are answered.
 use std::time::Duration;
 
+use guardsplat_proto::connect::{Channel, ConnectError, Target};
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
 use guardsplat_proto::v1::worker_service_client::WorkerServiceClient;
-use tonic::transport::{Channel, Endpoint};
 use tonic::{Response, Status};
 
 use super::backoff::Backoff;
@@ -21,24 +21,18 @@ pub struct Server {
 }
 
 impl Server {
-    /// The server at `url`; nothing is sent yet.
+    /// The server at an address, with its certificates read; nothing is sent yet.
     ///
     /// # Errors
-    /// [`Error::BadOption`] where that is no `http` address.
-    pub fn new(url: &str) -> Result<Self> {
-        let bad = |reason: String| Error::BadOption {
-            field: "--server",
-            reason,
-        };
-        let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| {
-            bad(format!(
-                "{url:?} is no address such as http://127.0.0.1:50051 ({error})"
-            ))
+    /// [`Error::BadOption`] where that is no address, or certificates can't be used.
+    pub fn new(target: &Target) -> Result<Self> {
+        let endpoint = target.endpoint().map_err(|error| Error::BadOption {
+            field: match error {
+                ConnectError::Address { .. } | ConnectError::Plain { .. } => "--server",
+                _ => "--ca, --cert or --cert-key",
+            },
+            reason: error.to_string(),
         })?;
-        let address = endpoint.uri();
-        if address.scheme_str() != Some("http") || address.authority().is_none() {
-            return Err(bad(format!("{url:?} must begin with http:// and name a host")));
-        }
         let channel = endpoint
             .connect_timeout(CONNECT)
             .tcp_nodelay(true)
@@ -46,7 +40,9 @@ impl Server {
             .keep_alive_timeout(ALIVE)
             .keep_alive_while_idle(true)
             .connect_lazy();
-        Ok(Self { channel })
+        Ok(Self {
+            channel: target.authorised(channel),
+        })
     }
 
     /// Calls of workers.
@@ -108,9 +104,16 @@ mod tests {
 
     #[tokio::test]
     async fn addresses_are_checked() {
-        Server::new("http://127.0.0.1:50051").unwrap();
-        for bad in ["127.0.0.1:50051", "https://example.org", "http://", "", "http://a b"] {
-            let error = Server::new(bad).err().expect(bad).to_string();
+        let at = |url: &str| {
+            Server::new(&Target {
+                url: url.into(),
+                ..Target::default()
+            })
+        };
+        at("http://127.0.0.1:50051").unwrap();
+        at("https://example.org").unwrap();
+        for bad in ["127.0.0.1:50051", "http://", "", "http://a b"] {
+            let error = at(bad).err().expect(bad).to_string();
             assert!(error.starts_with("--server: "), "{error}");
         }
     }

@@ -343,7 +343,10 @@ fn bad_options_are_told() {
     let bench = Bench::new();
     for (line, needle) in [
         ("run --server localhost:50051 --device cpu", "--server: "),
-        ("run --server https://localhost --device cpu", "must begin with http://"),
+        (
+            "run --server ftp://localhost --device cpu",
+            "must begin with http:// or https://",
+        ),
         ("run --server http://127.0.0.1:9 --device cpu --work-dir none", "none"),
     ] {
         let told = bench.fails(line);

@@ -75,7 +75,13 @@ pub(super) fn of_job(job: &JobRow) -> Result<Option<Claim>> {
 
 impl Api {
     /// Refuses a claim on what is not there, is of another key, or can't be marked as is asked.
-    pub(super) async fn check_claim(&self, claim: &Claim, key: &KeyRow, submission: &Submission) -> Result<()> {
+    pub(super) async fn check_claim(
+        &self,
+        project: &str,
+        claim: &Claim,
+        key: &KeyRow,
+        submission: &Submission,
+    ) -> Result<()> {
         let (field, key_field) = match submission.kind {
             JobKind::Embed => ("job.embed.asset", "job.embed.key"),
             _ => ("job.verify.asset", "job.verify.key"),
@@ -83,13 +89,11 @@ impl Api {
         let id = match claim {
             Claim::Search => return Ok(()),
             Claim::Owner(id) => {
-                let owner = self.ledger().get_owner(*id).await?;
-                return owner.map(|_| ()).ok_or_else(|| Kind::Owner.not_found(*id));
+                return self.own_owner(project, *id).await.map(|_| ());
             }
             Claim::Asset(id) => *id,
         };
-        let asset = self.ledger().get_asset(id).await?;
-        let asset = asset.ok_or_else(|| Kind::Asset.not_found(id))?;
+        let asset = self.own_asset(project, id).await?;
         if asset.key != key.id {
             let reason = format!("was registered for {}, not for this key", Kind::Key.name(asset.key));
             return Err(Error::invalid(field, reason));
@@ -102,7 +106,7 @@ impl Api {
             return Err(Error::invalid(key_field, reason));
         }
         // One that is gone is told of by the ledger, which also knows whether the same was asked for before.
-        let Some(scene) = self.scene(submission).await? else {
+        let Some(scene) = self.scene(project, submission).await? else {
             return Ok(());
         };
         if upload::digest(&scene) != Some(asset.sha256) {
@@ -116,11 +120,11 @@ impl Api {
     }
 
     /// SHA-256 of the first input, if it is there.
-    async fn scene(&self, submission: &Submission) -> Result<Option<String>> {
+    async fn scene(&self, project: &str, submission: &Submission) -> Result<Option<String>> {
         let Some(&id) = submission.inputs.first() else {
             return Ok(None);
         };
-        Ok(self.ledger().get_artifact(id).await?.map(|row| row.sha256))
+        Ok(self.find_artifact(project, id).await?.map(|row| row.sha256))
     }
 
     /// The word that an asset of a key is marked with, in hexadecimal, for the worker that marks it.

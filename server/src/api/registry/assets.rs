@@ -7,7 +7,7 @@ use uuid::Uuid;
 use crate::api::clock::{self, timestamp};
 use crate::api::names::Kind;
 use crate::api::problems::Problems;
-use crate::api::{Api, page, submission, text, upload};
+use crate::api::{Api, own, page, submission, text, upload};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, AssetFilter, AssetRow, KeyId, NewAsset, OwnerId};
 use crate::notary;
@@ -30,16 +30,19 @@ enum Source {
 }
 
 impl Api {
-    pub(super) async fn register_asset(&self, request: CreateAssetRequest) -> Result<Asset> {
+    pub(super) async fn register_asset(&self, project: String, request: CreateAssetRequest) -> Result<Asset> {
         let registration = checked(request)?;
+        let asked = registration.request_id;
+        let request = asked.map(|id| own::request(&project, id));
         let (sha256, artifact) = match registration.original {
             Source::Told(sha256) => (sha256, None),
-            Source::Artifact(id) => (self.hash_of(id, registration.request_id).await?, Some(id)),
+            Source::Artifact(id) => (self.hash_of(&project, id, request).await?, Some(id)),
         };
         let id = Uuid::now_v7();
         let nonce = notary::new_nonce(self.master(), id)?;
         let new = NewAsset {
             id,
+            project,
             commitment: Uuid::now_v7(),
             owner: registration.owner,
             display_name: registration.display_name,
@@ -48,17 +51,17 @@ impl Api {
             key: registration.key,
             sealed_nonce: nonce.sealed,
             nonce_hash: nonce.hash,
-            request_id: registration.request_id,
+            request_id: request,
         };
         let signer = self.notary().signing_key();
-        let row = self.ledger().create_asset(new, signer, clock::now()).await?;
-        Ok(message(row))
+        let row = self.ledger().create_asset(new, signer, clock::now()).await;
+        Ok(message(row.map_err(|error| own::as_asked(error, asked))?))
     }
 
     /// What the server counted of an artifact when it was uploaded. One that is gone is still known to the request that
     /// registered it.
-    async fn hash_of(&self, id: ArtifactId, request: Option<Uuid>) -> Result<Hash> {
-        if let Some(row) = self.ledger().get_artifact(id).await? {
+    async fn hash_of(&self, project: &str, id: ArtifactId, request: Option<Uuid>) -> Result<Hash> {
+        if let Some(row) = self.find_artifact(project, id).await? {
             return upload::digest(&row.sha256)
                 .ok_or_else(|| Error::internal("reading a hash kept in the ledger", "it is no SHA-256"));
         }
@@ -66,17 +69,20 @@ impl Api {
             Some(request) => self.ledger().find_asset_request(request).await?,
             None => None,
         };
-        let same = before.filter(|row| row.artifact == Some(id));
+        let same = before.filter(|row| row.artifact == Some(id) && row.project == project);
         same.map(|row| row.sha256).ok_or_else(|| Kind::Artifact.not_found(id))
     }
 
-    pub(super) async fn asset(&self, name: &str) -> Result<Asset> {
+    pub(super) async fn asset(&self, project: &str, name: &str) -> Result<Asset> {
         let id = Kind::Asset.parse("name", name)?;
-        let row = self.ledger().get_asset(id).await?;
-        Ok(message(row.ok_or_else(|| Kind::Asset.not_found(id))?))
+        Ok(message(self.own_asset(project, id).await?))
     }
 
-    pub(super) async fn page_of_assets(&self, request: &ListAssetsRequest) -> Result<ListAssetsResponse> {
+    pub(super) async fn page_of_assets(
+        &self,
+        project: &str,
+        request: &ListAssetsRequest,
+    ) -> Result<ListAssetsResponse> {
         let size = page::size(request.page_size)?;
         let given = |kind: Kind, field, name: &str| match name {
             "" => Ok(None),
@@ -89,7 +95,7 @@ impl Api {
         let query: [&[u8]; 3] = [b"assets", request.owner.as_bytes(), request.key.as_bytes()];
         let before = page::position(&query, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_assets(filter, before, size + 1).await?;
+        let rows = self.ledger().list_assets(project, filter, before, size + 1).await?;
         let (rows, next_page_token) = page::cut(&query, rows, size, |row| (row.create_time, row.id));
         Ok(ListAssetsResponse {
             assets: rows.into_iter().map(message).collect(),

@@ -12,20 +12,20 @@ use crate::error::{Error, Result};
 const QUERY: &[&[u8]] = &[b"commitments"];
 
 impl Api {
-    pub(super) async fn commitment(&self, name: &str) -> Result<Signed> {
+    pub(super) async fn commitment(&self, project: &str, name: &str) -> Result<Signed> {
         let id = Kind::Commitment.parse("name", name)?;
-        let signed = self.ledger().get_commitment(id).await?;
-        signed.ok_or_else(|| Kind::Commitment.not_found(id))
+        self.own_commitment(project, id).await
     }
 
     pub(super) async fn page_of_commitments(
         &self,
+        project: &str,
         request: &ListCommitmentsRequest,
     ) -> Result<ListCommitmentsResponse> {
         let size = page::size(request.page_size)?;
         let after = page::position(QUERY, &request.page_token)?.map_or(0, |(sequence, _)| sequence);
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_commitments(after, size + 1).await?;
+        let rows = self.ledger().list_commitments(project, after, size + 1).await?;
         let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (sequence(row), row.commitment.id));
         Ok(ListCommitmentsResponse {
             commitments: rows.iter().map(message).collect(),
@@ -33,16 +33,16 @@ impl Api {
         })
     }
 
-    pub(super) async fn head(&self) -> Result<Commitment> {
-        let head = self.ledger().head().await?;
+    pub(super) async fn head(&self, project: &str) -> Result<Commitment> {
+        let head = self.ledger().head(project).await?;
         // The chain itself has no name; none has this id.
         let head = head.ok_or_else(|| Kind::Commitment.not_found(Uuid::nil()))?;
         Ok(message(&head))
     }
 
-    pub(super) async fn document(&self, name: &str) -> Result<String> {
+    pub(super) async fn document(&self, project: &str, name: &str) -> Result<String> {
         let document = Document {
-            signed: self.commitment(name).await?,
+            signed: self.commitment(project, name).await?,
             public_key: self.notary().public_key(),
         };
         document

@@ -13,35 +13,43 @@ use guardsplat_proto::v1::{
 use tonic::{Request, Response, Status};
 
 use super::Api;
+use super::guard::caller;
 
 #[tonic::async_trait]
 impl RegistryService for Api {
     async fn create_owner(&self, request: Request<CreateOwnerRequest>) -> Result<Response<Owner>, Status> {
-        Ok(Response::new(self.register_owner(request.into_inner()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.register_owner(project, request.into_inner()).await?))
     }
 
     async fn get_owner(&self, request: Request<GetOwnerRequest>) -> Result<Response<Owner>, Status> {
-        Ok(Response::new(self.owner(&request.get_ref().name).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.owner(&project, &request.get_ref().name).await?))
     }
 
     async fn list_owners(&self, request: Request<ListOwnersRequest>) -> Result<Response<ListOwnersResponse>, Status> {
-        Ok(Response::new(self.page_of_owners(request.get_ref()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.page_of_owners(&project, request.get_ref()).await?))
     }
 
     async fn create_asset(&self, request: Request<CreateAssetRequest>) -> Result<Response<Asset>, Status> {
-        Ok(Response::new(self.register_asset(request.into_inner()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.register_asset(project, request.into_inner()).await?))
     }
 
     async fn get_asset(&self, request: Request<GetAssetRequest>) -> Result<Response<Asset>, Status> {
-        Ok(Response::new(self.asset(&request.get_ref().name).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.asset(&project, &request.get_ref().name).await?))
     }
 
     async fn list_assets(&self, request: Request<ListAssetsRequest>) -> Result<Response<ListAssetsResponse>, Status> {
-        Ok(Response::new(self.page_of_assets(request.get_ref()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.page_of_assets(&project, request.get_ref()).await?))
     }
 
     async fn get_commitment(&self, request: Request<GetCommitmentRequest>) -> Result<Response<Commitment>, Status> {
-        let signed = self.commitment(&request.get_ref().name).await?;
+        let project = caller(&request)?.project;
+        let signed = self.commitment(&project, &request.get_ref().name).await?;
         Ok(Response::new(commitments::message(&signed)))
     }
 
@@ -49,18 +57,23 @@ impl RegistryService for Api {
         &self,
         request: Request<ListCommitmentsRequest>,
     ) -> Result<Response<ListCommitmentsResponse>, Status> {
-        Ok(Response::new(self.page_of_commitments(request.get_ref()).await?))
+        let project = caller(&request)?.project;
+        Ok(Response::new(
+            self.page_of_commitments(&project, request.get_ref()).await?,
+        ))
     }
 
-    async fn get_head(&self, _: Request<GetHeadRequest>) -> Result<Response<Commitment>, Status> {
-        Ok(Response::new(self.head().await?))
+    async fn get_head(&self, request: Request<GetHeadRequest>) -> Result<Response<Commitment>, Status> {
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.head(&project).await?))
     }
 
     async fn export_commitment(
         &self,
         request: Request<ExportCommitmentRequest>,
     ) -> Result<Response<ExportCommitmentResponse>, Status> {
-        let document = self.document(&request.get_ref().name).await?;
+        let project = caller(&request)?.project;
+        let document = self.document(&project, &request.get_ref().name).await?;
         Ok(Response::new(ExportCommitmentResponse { document }))
     }
 

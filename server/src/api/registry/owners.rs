@@ -5,7 +5,7 @@ use uuid::Uuid;
 use crate::api::clock::{self, timestamp};
 use crate::api::names::Kind;
 use crate::api::problems::Problems;
-use crate::api::{Api, page, submission, text};
+use crate::api::{Api, own, page, submission, text};
 use crate::error::{Error, Result};
 use crate::ledger::{NewOwner, OwnerRow};
 
@@ -13,22 +13,32 @@ use crate::ledger::{NewOwner, OwnerRow};
 const QUERY: &[&[u8]] = &[b"owners"];
 
 impl Api {
-    pub(super) async fn register_owner(&self, request: CreateOwnerRequest) -> Result<Owner> {
-        let new = checked(request)?;
-        Ok(message(self.ledger().create_owner(new, clock::now()).await?))
+    pub(super) async fn register_owner(&self, project: String, request: CreateOwnerRequest) -> Result<Owner> {
+        let (display_name, asked) = checked(request)?;
+        let new = NewOwner {
+            id: Uuid::now_v7(),
+            request_id: asked.map(|id| own::request(&project, id)),
+            project,
+            display_name,
+        };
+        let row = self.ledger().create_owner(new, clock::now()).await;
+        Ok(message(row.map_err(|error| own::as_asked(error, asked))?))
     }
 
-    pub(super) async fn owner(&self, name: &str) -> Result<Owner> {
+    pub(super) async fn owner(&self, project: &str, name: &str) -> Result<Owner> {
         let id = Kind::Owner.parse("name", name)?;
-        let row = self.ledger().get_owner(id).await?;
-        Ok(message(row.ok_or_else(|| Kind::Owner.not_found(id))?))
+        Ok(message(self.own_owner(project, id).await?))
     }
 
-    pub(super) async fn page_of_owners(&self, request: &ListOwnersRequest) -> Result<ListOwnersResponse> {
+    pub(super) async fn page_of_owners(
+        &self,
+        project: &str,
+        request: &ListOwnersRequest,
+    ) -> Result<ListOwnersResponse> {
         let size = page::size(request.page_size)?;
         let before = page::position(QUERY, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_owners(before, size + 1).await?;
+        let rows = self.ledger().list_owners(project, before, size + 1).await?;
         let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (row.create_time, row.id));
         Ok(ListOwnersResponse {
             owners: rows.into_iter().map(message).collect(),
@@ -37,7 +47,8 @@ impl Api {
     }
 }
 
-fn checked(request: CreateOwnerRequest) -> Result<NewOwner> {
+/// The display name, and what the request is called.
+fn checked(request: CreateOwnerRequest) -> Result<(String, Option<Uuid>)> {
     let CreateOwnerRequest { owner, request_id } = request;
     let owner = owner.ok_or_else(|| Error::invalid("owner", "is missing"))?;
     let mut problems = Problems::default();
@@ -51,11 +62,7 @@ fn checked(request: CreateOwnerRequest) -> Result<NewOwner> {
         problems.check(empty, field, "is set by the server and must be empty");
     }
     problems.finish()?;
-    Ok(NewOwner {
-        id: Uuid::now_v7(),
-        display_name: owner.display_name,
-        request_id,
-    })
+    Ok((owner.display_name, request_id))
 }
 
 fn message(row: OwnerRow) -> Owner {

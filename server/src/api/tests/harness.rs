@@ -16,6 +16,7 @@ use guardsplat_proto::v1::{
     LeaseJobRequest, LeaseJobResponse, OutputMetadata, UploadArtifactRequest, UploadMetadata, UploadOutputRequest,
     VerifySpec, upload_artifact_request, upload_output_request,
 };
+use secrecy::ExposeSecret;
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 use tokio::net::TcpListener;
@@ -25,9 +26,10 @@ use tonic::transport::Channel;
 use tonic::{Code, Response, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-use crate::api::{Api, Limits, housekeeping, relay, serve};
+use crate::access::{self, Scope};
+use crate::api::{Api, Door, Guard, Limits, housekeeping, relay, serve};
 use crate::artifacts::ArtifactStore;
-use crate::ledger::{Ledger, SqliteLedger};
+use crate::ledger::{Ledger, NewToken, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 
@@ -44,6 +46,7 @@ pub struct Server {
     pub channel: Channel,
     folder: TempDir,
     ledger: Arc<dyn Ledger>,
+    tokens: bool,
     end: oneshot::Sender<()>,
     served: JoinHandle<crate::error::Result<()>>,
     housekeeper: JoinHandle<()>,
@@ -55,16 +58,25 @@ impl Server {
     }
 
     pub async fn with(limits: Limits) -> Self {
-        Self::in_folder(TempDir::new().unwrap(), limits).await
+        Self::in_folder(TempDir::new().unwrap(), limits, false).await
     }
 
-    async fn in_folder(folder: TempDir, limits: Limits) -> Self {
+    /// One that asks for tokens.
+    pub async fn with_tokens() -> Self {
+        Self::with_tokens_and(Limits::default()).await
+    }
+
+    pub async fn with_tokens_and(limits: Limits) -> Self {
+        Self::in_folder(TempDir::new().unwrap(), limits, true).await
+    }
+
+    async fn in_folder(folder: TempDir, limits: Limits, tokens: bool) -> Self {
         let ledger = SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap();
-        Self::over(Arc::new(ledger), folder, limits).await
+        Self::over(Arc::new(ledger), folder, limits, tokens).await
     }
 
     /// A server over a ledger that others may use too. The folder has the master key, and its artifacts.
-    pub async fn over(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits) -> Self {
+    pub async fn over(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits, tokens: bool) -> Self {
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
         let notary = Notary::open(ledger.as_ref(), &master, 0).await.unwrap();
@@ -73,7 +85,13 @@ impl Server {
         let address = format!("http://{}", listener.local_addr().unwrap());
         let (end, ended) = oneshot::channel();
         let shutdown = async { ended.await.unwrap_or_default() };
-        let served = tokio::spawn(serve(api.routes().unwrap(), listener, shutdown));
+        let guard = match tokens {
+            true => Guard::tokens(api.meter(), ledger.clone(), None),
+            false => Guard::open(api.meter()),
+        };
+        let (_, health) = tonic_health::server::health_reporter();
+        let routes = api.routes().unwrap().add_service(health);
+        let served = tokio::spawn(serve(routes, Door { guard, tls: None }, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
         tokio::spawn(relay(api.clone()));
         let channel = Channel::from_shared(address).unwrap().connect_lazy();
@@ -87,6 +105,7 @@ impl Server {
             api,
             folder,
             ledger,
+            tokens,
             end,
             served,
             housekeeper,
@@ -97,7 +116,7 @@ impl Server {
     pub async fn twin(&self, ledger: Arc<dyn Ledger>) -> Self {
         let folder = TempDir::new().unwrap();
         std::fs::copy(self.folder.path().join("master.key"), folder.path().join("master.key")).unwrap();
-        Self::over(ledger, folder, self.api.limits().clone()).await
+        Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
     }
 
     /// Stops in good order, and starts another server over the same folder.
@@ -115,7 +134,27 @@ impl Server {
         self.housekeeper.await.unwrap();
         self.ledger.close().await;
         tokio::time::sleep(absence).await;
-        Self::in_folder(self.folder, limits).await
+        Self::in_folder(self.folder, limits, self.tokens).await
+    }
+
+    /// A token of a project that is good for these.
+    pub async fn token(&self, project: &str, scopes: &[Scope]) -> String {
+        self.token_until(project, scopes, None).await
+    }
+
+    /// One that ends at a time.
+    pub async fn token_until(&self, project: &str, scopes: &[Scope], expire_time: Option<i64>) -> String {
+        let fresh = access::fresh().unwrap();
+        let new = NewToken {
+            id: fresh.id,
+            hash: fresh.hash,
+            display_name: String::new(),
+            project: project.into(),
+            scopes: scopes.iter().copied().collect(),
+            expire_time,
+        };
+        self.ledger.create_token(new, 0).await.unwrap();
+        fresh.text.expose_secret().to_owned()
     }
 
     pub fn ledger(&self) -> Arc<dyn Ledger> {

@@ -75,7 +75,9 @@ async fn what_a_killed_server_left_is_collected_by_the_next() {
         display_name: "lost.ply".into(),
         size: 4,
         sha256: super::harness::sha256(b"lost"),
-        origin: Origin::Upload,
+        origin: Origin::Upload {
+            project: "default".into(),
+        },
         secret: false,
         path: path.to_string(),
     };

@@ -1,13 +1,17 @@
 //! The API over a real socket, with a real ledger and a real folder, called through generated clients.
+mod access;
 mod admission;
 mod artifacts;
+mod calls;
 mod claims;
 mod harness;
 mod housekeeping;
 mod jobs;
 mod key_states;
 mod keys;
+mod limits;
 mod lists;
+mod projects;
 mod registry;
 mod search_speed;
 mod several;

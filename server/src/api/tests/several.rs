@@ -3,13 +3,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::job::State;
-use guardsplat_proto::v1::{CancelJobRequest, FailJobRequest, Job, LeaseJobRequest, ReportJobRequest, WatchJobRequest};
+use guardsplat_proto::v1::{
+    CancelJobRequest, CreateJobRequest, FailJobRequest, GetJobRequest, Job, LeaseJobRequest, ListJobsRequest,
+    ReportJobRequest, WatchJobRequest,
+};
 use tokio::sync::broadcast::Receiver;
 use tokio::time::timeout;
+use tonic::{Code, Status};
+use uuid::Uuid;
 
-use super::harness::{Server, key_spec};
-use crate::api::Limits;
+use super::calls::asking;
+use super::harness::{Server, key_spec, not_found, refused};
+use crate::access::Scope;
 use crate::api::changes::{For, Heard};
+use crate::api::{Limits, now};
 use crate::ledger::postgres::tests::Place;
 use crate::ledger::postgres::tests::cluster::Cluster;
 use crate::ledger::{Elsewhere, JobId, PostgresLedger};
@@ -26,6 +33,7 @@ async fn two() -> Option<(Place, Server, Server)> {
         place.ledger().await,
         tempfile::TempDir::new().unwrap(),
         Limits::default(),
+        false,
     )
     .await;
     let two = one.twin(place.ledger().await).await;
@@ -116,6 +124,68 @@ async fn a_job_goes_its_way_through_two_servers() {
     assert_eq!(two.job(&job.name).await, one.job(&job.name).await);
 }
 
+/// Tokens and projects are the database's: what one server is told of them holds at the next call of another.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_token_is_good_at_every_server_until_one_revokes_it() {
+    let Some(place) = Place::fresh().await else { return };
+    let folder = tempfile::TempDir::new().unwrap();
+    let one = Server::over(place.ledger().await, folder, Limits::default(), true).await;
+    let two = one.twin(place.ledger().await).await;
+    let studio = one.token("studio", &[Scope::Embed]).await;
+    let other = one.token("other", &[Scope::Embed, Scope::Verify]).await;
+    let wanted = CreateJobRequest {
+        job: Some(Job {
+            spec: Some(key_spec(8)),
+            ..Job::default()
+        }),
+        request_id: Uuid::now_v7().to_string(),
+    };
+    let [mut here, mut there] = [&one, &two].map(|server| server.jobs.clone());
+    let made = here
+        .create_job(asking(&studio, wanted.clone()))
+        .await
+        .unwrap()
+        .into_inner();
+    let name = GetJobRequest {
+        name: made.name.clone(),
+    };
+    assert_eq!(
+        there.get_job(asking(&studio, name.clone())).await.unwrap().into_inner(),
+        made
+    );
+    not_found(there.get_job(asking(&other, name)).await);
+    // The id of a request is its project's.
+    let again = there
+        .create_job(asking(&studio, wanted.clone()))
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(again.name, made.name);
+    let theirs = there.create_job(asking(&other, wanted)).await.unwrap().into_inner();
+    assert_ne!(theirs.name, made.name);
+    let list = async |server: &Server, token: &str| {
+        let jobs = server
+            .jobs
+            .clone()
+            .list_jobs(asking(token, ListJobsRequest::default()))
+            .await?;
+        Ok::<_, Status>(
+            jobs.into_inner()
+                .jobs
+                .into_iter()
+                .map(|job| job.name)
+                .collect::<Vec<_>>(),
+        )
+    };
+    for server in [&one, &two] {
+        assert_eq!(list(server, &studio).await.unwrap(), std::slice::from_ref(&made.name));
+        assert_eq!(list(server, &other).await.unwrap(), std::slice::from_ref(&theirs.name));
+    }
+    let row = &one.ledger().list_tokens(Some("studio"), None, 2).await.unwrap()[0];
+    one.ledger().revoke_token(row.id, now()).await.unwrap();
+    refused(list(&two, &studio).await, Code::Unauthenticated, "TOKEN_REVOKED");
+}
+
 /// While the database is away nobody's report can be written, and nobody is to lose a lease for that.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn leases_outlast_the_absence_of_the_database() {
@@ -126,7 +196,7 @@ async fn leases_outlast_the_absence_of_the_database() {
         lease: Duration::from_secs(4),
         ..Limits::default()
     };
-    let server = Server::over(Arc::new(ledger), tempfile::TempDir::new().unwrap(), limits).await;
+    let server = Server::over(Arc::new(ledger), tempfile::TempDir::new().unwrap(), limits, false).await;
     let name = server.create(key_spec(8)).await.name;
     let (_, token) = server.take().await;
     cluster.stop();

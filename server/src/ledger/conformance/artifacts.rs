@@ -1,11 +1,11 @@
 //! Uploads: seen when they are complete, kept while needed, collected when abandoned.
-use super::super::{ArtifactState, JobState, LedgerError, NewJob, Origin};
+use super::super::{ArtifactState, JobState, LedgerError, NewJob};
 use super::Factory;
 use super::fixture::*;
 
 pub(crate) async fn uploads_are_seen_when_they_are_complete(factory: &dyn Factory) {
     let ledger = factory.open().await;
-    let new = new_artifact(Origin::Upload, false);
+    let new = new_artifact(by_us(), false);
     let made = ledger.create_artifact(new.clone(), at(0)).await.unwrap();
     assert_eq!((made.id, made.size, made.state), (new.id, 10, ArtifactState::Pending));
     assert_eq!(
@@ -66,12 +66,12 @@ pub(crate) async fn abandoned_uploads_are_collected(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let whole = upload(&*ledger, at(0)).await;
     let half = ledger
-        .create_artifact(new_artifact(Origin::Upload, false), at(1))
+        .create_artifact(new_artifact(by_us(), false), at(1))
         .await
         .unwrap()
         .id;
     let young = ledger
-        .create_artifact(new_artifact(Origin::Upload, false), at(5))
+        .create_artifact(new_artifact(by_us(), false), at(5))
         .await
         .unwrap()
         .id;

@@ -16,9 +16,18 @@ pub fn at(seconds: i64) -> i64 {
     1_700_000_000_000_000 + seconds * 1_000_000
 }
 
+/// The project of the tests that are about no project.
+pub const OURS: &str = "default";
+
+/// That we send it.
+pub fn by_us() -> Origin {
+    Origin::Upload { project: OURS.into() }
+}
+
 pub fn new_job() -> NewJob {
     NewJob {
         id: Uuid::now_v7(),
+        project: OURS.into(),
         display_name: "a scene".into(),
         kind: JobKind::Embed,
         spec: vec![1, 2, 3],
@@ -78,7 +87,7 @@ pub fn new_artifact(origin: Origin, secret: bool) -> NewArtifact {
 }
 
 pub async fn upload(ledger: &dyn Ledger, now: i64) -> ArtifactId {
-    let new = new_artifact(Origin::Upload, false);
+    let new = new_artifact(by_us(), false);
     let id = ledger
         .create_artifact(new, now)
         .await

@@ -2,6 +2,7 @@
 //!
 //! `conformance_suite!(factory)` makes a test of each; a function here that the macro doesn't name is dead code, which
 //! the compiler reports.
+mod access;
 mod artifacts;
 mod attempts;
 mod cancelling;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 
 use super::Ledger;
 
+pub(crate) use access::*;
 pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
@@ -94,6 +96,17 @@ macro_rules! conformance_suite {
             payload_numbers_run_out
             owners_and_assets_come_in_pages
             a_search_sees_every_asset_of_its_key_once
+            a_token_is_kept_and_found_by_its_hash
+            a_revoked_token_stays_revoked
+            the_use_of_a_token_is_noted
+            tokens_come_in_pages_of_their_project
+            lists_are_of_a_project
+            a_job_names_what_is_of_its_project
+            what_a_job_makes_is_of_its_project
+            an_asset_names_what_is_of_its_project
+            a_request_is_of_a_project
+            what_a_running_job_reads_is_known
+            what_a_project_takes_is_counted
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

@@ -295,7 +295,7 @@ impl Pair {
 
     /// Everything that can be seen, in the model and in the ledger.
     async fn compare(&self, step: &Step) {
-        let mut rows = self.ledger.list_jobs(&[], None, 1000).await.unwrap();
+        let mut rows = self.ledger.list_jobs(OURS, &[], None, 1000).await.unwrap();
         let mut jobs = self.jobs.clone();
         rows.sort_by_key(|row| row.id);
         jobs.sort_by_key(|job| job.id);

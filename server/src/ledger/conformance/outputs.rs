@@ -118,6 +118,7 @@ pub(crate) async fn keys_are_published_and_their_files_never(factory: &dyn Facto
 
     let (job, key) = make_key(&*ledger, at(2)).await;
     let expected = KeyRow {
+        project: OURS.into(),
         id: key.id,
         display_name: "house key".into(),
         bits: 48,
@@ -162,7 +163,7 @@ pub(crate) async fn keys_come_in_pages(factory: &dyn Factory) {
     let mut seen = Vec::new();
     let mut before = None;
     loop {
-        let page = ledger.list_keys(before, 2).await.unwrap();
+        let page = ledger.list_keys(OURS, before, 2).await.unwrap();
         let Some(last) = page.last() else { break };
         before = Some((last.create_time, last.id));
         seen.extend(page.iter().map(|key| key.id));

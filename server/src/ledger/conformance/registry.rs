@@ -19,6 +19,7 @@ fn signer() -> Arc<SigningKey> {
 
 fn new_owner() -> NewOwner {
     NewOwner {
+        project: OURS.into(),
         id: Uuid::now_v7(),
         display_name: "studio".into(),
         request_id: None,
@@ -28,6 +29,7 @@ fn new_owner() -> NewOwner {
 fn new_asset(owner: OwnerId, key: KeyId) -> NewAsset {
     let id = Uuid::now_v7();
     NewAsset {
+        project: OURS.into(),
         id,
         commitment: Uuid::now_v7(),
         owner,
@@ -59,7 +61,7 @@ async fn chain(ledger: &dyn Ledger) -> Vec<Signed> {
     let mut checked = Chain::new(signer().public_key());
     let mut all = Vec::new();
     loop {
-        let page = ledger.list_commitments(all.len() as i64, 2).await.unwrap();
+        let page = ledger.list_commitments(OURS, all.len() as i64, 2).await.unwrap();
         if page.is_empty() {
             break;
         }
@@ -68,7 +70,7 @@ async fn chain(ledger: &dyn Ledger) -> Vec<Signed> {
             all.push(signed);
         }
     }
-    let head = ledger.head().await.unwrap();
+    let head = ledger.head(OURS).await.unwrap();
     assert_eq!(head.as_ref().map_or(Link::START, Link::at), checked.head());
     all
 }
@@ -77,6 +79,7 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let made = ledger.create_owner(new_owner(), at(1)).await.unwrap();
     let expected = OwnerRow {
+        project: OURS.into(),
         id: made.id,
         display_name: "studio".into(),
         create_time: at(1),
@@ -84,7 +87,7 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
     assert_eq!(made, expected);
     assert_eq!(ledger.get_owner(made.id).await.unwrap(), Some(expected));
     let key = make_key(&*ledger, at(0)).await.1.id;
-    assert_eq!(ledger.head().await.unwrap(), None);
+    assert_eq!(ledger.head(OURS).await.unwrap(), None);
     let upload = upload(&*ledger, at(1)).await;
     let artifact = Some(upload);
     let new = NewAsset {
@@ -93,6 +96,7 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
     };
     let asset = register(&*ledger, new.clone(), at(2)).await;
     let expected = AssetRow {
+        project: OURS.into(),
         id: new.id,
         commitment: new.commitment,
         owner: made.id,
@@ -208,7 +212,13 @@ pub(crate) async fn what_an_asset_needs_must_be_there(factory: &dyn Factory) {
         );
     }
     assert_eq!(chain(&*ledger).await, []);
-    assert_eq!(ledger.list_assets(AssetFilter::default(), None, 10).await.unwrap(), []);
+    assert_eq!(
+        ledger
+            .list_assets(OURS, AssetFilter::default(), None, 10)
+            .await
+            .unwrap(),
+        []
+    );
 }
 
 pub(crate) async fn registrations_at_once_make_one_chain_without_gaps(factory: &dyn Factory) {
@@ -299,7 +309,7 @@ pub(crate) async fn owners_and_assets_come_in_pages(factory: &dyn Factory) {
             let filter = AssetFilter { owner, key };
             let (mut seen, mut before) = (Vec::new(), None);
             loop {
-                let page = ledger.list_assets(filter, before, 2).await.unwrap();
+                let page = ledger.list_assets(OURS, filter, before, 2).await.unwrap();
                 let Some(last) = page.last() else { break };
                 assert!(page.len() <= 2);
                 before = Some((last.create_time, last.id));
@@ -310,8 +320,8 @@ pub(crate) async fn owners_and_assets_come_in_pages(factory: &dyn Factory) {
             assert_eq!(seen, wanted, "{filter:?}");
         }
     }
-    let page = ledger.list_owners(None, 1).await.unwrap();
-    let rest = ledger.list_owners(Some((at(0), page[0].id)), 5).await.unwrap();
+    let page = ledger.list_owners(OURS, None, 1).await.unwrap();
+    let rest = ledger.list_owners(OURS, Some((at(0), page[0].id)), 5).await.unwrap();
     assert_eq!((page[0].id, rest.len(), rest[0].id), (two, 1, one));
 }
 
@@ -375,7 +385,7 @@ pub(crate) async fn keys_are_retired_and_revoked_for_good(factory: &dyn Factory)
         );
     }
     assert_eq!(ledger.get_key(key).await.unwrap(), Some(revoked.clone()));
-    assert_eq!(ledger.list_keys(None, 5).await.unwrap(), [revoked]);
+    assert_eq!(ledger.list_keys(OURS, None, 5).await.unwrap(), [revoked]);
     let nowhere = Uuid::now_v7();
     let answer = ledger.update_key_state(nowhere, KeyState::Revoked, "", at(7)).await;
     refused!(answer, LedgerError::NotFound { kind: "key", id } if id == nowhere);

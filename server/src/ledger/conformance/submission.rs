@@ -3,7 +3,7 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use super::super::{JobKind, JobRow, JobState, LedgerError, NewJob, Origin};
+use super::super::{JobKind, JobRow, JobState, LedgerError, NewJob};
 use super::Factory;
 use super::fixture::*;
 
@@ -19,6 +19,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
     };
     let made = ledger.create_job(new.clone(), at(1)).await.unwrap();
     let expected = JobRow {
+        project: OURS.into(),
         id: new.id,
         display_name: new.display_name,
         kind: JobKind::Verify,
@@ -81,7 +82,7 @@ pub(crate) async fn the_same_request_is_the_same_job(factory: &dyn Factory) {
     assert_eq!((late.id, late.state), (made.id, JobState::Succeeded));
     let found = ledger.find_request(id).await.unwrap().unwrap();
     assert_eq!((found.id, found.state), (made.id, JobState::Succeeded));
-    assert_eq!(ledger.list_jobs(&[], None, 10).await.unwrap().len(), 1);
+    assert_eq!(ledger.list_jobs(OURS, &[], None, 10).await.unwrap().len(), 1);
 }
 
 pub(crate) async fn a_request_is_the_same_if_its_artifacts_hold_the_same(factory: &dyn Factory) {
@@ -138,14 +139,14 @@ pub(crate) async fn what_a_job_needs_must_be_there(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let nowhere = Uuid::new_v4();
     let unfinished = ledger
-        .create_artifact(new_artifact(Origin::Upload, false), at(0))
+        .create_artifact(new_artifact(by_us(), false), at(0))
         .await
         .unwrap()
         .id;
     let deleted = upload(&*ledger, at(0)).await;
     ledger.delete_artifact(deleted, at(0)).await.unwrap();
     let secret = ledger
-        .create_artifact(new_artifact(Origin::Upload, true), at(0))
+        .create_artifact(new_artifact(by_us(), true), at(0))
         .await
         .unwrap()
         .id;
@@ -164,7 +165,7 @@ pub(crate) async fn what_a_job_needs_must_be_there(factory: &dyn Factory) {
         ..new_job()
     };
     refused!(ledger.create_job(new, at(1)).await, LedgerError::NotFound { kind: "key", id } if id == nowhere);
-    assert_eq!(ledger.list_jobs(&[], None, 10).await.unwrap(), []);
+    assert_eq!(ledger.list_jobs(OURS, &[], None, 10).await.unwrap(), []);
 }
 
 pub(crate) async fn acknowledged_work_survives(factory: &dyn Factory) {
@@ -203,7 +204,7 @@ pub(crate) async fn pages_have_no_gaps_or_repeats_while_jobs_are_added(factory: 
     let mut seen = Vec::new();
     let mut before = None;
     loop {
-        let page = ledger.list_jobs(&[], before, 4).await.unwrap();
+        let page = ledger.list_jobs(OURS, &[], before, 4).await.unwrap();
         let Some(last) = page.last() else { break };
         assert!(page.len() <= 4);
         before = Some((last.create_time, last.id));
@@ -225,7 +226,7 @@ pub(crate) async fn states_select_jobs(factory: &dyn Factory) {
     claim_of(&*ledger, ids[1], at(12)).await;
     ledger.cancel_job(ids[2], at(13)).await.unwrap();
     let list = async |states: &[JobState], before, limit| {
-        let jobs = ledger.list_jobs(states, before, limit).await.unwrap();
+        let jobs = ledger.list_jobs(OURS, states, before, limit).await.unwrap();
         jobs.into_iter()
             .map(|job| (job.id, job.queue_position))
             .collect::<Vec<_>>()

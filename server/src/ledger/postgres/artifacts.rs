@@ -8,17 +8,17 @@ use super::super::{LedgerError, Result, token};
 use super::{jobs, leases, rows};
 
 pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -> Result<ArtifactRow> {
-    let (job, token) = match &new.origin {
-        Origin::Upload => (None, None),
+    let (project, job, token) = match &new.origin {
+        Origin::Upload { project } => (project.clone(), None, None),
         Origin::Output { job, token } => {
             let token = token::hash(token);
-            leases::leased_meanwhile(db, *job, &token).await?;
-            (Some(*job), Some(token))
+            let leased = leases::leased_meanwhile(db, *job, &token).await?;
+            (leased.project, Some(*job), Some(token))
         }
     };
     let row = sqlx::query(
         "INSERT INTO artifacts (id, display_name, size, sha256, job_id, lease_token, secret, path, state, create_time, \
-         update_time) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, 1, $9, $9) RETURNING *",
+         update_time, project) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, 1, $9, $9, $10) RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -29,6 +29,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -
     .bind(new.secret)
     .bind(&new.path)
     .bind(now)
+    .bind(project)
     .fetch_one(db)
     .await?;
     rows::artifact(&row)

@@ -10,8 +10,13 @@ use super::rows;
 /// The end of the chain.
 pub(super) const HEAD: &str = "SELECT * FROM commitments ORDER BY sequence DESC LIMIT 1";
 
-/// A page of the chain.
-pub(super) const CHAIN: &str = "SELECT * FROM commitments WHERE sequence > $1 ORDER BY sequence LIMIT $2";
+/// The last of a project's.
+const HEAD_OF: &str = "SELECT c.* FROM commitments c JOIN assets a ON a.id = c.asset_id WHERE a.project = $1 \
+    ORDER BY c.sequence DESC LIMIT 1";
+
+/// A page of the chain, of what is a project's.
+pub(super) const CHAIN: &str = "SELECT c.* FROM commitments c JOIN assets a ON a.id = c.asset_id \
+    WHERE c.sequence > $1 AND a.project = $3 ORDER BY c.sequence LIMIT $2";
 
 /// Names the lock under which the chain grows; it means nothing else, and is the database's own.
 const LOCK: i64 = 0x6775_6172_6473_706c;
@@ -58,15 +63,21 @@ pub(super) async fn head(db: &mut PgConnection) -> Result<Option<Signed>> {
         .transpose()
 }
 
+pub(super) async fn head_of(db: &mut PgConnection, project: &str) -> Result<Option<Signed>> {
+    let found = sqlx::query(HEAD_OF).bind(project).fetch_optional(db).await?;
+    found.as_ref().map(signed).transpose()
+}
+
 pub(super) async fn get(db: &mut PgConnection, id: CommitmentId) -> Result<Option<Signed>> {
     let query = sqlx::query("SELECT * FROM commitments WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(signed).transpose()
 }
 
-pub(super) async fn list(db: &mut PgConnection, after: i64, limit: u32) -> Result<Vec<Signed>> {
+pub(super) async fn list(db: &mut PgConnection, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>> {
     let found = sqlx::query(CHAIN)
         .bind(after)
         .bind(i64::from(limit))
+        .bind(project)
         .fetch_all(db)
         .await?;
     found.iter().map(signed).collect()

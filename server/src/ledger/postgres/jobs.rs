@@ -17,12 +17,13 @@ pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
     SELECT count(*) FROM jobs q WHERE q.state = 1 AND (q.queue_time, q.id) < (j.queue_time, j.id)\
     ) END AS queue_position FROM jobs j WHERE j.id = $1";
 
-/// A page of all jobs.
-pub(super) const PAGE: &str =
-    "SELECT * FROM jobs WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3";
+/// A page of a project's jobs.
+pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = $4 AND (create_time, id) < ($1, $2) \
+    ORDER BY create_time DESC, id DESC LIMIT $3";
 
-/// A page of the jobs in one state.
-pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs WHERE state = $4 AND (create_time, id) < ($1, $2) \
+/// A page of those in one state.
+pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs \
+    WHERE project = $4 AND state = $5 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
 /// The whole queue in its order.
@@ -32,9 +33,11 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     if let Some(there) = made_before(db, new).await? {
         return Ok(there);
     }
-    inputs_are_there(db, &new.inputs).await?;
+    inputs_are_there(db, &new.project, &new.inputs).await?;
     if let Some(key) = new.key {
-        let there = sqlx::query("SELECT 1 FROM keys WHERE id = $1").bind(key);
+        let there = sqlx::query("SELECT 1 FROM keys WHERE id = $1 AND project = $2")
+            .bind(key)
+            .bind(&new.project);
         there
             .fetch_optional(&mut *db)
             .await?
@@ -42,8 +45,8 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9) ON CONFLICT (request_id) DO NOTHING RETURNING *",
+         create_time, update_time, queue_time, project) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10) ON CONFLICT (request_id) DO NOTHING RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -54,6 +57,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     .bind(new.fingerprint.as_slice())
     .bind(new.max_attempts)
     .bind(now)
+    .bind(&new.project)
     .fetch_optional(&mut *db)
     .await?;
     let Some(row) = row else {
@@ -79,12 +83,14 @@ async fn made_before(db: &mut PgConnection, new: &NewJob) -> Result<Option<JobRo
     again::job(request, rows::job(&row)?, &fingerprint, new).map(Some)
 }
 
-/// Sees that all inputs are visible, and holds them: they can't be deleted before this job is there to need them.
-async fn inputs_are_there(db: &mut PgConnection, inputs: &[ArtifactId]) -> Result<()> {
+/// Sees that all inputs are visible and the project's, and holds them: they can't be deleted before this job is there to need them.
+async fn inputs_are_there(db: &mut PgConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
     let held = sqlx::query_scalar(
-        "SELECT id FROM artifacts WHERE id = ANY($1) AND state = 3 AND NOT secret ORDER BY id FOR SHARE",
+        "SELECT id FROM artifacts WHERE id = ANY($1) AND project = $2 AND state = 3 AND NOT secret \
+         ORDER BY id FOR SHARE",
     );
-    let there: HashSet<ArtifactId> = held.bind(inputs).fetch_all(db).await?.into_iter().collect();
+    let held = held.bind(inputs).bind(project);
+    let there: HashSet<ArtifactId> = held.fetch_all(db).await?.into_iter().collect();
     match inputs.iter().find(|input| !there.contains(input)) {
         Some(missing) => Err(LedgerError::no_artifact(*missing)),
         None => Ok(()),
@@ -113,6 +119,7 @@ pub(super) async fn get(db: &mut PgConnection, id: JobId) -> Result<Option<JobRo
 
 pub(super) async fn list(
     db: &mut PgConnection,
+    project: &str,
     states: &[JobState],
     before: Option<(i64, JobId)>,
     limit: u32,
@@ -123,7 +130,7 @@ pub(super) async fn list(
     let mut jobs = Vec::new();
     if states.is_empty() {
         let all = sqlx::query(PAGE).bind(time).bind(id).bind(i64::from(limit));
-        for row in all.fetch_all(&mut *db).await? {
+        for row in all.bind(project).fetch_all(&mut *db).await? {
             jobs.push(rows::job(&row)?);
         }
     }
@@ -133,7 +140,7 @@ pub(super) async fn list(
             continue;
         }
         let one = sqlx::query(PAGE_OF_STATE).bind(time).bind(id).bind(i64::from(limit));
-        for row in one.bind(*state as i32).fetch_all(&mut *db).await? {
+        for row in one.bind(project).bind(*state as i32).fetch_all(&mut *db).await? {
             jobs.push(rows::job(&row)?);
         }
     }

@@ -7,10 +7,14 @@ use super::super::types::{JobId, KeyId, KeyRow, NewKey};
 use super::super::{LedgerError, Result};
 use super::rows;
 
+/// A page of a project's keys.
+pub(super) const PAGE: &str = "SELECT * FROM keys WHERE project = $4 AND (create_time, id) < ($1, $2) \
+    ORDER BY create_time DESC, id DESC LIMIT $3";
+
 pub(super) async fn create(db: &mut PgConnection, new: &NewKey, job: JobId, now: i64) -> Result<()> {
     sqlx::query(
-        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id, \
+         project) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, (SELECT project FROM jobs WHERE id = $8))",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -37,12 +41,15 @@ pub(super) async fn get_meanwhile(db: &mut PgConnection, id: KeyId) -> Result<Op
     query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
 }
 
-pub(super) async fn list(db: &mut PgConnection, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+pub(super) async fn list(
+    db: &mut PgConnection,
+    project: &str,
+    before: Option<(i64, KeyId)>,
+    limit: u32,
+) -> Result<Vec<KeyRow>> {
     let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-    let query = sqlx::query(
-        "SELECT * FROM keys WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3",
-    );
-    let found = query.bind(time).bind(id).bind(i64::from(limit)).fetch_all(db).await?;
+    let query = sqlx::query(PAGE).bind(time).bind(id).bind(i64::from(limit));
+    let found = query.bind(project).fetch_all(db).await?;
     found.iter().map(rows::key).collect()
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Every change is one transaction, which locks the rows that it decides by: the job whose lease it checks, the inputs
 //! of a new job, the chain of commitments. What a server changes the others hear of from the database.
+mod access;
 mod artifacts;
 mod commitments;
 mod database;
@@ -85,6 +86,8 @@ macro_rules! with {
     };
 }
 
+use with;
+
 #[tonic::async_trait]
 impl Ledger for PostgresLedger {
     async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow> {
@@ -104,10 +107,16 @@ impl Ledger for PostgresLedger {
         self.database.read(with!([] db => jobs::get(db, id))).await
     }
 
-    async fn list_jobs(&self, states: &[JobState], before: Option<(i64, JobId)>, limit: u32) -> Result<Vec<JobRow>> {
-        let states = states.to_vec();
+    async fn list_jobs(
+        &self,
+        project: &str,
+        states: &[JobState],
+        before: Option<(i64, JobId)>,
+        limit: u32,
+    ) -> Result<Vec<JobRow>> {
+        let (project, states) = (project.to_owned(), states.to_vec());
         self.database
-            .read(with!([states] db => jobs::list(db, &states, before, limit)))
+            .read(with!([project, states] db => jobs::list(db, &project, &states, before, limit)))
             .await
     }
 
@@ -223,8 +232,11 @@ impl Ledger for PostgresLedger {
         self.database.read(with!([] db => keys::get(db, id))).await
     }
 
-    async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
-        self.database.read(with!([] db => keys::list(db, before, limit))).await
+    async fn list_keys(&self, project: &str, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+        let project = project.to_owned();
+        self.database
+            .read(with!([project] db => keys::list(db, &project, before, limit)))
+            .await
     }
 
     async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow> {
@@ -254,9 +266,10 @@ impl Ledger for PostgresLedger {
         self.database.read(with!([] db => registry::get_owner(db, id))).await
     }
 
-    async fn list_owners(&self, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
+    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
+        let project = project.to_owned();
         self.database
-            .read(with!([] db => registry::list_owners(db, before, limit)))
+            .read(with!([project] db => registry::list_owners(db, &project, before, limit)))
             .await
     }
 
@@ -278,12 +291,14 @@ impl Ledger for PostgresLedger {
 
     async fn list_assets(
         &self,
+        project: &str,
         filter: AssetFilter,
         before: Option<(i64, AssetId)>,
         limit: u32,
     ) -> Result<Vec<AssetRow>> {
+        let project = project.to_owned();
         self.database
-            .read(with!([] db => registry::list_assets(db, filter, before, limit)))
+            .read(with!([project] db => registry::list_assets(db, &project, filter, before, limit)))
             .await
     }
 
@@ -301,14 +316,18 @@ impl Ledger for PostgresLedger {
         self.database.read(with!([] db => commitments::get(db, id))).await
     }
 
-    async fn list_commitments(&self, after: i64, limit: u32) -> Result<Vec<Signed>> {
+    async fn list_commitments(&self, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>> {
+        let project = project.to_owned();
         self.database
-            .read(with!([] db => commitments::list(db, after, limit)))
+            .read(with!([project] db => commitments::list(db, &project, after, limit)))
             .await
     }
 
-    async fn head(&self) -> Result<Option<Signed>> {
-        self.database.read(with!([] db => commitments::head(db))).await
+    async fn head(&self, project: &str) -> Result<Option<Signed>> {
+        let project = project.to_owned();
+        self.database
+            .read(with!([project] db => commitments::head_of(db, &project)))
+            .await
     }
 
     async fn queue_depth(&self) -> Result<i64> {

@@ -110,7 +110,9 @@ pub(super) async fn migrated(options: &PgConnectOptions) -> Result<()> {
         sleep(Duration::from_secs(1)).await;
     };
     // `run` would do the same, but its future can't be seen to move between threads.
-    migrator().run_direct(None, &mut db, false).await?;
+    Migrator::with_migrations(steps())
+        .run_direct(None, &mut db, false)
+        .await?;
     compare_clocks(&mut db).await?;
     // What matters is done.
     let _ = db.close().await;
@@ -152,13 +154,32 @@ pub(super) fn pool(options: PgConnectOptions, server: Uuid) -> PgPool {
         .connect_lazy_with(options)
 }
 
-fn migrator() -> Migrator {
-    let layout = include_str!("../../../migrations/postgres/0001_ledger.sql");
-    Migrator::with_migrations(vec![Migration::new(
-        1,
-        "ledger".into(),
-        MigrationType::Simple,
-        layout.into_sql_str(),
-        false,
-    )])
+/// The steps from a database without tables to this version's.
+pub(super) fn steps() -> Vec<Migration> {
+    let step = |version, name: &'static str, script: &'static str| {
+        Migration::new(
+            version,
+            name.into(),
+            MigrationType::Simple,
+            script.into_sql_str(),
+            false,
+        )
+    };
+    vec![
+        step(
+            1,
+            "ledger",
+            include_str!("../../../migrations/postgres/0001_ledger.sql"),
+        ),
+        step(
+            2,
+            "tokens",
+            include_str!("../../../migrations/postgres/0002_tokens.sql"),
+        ),
+        step(
+            3,
+            "projects",
+            include_str!("../../../migrations/postgres/0003_projects.sql"),
+        ),
+    ]
 }

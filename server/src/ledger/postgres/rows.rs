@@ -10,6 +10,7 @@ pub(super) fn job(row: &PgRow) -> Result<JobRow> {
     let message: Option<String> = row.try_get("failure_message")?;
     Ok(JobRow {
         id: row.try_get("id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         kind: numbers::job_kind(number(row, "kind")?)?,
         spec: row.try_get("spec")?,
@@ -33,6 +34,7 @@ pub(super) fn job(row: &PgRow) -> Result<JobRow> {
 pub(super) fn artifact(row: &PgRow) -> Result<ArtifactRow> {
     Ok(ArtifactRow {
         id: row.try_get("id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         size: row.try_get("size")?,
         sha256: row.try_get("sha256")?,
@@ -48,6 +50,7 @@ pub(super) fn key(row: &PgRow) -> Result<KeyRow> {
     let bits = number(row, "bits")?;
     Ok(KeyRow {
         id: row.try_get("id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         bits: u32::try_from(bits).map_err(|_| super::super::LedgerError::Corrupt {
             what: "number of bits",
@@ -65,7 +68,7 @@ pub(super) fn key(row: &PgRow) -> Result<KeyRow> {
     })
 }
 
-fn number(row: &PgRow, column: &str) -> Result<i64> {
+pub(super) fn number(row: &PgRow, column: &str) -> Result<i64> {
     Ok(i64::from(row.try_get::<i32, _>(column)?))
 }
 

@@ -10,8 +10,13 @@ use super::rows;
 /// The end of the chain.
 pub(super) const HEAD: &str = "SELECT * FROM commitments ORDER BY sequence DESC LIMIT 1";
 
-/// A page of the chain.
-pub(super) const CHAIN: &str = "SELECT * FROM commitments WHERE sequence > ?1 ORDER BY sequence LIMIT ?2";
+/// The last of a project's.
+const HEAD_OF: &str = "SELECT c.* FROM commitments c CROSS JOIN assets a ON a.id = c.asset_id WHERE a.project = ?1 \
+    ORDER BY c.sequence DESC LIMIT 1";
+
+/// A page of the chain, of what is a project's. `CROSS` has the chain walked, in its order, and assets looked up.
+pub(super) const CHAIN: &str = "SELECT c.* FROM commitments c CROSS JOIN assets a ON a.id = c.asset_id \
+    WHERE c.sequence > ?1 AND a.project = ?3 ORDER BY c.sequence LIMIT ?2";
 
 /// Signs a commitment to an asset behind the last one. It must run in the transaction that makes the asset, so that
 /// nothing comes in between.
@@ -45,13 +50,19 @@ pub(super) async fn head(db: &mut SqliteConnection) -> Result<Option<Signed>> {
         .transpose()
 }
 
+pub(super) async fn head_of(db: &mut SqliteConnection, project: &str) -> Result<Option<Signed>> {
+    let found = sqlx::query(HEAD_OF).bind(project).fetch_optional(db).await?;
+    found.as_ref().map(signed).transpose()
+}
+
 pub(super) async fn get(db: &mut SqliteConnection, id: CommitmentId) -> Result<Option<Signed>> {
     let query = sqlx::query("SELECT * FROM commitments WHERE id = ?1").bind(id.as_bytes().as_slice());
     query.fetch_optional(db).await?.as_ref().map(signed).transpose()
 }
 
-pub(super) async fn list(db: &mut SqliteConnection, after: i64, limit: u32) -> Result<Vec<Signed>> {
-    let found = sqlx::query(CHAIN).bind(after).bind(limit).fetch_all(db).await?;
+pub(super) async fn list(db: &mut SqliteConnection, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>> {
+    let query = sqlx::query(CHAIN).bind(after).bind(limit).bind(project);
+    let found = query.fetch_all(db).await?;
     found.iter().map(signed).collect()
 }
 

@@ -17,12 +17,11 @@ pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
     SELECT count(*) FROM jobs q INDEXED BY jobs_queue WHERE q.state = 1 AND (q.queue_time, q.id) < (j.queue_time, j.id)\
     ) END AS queue_position FROM jobs j WHERE j.id = ?1";
 
-/// A page of all jobs.
-pub(super) const PAGE: &str =
-    "SELECT * FROM jobs WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3";
+/// A page of a project's jobs.
+pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = ?4 AND (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3";
 
-/// A page of the jobs in one state.
-pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs WHERE state = ?4 AND (create_time, id) < (?1, ?2) \
+/// A page of those in one state.
+pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs WHERE project = ?4 AND state = ?5 AND (create_time, id) < (?1, ?2) \
     ORDER BY create_time DESC, id DESC LIMIT ?3";
 
 /// The whole queue in its order.
@@ -36,15 +35,19 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
         return again::job(request, rows::job(&row)?, &fingerprint, &new);
     }
     for input in &new.inputs {
-        let visible = sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0")
-            .bind(input.as_bytes().as_slice());
+        let visible =
+            sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0 AND project = ?2")
+                .bind(input.as_bytes().as_slice())
+                .bind(&new.project);
         visible
             .fetch_optional(&mut *db)
             .await?
             .ok_or_else(|| LedgerError::no_artifact(*input))?;
     }
     if let Some(key) = new.key {
-        let there = sqlx::query("SELECT 1 FROM keys WHERE id = ?1").bind(key.as_bytes().as_slice());
+        let there = sqlx::query("SELECT 1 FROM keys WHERE id = ?1 AND project = ?2")
+            .bind(key.as_bytes().as_slice())
+            .bind(&new.project);
         there
             .fetch_optional(&mut *db)
             .await?
@@ -52,8 +55,8 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9) RETURNING *",
+         create_time, update_time, queue_time, project) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10) RETURNING *",
     )
     .bind(new.id.as_bytes().as_slice())
     .bind(&new.display_name)
@@ -64,6 +67,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     .bind(new.fingerprint.as_slice())
     .bind(new.max_attempts)
     .bind(now)
+    .bind(&new.project)
     .fetch_one(&mut *db)
     .await?;
     for input in &new.inputs {
@@ -103,6 +107,7 @@ pub(super) async fn get(db: &mut SqliteConnection, id: JobId) -> Result<Option<J
 /// Must run in a transaction, so that pages of several states fit together.
 pub(super) async fn list(
     db: &mut SqliteConnection,
+    project: &str,
     states: &[JobState],
     before: Option<(i64, JobId)>,
     limit: u32,
@@ -115,6 +120,7 @@ pub(super) async fn list(
             .bind(time)
             .bind(id.as_bytes().as_slice())
             .bind(limit)
+            .bind(project)
             .fetch_all(&mut *db)
             .await?
         {
@@ -131,6 +137,7 @@ pub(super) async fn list(
             .bind(time)
             .bind(id.as_bytes().as_slice())
             .bind(limit)
+            .bind(project)
             .bind(*state as i64);
         for row in one.fetch_all(&mut *db).await? {
             jobs.push(rows::job(&row)?);

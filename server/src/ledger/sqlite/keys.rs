@@ -7,10 +7,14 @@ use super::super::types::{JobId, KeyId, KeyRow, NewKey};
 use super::super::{LedgerError, Result};
 use super::rows;
 
+/// A page of a project's keys.
+pub(super) const PAGE: &str = "SELECT * FROM keys WHERE project = ?4 AND (create_time, id) < (?1, ?2) \
+    ORDER BY create_time DESC, id DESC LIMIT ?3";
+
 pub(super) async fn create(db: &mut SqliteConnection, new: NewKey, job: JobId, now: i64) -> Result<()> {
     sqlx::query(
-        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id, \
+         project) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, (SELECT project FROM jobs WHERE id = ?8))",
     )
     .bind(new.id.as_bytes().as_slice())
     .bind(&new.display_name)
@@ -31,15 +35,18 @@ pub(super) async fn get(db: &mut SqliteConnection, id: KeyId) -> Result<Option<K
     query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
 }
 
-pub(super) async fn list(db: &mut SqliteConnection, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+pub(super) async fn list(
+    db: &mut SqliteConnection,
+    project: &str,
+    before: Option<(i64, KeyId)>,
+    limit: u32,
+) -> Result<Vec<KeyRow>> {
     let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-    let query = sqlx::query(
-        "SELECT * FROM keys WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3",
-    );
-    let found = query
+    let found = sqlx::query(PAGE)
         .bind(time)
         .bind(id.as_bytes().as_slice())
         .bind(limit)
+        .bind(project)
         .fetch_all(db)
         .await?;
     found.iter().map(rows::key).collect()

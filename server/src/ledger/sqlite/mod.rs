@@ -1,4 +1,5 @@
 //! The ledger in a SQLite file: one writer that commits in groups, readers beside it (WAL).
+mod access;
 mod artifacts;
 mod commitments;
 mod jobs;
@@ -72,9 +73,15 @@ impl Ledger for SqliteLedger {
         jobs::get(&mut *self.readers.acquire().await?, id).await
     }
 
-    async fn list_jobs(&self, states: &[JobState], before: Option<(i64, JobId)>, limit: u32) -> Result<Vec<JobRow>> {
+    async fn list_jobs(
+        &self,
+        project: &str,
+        states: &[JobState],
+        before: Option<(i64, JobId)>,
+        limit: u32,
+    ) -> Result<Vec<JobRow>> {
         let mut snapshot = self.readers.begin().await?;
-        jobs::list(&mut snapshot, states, before, limit).await
+        jobs::list(&mut snapshot, project, states, before, limit).await
     }
 
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
@@ -184,8 +191,8 @@ impl Ledger for SqliteLedger {
         keys::get(&mut *self.readers.acquire().await?, id).await
     }
 
-    async fn list_keys(&self, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
-        keys::list(&mut *self.readers.acquire().await?, before, limit).await
+    async fn list_keys(&self, project: &str, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+        keys::list(&mut *self.readers.acquire().await?, project, before, limit).await
     }
 
     async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow> {
@@ -215,8 +222,8 @@ impl Ledger for SqliteLedger {
         registry::get_owner(&mut *self.readers.acquire().await?, id).await
     }
 
-    async fn list_owners(&self, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
-        registry::list_owners(&mut *self.readers.acquire().await?, before, limit).await
+    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
+        registry::list_owners(&mut *self.readers.acquire().await?, project, before, limit).await
     }
 
     async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow> {
@@ -235,11 +242,12 @@ impl Ledger for SqliteLedger {
 
     async fn list_assets(
         &self,
+        project: &str,
         filter: AssetFilter,
         before: Option<(i64, AssetId)>,
         limit: u32,
     ) -> Result<Vec<AssetRow>> {
-        registry::list_assets(&mut *self.readers.acquire().await?, filter, before, limit).await
+        registry::list_assets(&mut *self.readers.acquire().await?, project, filter, before, limit).await
     }
 
     async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
@@ -254,12 +262,12 @@ impl Ledger for SqliteLedger {
         commitments::get(&mut *self.readers.acquire().await?, id).await
     }
 
-    async fn list_commitments(&self, after: i64, limit: u32) -> Result<Vec<Signed>> {
-        commitments::list(&mut *self.readers.acquire().await?, after, limit).await
+    async fn list_commitments(&self, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>> {
+        commitments::list(&mut *self.readers.acquire().await?, project, after, limit).await
     }
 
-    async fn head(&self) -> Result<Option<Signed>> {
-        commitments::head(&mut *self.readers.acquire().await?).await
+    async fn head(&self, project: &str) -> Result<Option<Signed>> {
+        commitments::head_of(&mut *self.readers.acquire().await?, project).await
     }
 
     async fn queue_depth(&self) -> Result<i64> {

@@ -66,5 +66,11 @@ fn migrator() -> Migrator {
             "registry",
             include_str!("../../../migrations/sqlite/0003_registry.sql"),
         ),
+        step(4, "tokens", include_str!("../../../migrations/sqlite/0004_tokens.sql")),
+        step(
+            5,
+            "projects",
+            include_str!("../../../migrations/sqlite/0005_projects.sql"),
+        ),
     ])
 }

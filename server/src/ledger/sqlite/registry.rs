@@ -24,21 +24,29 @@ const ASSET: &str = assets!("WHERE a.id = ?1");
 /// The asset that a request made.
 const OF_REQUEST: &str = assets!("WHERE a.request_id = ?1");
 
-/// A page of all assets.
-pub(super) const ASSETS: &str =
-    assets!("WHERE (a.create_time, a.id) < (?1, ?2) ORDER BY a.create_time DESC, a.id DESC LIMIT ?3");
-/// A page of an owner's.
-pub(super) const OF_OWNER: &str = assets!(
-    "WHERE a.owner_id = ?4 AND (a.create_time, a.id) < (?1, ?2) ORDER BY a.create_time DESC, a.id DESC LIMIT ?3"
+/// A page of a project's assets.
+pub(super) const ASSETS: &str = assets!(
+    "WHERE a.project = ?6 AND (a.create_time, a.id) < (?1, ?2) ORDER BY a.create_time DESC, a.id DESC LIMIT ?3"
 );
-/// A page of a key's.
-pub(super) const OF_KEY: &str =
-    assets!("WHERE a.key_id = ?5 AND (a.create_time, a.id) < (?1, ?2) ORDER BY a.create_time DESC, a.id DESC LIMIT ?3");
-/// A page of an owner's that are of a key.
-pub(super) const OF_BOTH: &str = assets!(
-    "WHERE a.owner_id = ?4 AND a.key_id = ?5 AND (a.create_time, a.id) < (?1, ?2) \
+/// A page of an owner's. The plus keeps the planner from the index of projects, which has more to walk.
+pub(super) const OF_OWNER: &str = assets!(
+    "WHERE a.owner_id = ?4 AND +a.project = ?6 AND (a.create_time, a.id) < (?1, ?2) \
      ORDER BY a.create_time DESC, a.id DESC LIMIT ?3"
 );
+/// A page of a key's.
+pub(super) const OF_KEY: &str = assets!(
+    "WHERE a.key_id = ?5 AND +a.project = ?6 AND (a.create_time, a.id) < (?1, ?2) \
+     ORDER BY a.create_time DESC, a.id DESC LIMIT ?3"
+);
+/// A page of an owner's that are of a key.
+pub(super) const OF_BOTH: &str = assets!(
+    "WHERE a.owner_id = ?4 AND a.key_id = ?5 AND +a.project = ?6 AND (a.create_time, a.id) < (?1, ?2) \
+     ORDER BY a.create_time DESC, a.id DESC LIMIT ?3"
+);
+
+/// A page of a project's owners.
+pub(super) const OWNERS: &str = "SELECT * FROM owners WHERE project = ?4 AND (create_time, id) < (?1, ?2) \
+    ORDER BY create_time DESC, id DESC LIMIT ?3";
 
 /// A page of what a search among a key's assets needs.
 pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE key_id = ?1 AND payload > ?2 ORDER BY payload LIMIT ?3";
@@ -54,13 +62,15 @@ pub(super) async fn create_owner(db: &mut SqliteConnection, new: NewOwner, now: 
         }
     }
     let insert = sqlx::query(
-        "INSERT INTO owners (id, display_name, request_id, create_time) VALUES (?1, ?2, ?3, ?4) RETURNING *",
+        "INSERT INTO owners (id, display_name, request_id, create_time, project) VALUES (?1, ?2, ?3, ?4, ?5) \
+         RETURNING *",
     );
     let row = insert
         .bind(new.id.as_bytes().as_slice())
         .bind(&new.display_name)
         .bind(new.request_id.as_ref().map(|id| id.as_bytes().as_slice()))
         .bind(now)
+        .bind(&new.project)
         .fetch_one(db)
         .await?;
     owner(&row)
@@ -73,14 +83,13 @@ pub(super) async fn get_owner(db: &mut SqliteConnection, id: OwnerId) -> Result<
 
 pub(super) async fn list_owners(
     db: &mut SqliteConnection,
+    project: &str,
     before: Option<(i64, OwnerId)>,
     limit: u32,
 ) -> Result<Vec<OwnerRow>> {
     let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-    let query = sqlx::query(
-        "SELECT * FROM owners WHERE (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3",
-    );
-    let found = query.bind(time).bind(id.as_bytes().as_slice()).bind(limit);
+    let query = sqlx::query(OWNERS).bind(time).bind(id.as_bytes().as_slice());
+    let found = query.bind(limit).bind(project);
     found.fetch_all(db).await?.iter().map(owner).collect()
 }
 
@@ -97,10 +106,12 @@ pub(super) async fn create_asset(
         return again::asset(request, there, &new);
     }
     let missing = |kind, id| LedgerError::NotFound { kind, id };
-    get_owner(db, new.owner)
-        .await?
-        .ok_or_else(|| missing("owner", new.owner))?;
-    let key = keys::get(db, new.key).await?.ok_or_else(|| missing("key", new.key))?;
+    let owner = get_owner(db, new.owner).await?;
+    let own = owner.filter(|owner| owner.project == new.project);
+    own.ok_or_else(|| missing("owner", new.owner))?;
+    let key = keys::get(db, new.key).await?;
+    let own = key.filter(|key| key.project == new.project);
+    let key = own.ok_or_else(|| missing("key", new.key))?;
     let last: Option<i64> = sqlx::query_scalar(LAST_PAYLOAD)
         .bind(new.key.as_bytes().as_slice())
         .fetch_optional(&mut *db)
@@ -114,7 +125,7 @@ pub(super) async fn create_asset(
 async fn insert(db: &mut SqliteConnection, asset: &AssetRow, sealed_nonce: &[u8], request: Option<Uuid>) -> Result<()> {
     sqlx::query(
         "INSERT INTO assets (id, owner_id, display_name, sha256, artifact_id, key_id, payload, sealed_nonce, \
-         request_id, create_time) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+         request_id, create_time, project) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
     )
     .bind(asset.id.as_bytes().as_slice())
     .bind(asset.owner.as_bytes().as_slice())
@@ -126,6 +137,7 @@ async fn insert(db: &mut SqliteConnection, asset: &AssetRow, sealed_nonce: &[u8]
     .bind(sealed_nonce)
     .bind(request.as_ref().map(|id| id.as_bytes().as_slice()))
     .bind(asset.create_time)
+    .bind(&asset.project)
     .execute(db)
     .await?;
     Ok(())
@@ -143,6 +155,7 @@ pub(super) async fn get_asset(db: &mut SqliteConnection, id: AssetId) -> Result<
 
 pub(super) async fn list_assets(
     db: &mut SqliteConnection,
+    project: &str,
     filter: AssetFilter,
     before: Option<(i64, AssetId)>,
     limit: u32,
@@ -159,7 +172,8 @@ pub(super) async fn list_assets(
         .bind(id.as_bytes().as_slice())
         .bind(limit)
         .bind(filter.owner.as_ref().map(|id| id.as_bytes().as_slice()))
-        .bind(filter.key.as_ref().map(|id| id.as_bytes().as_slice()));
+        .bind(filter.key.as_ref().map(|id| id.as_bytes().as_slice()))
+        .bind(project);
     query.fetch_all(db).await?.iter().map(asset).collect()
 }
 
@@ -192,6 +206,7 @@ fn candidate_of(row: &SqliteRow) -> Result<Candidate> {
 fn owner(row: &SqliteRow) -> Result<OwnerRow> {
     Ok(OwnerRow {
         id: rows::id(row, "id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         create_time: row.try_get("create_time")?,
     })
@@ -200,6 +215,7 @@ fn owner(row: &SqliteRow) -> Result<OwnerRow> {
 fn asset(row: &SqliteRow) -> Result<AssetRow> {
     Ok(AssetRow {
         id: rows::id(row, "id")?,
+        project: row.try_get("project")?,
         commitment: rows::id(row, "commitment_id")?,
         owner: rows::id(row, "owner_id")?,
         display_name: row.try_get("display_name")?,

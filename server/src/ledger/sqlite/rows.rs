@@ -11,6 +11,7 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
     let message: Option<String> = row.try_get("failure_message")?;
     Ok(JobRow {
         id: id(row, "id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         kind: numbers::job_kind(row.try_get("kind")?)?,
         spec: row.try_get("spec")?,
@@ -34,6 +35,7 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
 pub(super) fn artifact(row: &SqliteRow) -> Result<ArtifactRow> {
     Ok(ArtifactRow {
         id: id(row, "id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         size: row.try_get("size")?,
         sha256: row.try_get("sha256")?,
@@ -48,6 +50,7 @@ pub(super) fn artifact(row: &SqliteRow) -> Result<ArtifactRow> {
 pub(super) fn key(row: &SqliteRow) -> Result<KeyRow> {
     Ok(KeyRow {
         id: id(row, "id")?,
+        project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         bits: row.try_get("bits")?,
         clip: row.try_get("clip")?,

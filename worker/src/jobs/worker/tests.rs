@@ -1,4 +1,5 @@
 //! How a worker ends whose engine is lost.
+use guardsplat_proto::connect::Target;
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{KeySpec, VerifySpec};
@@ -16,7 +17,11 @@ use server::Event;
 async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
     let (accelerator, _) = Accelerator::start(DeviceChoice::Cpu, None).await.unwrap();
     Worker {
-        server: Server::new(&format!("http://{}", server.address)).unwrap(),
+        server: Server::new(&Target {
+            url: format!("http://{}", server.address),
+            ..Target::default()
+        })
+        .unwrap(),
         leaving: signals::listen(false).unwrap(),
         folder: Folder::new(folder).unwrap(),
         accelerator,

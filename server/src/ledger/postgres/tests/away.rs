@@ -20,7 +20,7 @@ async fn a_server_that_stops_and_starts_is_waited_for() {
     let two = PostgresLedger::open(&url).await.unwrap();
     let mut heard = listening(&two, &one).await;
     let lease = claim(&one, at(1)).await.unwrap();
-    let before = one.list_jobs(&[], None, 10).await.unwrap();
+    let before = one.list_jobs("default", &[], None, 10).await.unwrap();
 
     cluster.stop();
     let begun = Instant::now();
@@ -39,7 +39,7 @@ async fn a_server_that_stops_and_starts_is_waited_for() {
     cluster.resume();
     // The first call succeeds, and what was acknowledged is there.
     one.check().await.unwrap();
-    assert_eq!(two.list_jobs(&[], None, 10).await.unwrap(), before);
+    assert_eq!(two.list_jobs("default", &[], None, 10).await.unwrap(), before);
     two.report(lease.job.id, &lease.token, None, LEASE, at(3))
         .await
         .unwrap();

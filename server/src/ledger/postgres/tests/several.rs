@@ -116,7 +116,13 @@ async fn servers_that_begin_at_once_make_the_tables_once() {
         ids.push(queue(&task.await.unwrap(), at(0)).await);
     }
     assert_eq!(
-        place.ledger().await.list_jobs(&[], None, 10).await.unwrap().len(),
+        place
+            .ledger()
+            .await
+            .list_jobs("default", &[], None, 10)
+            .await
+            .unwrap()
+            .len(),
         ids.len()
     );
 }

@@ -1,11 +1,12 @@
 //! The tables: who may change them, what a newer version left, and that rows are found by their indexes.
 use sqlx::Row;
+use sqlx::migrate::Migrator;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Ledger, LedgerError, PostgresLedger};
+use super::super::super::{AccessLedger, Ledger, LedgerError, PostgresLedger, Usage};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
-use super::super::{commitments, registry};
+use super::super::{access, commitments, keys, open, registry};
 use super::Place;
 
 #[tokio::test]
@@ -16,6 +17,35 @@ async fn tables_of_a_newer_version_are_refused() {
     sqlx::query(newer).execute(&mut place.raw().await).await.unwrap();
     let opened = PostgresLedger::open(&place.url()).await;
     assert!(matches!(opened.err(), Some(LedgerError::Migrate(_))));
+}
+
+/// What was made before there were projects is the default one's.
+#[tokio::test]
+async fn tables_of_the_first_version_are_taken_along() {
+    let Some(place) = Place::empty().await else { return };
+    let mut db = place.raw().await;
+    let first = open::steps().into_iter().take(1).collect();
+    let made = Migrator::with_migrations(first).run_direct(None, &mut db, false).await;
+    made.unwrap();
+    for statement in [
+        "INSERT INTO jobs (id, display_name, kind, spec, fingerprint, state, max_attempts, create_time, update_time, \
+         queue_time) VALUES (gen_random_uuid(), 'a scene', 1, '', '', 1, 3, 1, 1, 1)",
+        "INSERT INTO artifacts (id, display_name, size, sha256, secret, path, state, create_time, update_time) \
+         VALUES (gen_random_uuid(), 'a.ply', 7, '', false, '', 3, 1, 1)",
+        "INSERT INTO owners (id, display_name, create_time) VALUES (gen_random_uuid(), 'studio', 1)",
+    ] {
+        sqlx::query(statement).execute(&mut db).await.unwrap();
+    }
+    let ledger = place.ledger().await;
+    let jobs = ledger.list_jobs(OURS, &[], None, 5).await.unwrap();
+    assert_eq!((jobs.len(), jobs[0].project.as_str()), (1, OURS));
+    assert_eq!(ledger.list_owners(OURS, None, 5).await.unwrap().len(), 1);
+    let usage = Usage {
+        queued_jobs: 1,
+        artifact_bytes: 7,
+    };
+    assert_eq!(ledger.usage(OURS).await.unwrap(), usage);
+    assert_eq!(ledger.list_tokens(None, None, 5).await.unwrap(), []);
 }
 
 #[tokio::test]
@@ -42,8 +72,11 @@ async fn commitments_are_not_changed_by_accident() {
     let mut db = place.raw().await;
     for statement in [
         "SET session_replication_role = replica",
-        "INSERT INTO commitments VALUES (1, gen_random_uuid(), gen_random_uuid(), '\\x00', decode(repeat('00', 32), \
-         'hex'), decode(repeat('00', 64), 'hex'))",
+        "WITH asset AS (INSERT INTO assets (id, owner_id, display_name, sha256, key_id, payload, sealed_nonce, \
+         create_time) VALUES (gen_random_uuid(), gen_random_uuid(), '', decode(repeat('00', 32), 'hex'), \
+         gen_random_uuid(), 1, '\\x00', 0) RETURNING id) \
+         INSERT INTO commitments SELECT 1, gen_random_uuid(), id, '\\x00'::bytea, decode(repeat('00', 32), \
+         'hex'), decode(repeat('00', 64), 'hex') FROM asset",
         "SET session_replication_role = origin",
     ] {
         sqlx::query(statement).execute(&mut db).await.unwrap();
@@ -58,7 +91,10 @@ async fn commitments_are_not_changed_by_accident() {
     }
     // And bytes that are no commitment are an error, and no panic.
     let ledger = place.ledger().await;
-    refused!(ledger.head().await, LedgerError::BadCommitment { sequence: 1, .. });
+    refused!(
+        ledger.head("default").await,
+        LedgerError::BadCommitment { sequence: 1, .. }
+    );
 }
 
 /// With few rows the planner reads all of them; told not to, it says whether there is another way.
@@ -70,16 +106,21 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         let off = sqlx::AssertSqlSafe(format!("SET {setting} = off"));
         sqlx::query(off).execute(&mut db).await.unwrap();
     }
-    let page = "bigint, uuid, bigint, uuid, uuid";
+    let (page, assets) = ("bigint, uuid, bigint, text", "bigint, uuid, bigint, uuid, uuid, text");
     let by_index = [
         (CLAIM, "jobs_queue", "text, bytea, bigint, bigint, int"),
         (GET, "jobs_queue", "uuid"),
         (PAGE, "jobs_by_time", page),
-        (PAGE_OF_STATE, "jobs_by_state", "bigint, uuid, bigint, int"),
+        (PAGE_OF_STATE, "jobs_by_state", "bigint, uuid, bigint, text, int"),
+        (keys::PAGE, "keys_by_time", page),
+        (registry::OWNERS, "owners_by_time", page),
+        (access::OF_HASH, "tokens_hash_key", "bytea"),
+        (access::OF_PROJECT, "tokens_by_project", page),
+        (access::USAGE, "artifacts_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
-        (registry::ASSETS, "assets_by_time", page),
-        (registry::OF_OWNER, "assets_by_owner", page),
-        (registry::OF_KEY, "assets_by_key", page),
+        (registry::ASSETS, "assets_by_time", assets),
+        (registry::OF_OWNER, "assets_by_owner", assets),
+        (registry::OF_KEY, "assets_by_key", assets),
         (
             registry::CANDIDATES,
             "assets_key_id_payload_key",
@@ -87,7 +128,7 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         ),
         (registry::LAST_PAYLOAD, "assets_key_id_payload_key", "uuid"),
         (commitments::HEAD, "commitments_pkey", ""),
-        (commitments::CHAIN, "commitments_pkey", "bigint, bigint"),
+        (commitments::CHAIN, "commitments_pkey", "bigint, bigint, text"),
     ];
     sqlx::query("SET plan_cache_mode = force_generic_plan")
         .execute(&mut db)

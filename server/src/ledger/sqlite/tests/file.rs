@@ -133,6 +133,17 @@ async fn a_file_of_the_first_version_is_taken_along() {
     for statement in [
         "ALTER TABLE jobs DROP COLUMN completed_token",
         "ALTER TABLE jobs DROP COLUMN completed_fingerprint",
+        "DROP INDEX jobs_by_time",
+        "DROP INDEX jobs_by_state",
+        "DROP INDEX keys_by_time",
+        "DROP INDEX artifacts_by_project",
+        "ALTER TABLE jobs DROP COLUMN project",
+        "ALTER TABLE artifacts DROP COLUMN project",
+        "ALTER TABLE keys DROP COLUMN project",
+        "CREATE INDEX jobs_by_time ON jobs (create_time, id)",
+        "CREATE INDEX jobs_by_state ON jobs (state, create_time, id)",
+        "CREATE INDEX keys_by_time ON keys (create_time, id)",
+        "DROP TABLE tokens",
         "DROP TABLE commitments",
         "DROP TABLE assets",
         "DROP TABLE owners",
@@ -159,6 +170,8 @@ async fn commitments_are_not_changed_by_accident() {
     let mut db = raw(&folder).await;
     for statement in [
         "PRAGMA foreign_keys = OFF",
+        "INSERT INTO assets (id, owner_id, display_name, sha256, key_id, payload, sealed_nonce, create_time) \
+         VALUES (zeroblob(16), zeroblob(16), '', zeroblob(32), zeroblob(16), 1, x'00', 0)",
         "INSERT INTO commitments VALUES (1, zeroblob(16), zeroblob(16), x'00', zeroblob(32), zeroblob(64))",
     ] {
         sqlx::query(statement).execute(&mut db).await.unwrap();
@@ -172,7 +185,10 @@ async fn commitments_are_not_changed_by_accident() {
     }
     // And bytes that are no commitment are an error, and no panic.
     let ledger = folder.ledger().await;
-    refused!(ledger.head().await, LedgerError::BadCommitment { sequence: 1, .. });
+    refused!(
+        ledger.head("default").await,
+        LedgerError::BadCommitment { sequence: 1, .. }
+    );
 }
 
 #[tokio::test]

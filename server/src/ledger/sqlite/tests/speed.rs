@@ -7,7 +7,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{Ledger, NewJob};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
-use super::super::{commitments, registry};
+use super::super::{access, commitments, keys, registry};
 use super::Folder;
 use super::file::raw;
 
@@ -25,10 +25,21 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
     let by_index = [
         (CLAIM, "INDEX jobs_queue"),
         (GET, "INDEX jobs_queue ((queue_time,id)<"),
-        (PAGE, "INDEX jobs_by_time ((create_time,id)<"),
-        (PAGE_OF_STATE, "INDEX jobs_by_state (state=? AND (create_time,id)<"),
+        (PAGE, "INDEX jobs_by_time (project=? AND (create_time,id)<"),
+        (
+            PAGE_OF_STATE,
+            "INDEX jobs_by_state (project=? AND state=? AND (create_time,id)<",
+        ),
+        (keys::PAGE, "INDEX keys_by_time (project=? AND (create_time,id)<"),
+        (
+            registry::OWNERS,
+            "INDEX owners_by_time (project=? AND (create_time,id)<",
+        ),
         (QUEUE, "INDEX jobs_queue"),
-        (registry::ASSETS, "INDEX assets_by_time ((create_time,id)<"),
+        (
+            registry::ASSETS,
+            "INDEX assets_by_time (project=? AND (create_time,id)<",
+        ),
         (
             registry::OF_OWNER,
             "INDEX assets_by_owner (owner_id=? AND (create_time,id)<",
@@ -37,6 +48,15 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (registry::OF_BOTH, "=? AND (create_time,id)<"),
         (registry::CANDIDATES, "(key_id=? AND payload>?)"),
         (registry::LAST_PAYLOAD, "(key_id=?)"),
+        (access::OF_HASH, "(hash=?)"),
+        (
+            access::OF_PROJECT,
+            "INDEX tokens_by_project (project=? AND (create_time,id)<",
+        ),
+        (
+            access::USAGE,
+            "COVERING INDEX artifacts_by_project (project=? AND state=?)",
+        ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
     for (statement, index) in by_index {

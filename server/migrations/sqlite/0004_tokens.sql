@@ -1,0 +1,15 @@
+-- Tokens: who may call, for which project, and what. Times are microseconds since 1970, UTC.
+
+CREATE TABLE tokens (
+    id            BLOB    NOT NULL PRIMARY KEY CHECK (length(id) = 16),
+    hash          BLOB    NOT NULL UNIQUE CHECK (length(hash) = 32), -- SHA-256 of the token, which is kept nowhere
+    display_name  TEXT    NOT NULL,
+    project       TEXT    NOT NULL,
+    scopes        INTEGER NOT NULL CHECK (scopes BETWEEN 1 AND 15),  -- the sum of 1 embed, 2 verify, 4 admin, 8 worker
+    create_time   INTEGER NOT NULL,
+    expire_time   INTEGER, -- null: never
+    last_use_time INTEGER, -- to the minute; null: never
+    revoke_time   INTEGER  -- null while it may be used
+) STRICT;
+
+CREATE INDEX tokens_by_project ON tokens (project, create_time, id);

@@ -1,0 +1,71 @@
+//! The one table of calls and what a token must be good for. A call that is not in it is refused, whoever makes it.
+use super::Scope::{self, Admin, Embed, Verify, Worker};
+
+/// What a call needs, where tokens are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// Nothing: whoever looks after the server asks this, and it tells nothing of anybody.
+    Nothing,
+    /// A token, whatever it is good for.
+    Token,
+    /// A token with one of these scopes.
+    AnyOf(&'static [Scope]),
+}
+
+use Need::{AnyOf, Nothing, Token};
+
+const EMBED: Need = AnyOf(&[Embed]);
+const ADMIN: Need = AnyOf(&[Admin]);
+const WORKER: Need = AnyOf(&[Worker]);
+/// Both kinds of work; `CreateJob` and `CancelJob` look at the job too.
+const WORK: Need = AnyOf(&[Embed, Verify]);
+/// Looking at what the project has.
+const LOOK: Need = AnyOf(&[Embed, Verify, Admin]);
+/// Workers read the inputs of running jobs in this way, and nothing else.
+const READ: Need = AnyOf(&[Embed, Verify, Worker]);
+
+/// Paths of all calls, as HTTP/2 has them.
+pub const METHODS: &[(&str, Need)] = &[
+    ("/guardsplat.v1.JobService/CreateJob", WORK),
+    ("/guardsplat.v1.JobService/GetJob", LOOK),
+    ("/guardsplat.v1.JobService/ListJobs", LOOK),
+    ("/guardsplat.v1.JobService/CancelJob", WORK),
+    ("/guardsplat.v1.JobService/WatchJob", LOOK),
+    ("/guardsplat.v1.ArtifactService/UploadArtifact", WORK),
+    ("/guardsplat.v1.ArtifactService/DownloadArtifact", READ),
+    ("/guardsplat.v1.ArtifactService/GetArtifact", WORK),
+    ("/guardsplat.v1.ArtifactService/DeleteArtifact", WORK),
+    ("/guardsplat.v1.KeyService/GetKey", LOOK),
+    ("/guardsplat.v1.KeyService/ListKeys", LOOK),
+    ("/guardsplat.v1.KeyService/UpdateKeyState", ADMIN),
+    ("/guardsplat.v1.RegistryService/CreateOwner", EMBED),
+    ("/guardsplat.v1.RegistryService/GetOwner", LOOK),
+    ("/guardsplat.v1.RegistryService/ListOwners", LOOK),
+    ("/guardsplat.v1.RegistryService/CreateAsset", EMBED),
+    ("/guardsplat.v1.RegistryService/GetAsset", LOOK),
+    ("/guardsplat.v1.RegistryService/ListAssets", LOOK),
+    ("/guardsplat.v1.RegistryService/GetCommitment", LOOK),
+    ("/guardsplat.v1.RegistryService/ListCommitments", LOOK),
+    ("/guardsplat.v1.RegistryService/GetHead", LOOK),
+    ("/guardsplat.v1.RegistryService/ExportCommitment", LOOK),
+    ("/guardsplat.v1.RegistryService/GetPublicKey", Token),
+    ("/guardsplat.v1.TokenService/CreateToken", ADMIN),
+    ("/guardsplat.v1.TokenService/ListTokens", ADMIN),
+    ("/guardsplat.v1.TokenService/RevokeToken", ADMIN),
+    ("/guardsplat.v1.WorkerService/LeaseJob", WORKER),
+    ("/guardsplat.v1.WorkerService/ReportJob", WORKER),
+    ("/guardsplat.v1.WorkerService/UploadOutput", WORKER),
+    ("/guardsplat.v1.WorkerService/DownloadKey", WORKER),
+    ("/guardsplat.v1.WorkerService/CompleteJob", WORKER),
+    ("/guardsplat.v1.WorkerService/FailJob", WORKER),
+    ("/guardsplat.v1.WorkerService/ReleaseJob", WORKER),
+    ("/grpc.health.v1.Health/Check", Nothing),
+    ("/grpc.health.v1.Health/Watch", Nothing),
+    ("/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Token),
+    ("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Token),
+];
+
+/// What a call needs; `None` for one that is not in the table.
+pub fn need(path: &str) -> Option<Need> {
+    METHODS.iter().find(|(known, _)| *known == path).map(|(_, need)| *need)
+}
