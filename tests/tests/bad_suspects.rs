@@ -37,6 +37,15 @@ fn promised(width: u32, height: u32) -> Vec<u8> {
     bytes
 }
 
+/// The PNG as an animation of two frames, the second of which is missing.
+fn animated(png: &[u8]) -> Vec<u8> {
+    let mut chunk = b"acTL\0\0\0\x02\0\0\0\0".to_vec();
+    chunk.extend(crc32(&chunk).to_be_bytes());
+    // Behind the signature and the header.
+    let (header, rest) = png.split_at(33);
+    [header, &8_u32.to_be_bytes(), &chunk, rest].concat()
+}
+
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
@@ -77,6 +86,8 @@ fn files_that_are_no_pictures_are_told_by_name() {
             "animated.gif",
             b"GIF89a\x01\0\x01\0\x80\0\0\0\0\0\xff\xff\xff,".to_vec(),
         ),
+        // A still that was given a header of animations: what it shows first is not what it shows.
+        ("animated.png", animated(&png)),
         ("text.png", b"this is no picture".to_vec()),
     ] {
         bench.write(name, bytes);

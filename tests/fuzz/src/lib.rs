@@ -3,6 +3,7 @@
 //! A target is a function of bytes. It does with them what the programs do with such a file or text, asks of whatever is
 //! accepted that it holds together, and lets the parser have twice the file and 64 MiB ([`memory`]). It panics where
 //! something is wrong, and never for bytes that are refused.
+mod claims;
 pub mod memory;
 mod models;
 mod packages;
@@ -12,6 +13,7 @@ mod server;
 pub mod sog;
 mod texts;
 
+pub use claims::{commitment, evidence};
 pub use models::{TINY_CLIP, clip_config, clip_weights, key, lpips, manifest};
 pub use packages::{lpips_checkpoint, lpips_package};
 pub use pictures::{exr, picture};
@@ -63,4 +65,6 @@ targets![
     requests,
     sealed,
     server_settings,
+    evidence,
+    commitment,
 ];

@@ -79,16 +79,16 @@ pub struct Arguments {
     /// A Markdown file whose tables between markers are replaced too
     #[arg(long, value_name = "FILE")]
     document: Option<PathBuf>,
-    /// An SVG file for the plots of trade
+    /// An SVG file for the plots of trade, or of claims
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    if arguments.plot.is_some() && !arguments.experiments.contains(&Kind::Trade) {
+    if arguments.plot.is_some() && plotted(arguments).is_none() {
         return Err(Error::BadOption {
             field: "plot",
-            reason: "it is of trade, which is not among the experiments".into(),
+            reason: "it is of trade or of claims: name one of them in --experiments, and not both".into(),
         });
     }
     // What is refused leaves no folder behind.
@@ -110,6 +110,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     }
     write_reports(arguments, &store)?;
     Ok(Exit::Done)
+}
+
+/// The experiment whose plots a file of their own gets: the one of two that has any.
+fn plotted(arguments: &Arguments) -> Option<Kind> {
+    let asked = [Kind::Trade, Kind::Claims].map(|kind| arguments.experiments.contains(&kind).then_some(kind));
+    match asked {
+        [Some(kind), None] | [None, Some(kind)] => Some(kind),
+        _ => None,
+    }
 }
 
 /// Whether there are settings that can be used, and scenes that can be opened: a run of hours should not end at its
@@ -283,8 +292,9 @@ fn write_reports(arguments: &Arguments, store: &Store) -> Result<()> {
         output::write_csv(&selection, &folder.join("readings.csv"))?;
         output::write_html(&reports, folder, &folder.join("report.html"))?;
         if let Some(path) = &arguments.plot {
-            let trade = reports.iter().find(|report| report.name == Kind::Trade.name());
-            output::write_svg(trade.map_or(&[], |report| &report.plots), path)?;
+            let of = plotted(arguments).map(Kind::name);
+            let report = reports.iter().find(|report| Some(report.name.as_str()) == of);
+            output::write_svg(report.map_or(&[], |report| &report.plots), path)?;
         }
         if let Some(document) = &arguments.document {
             for report in &reports {

@@ -6,7 +6,7 @@ use std::path::Path;
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage};
 
-use super::exr;
+use super::{animation, exr};
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 
@@ -105,7 +105,7 @@ pub fn is_picture(head: &[u8]) -> bool {
 /// transparent pixels show `background` through.
 ///
 /// # Errors
-/// Says why in words: an unknown format, damage, more than [`MAX_PIXELS`], or values that are not finite.
+/// Says why in words: an unknown format, an animation, damage, more than [`MAX_PIXELS`], or values that are not finite.
 pub fn decode_picture(bytes: &[u8], background: [f32; 3]) -> Result<Picture, String> {
     let picture = if exr::is_exr(bytes) {
         exr::decode(bytes, background)?
@@ -130,10 +130,11 @@ fn decode_integers(bytes: &[u8], background: [f32; 3]) -> Result<Picture, String
         .map_err(|e| e.to_string())?;
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_ALLOCATION);
-    reader.limits(limits);
+    reader.limits(limits.clone());
     if reader.format().is_none() {
         return Err("not a PNG, JPEG, WebP or OpenEXR picture".into());
     }
+    animation::refuse(bytes, reader.format(), &limits)?;
     let mut decoder = reader.into_decoder().map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > MAX_PIXELS {

@@ -1,4 +1,5 @@
 //! How much a mark shows: PSNR, SSIM and LPIPS of marked against original views, and pictures to look at.
+mod animation;
 pub mod batch;
 pub mod compare;
 mod exr;

@@ -1,6 +1,7 @@
 //! Makes the seeds of the corpus: small files of every kind, right ones and such that are a little wrong.
 //!
 //! `cargo run --release --example seeds`. Files that are there stay as they are.
+mod claims;
 mod models;
 mod packages;
 mod pictures;
@@ -39,4 +40,5 @@ fn main() {
     pictures::put_all();
     texts::put_all();
     server::put_all();
+    claims::put_all();
 }
