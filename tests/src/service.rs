@@ -16,8 +16,13 @@ pub struct Service {
     pub bench: Bench,
     /// How long a run of the client may take.
     pub patience: Duration,
+    /// Variables of the client: its token, a CA.
+    pub client_variables: Vec<(String, String)>,
+    /// Variables of workers.
+    pub worker_variables: Vec<(String, String)>,
     flags: Vec<String>,
     address: String,
+    encrypted: bool,
     server: Option<Process>,
 }
 
@@ -30,8 +35,11 @@ impl Service {
         let mut service = Self {
             bench,
             patience: SOON,
+            client_variables: Vec::new(),
+            worker_variables: Vec::new(),
             flags: flags.split_whitespace().map(str::to_owned).collect(),
             address: "127.0.0.1:0".into(),
+            encrypted: false,
             server: None,
         };
         service.restart();
@@ -54,8 +62,13 @@ impl Service {
         let mut line = String::new();
         let stdout = server.stdout().expect("a pipe, and it was not taken");
         BufReader::new(stdout).read_line(&mut line).expect("it prints text");
-        let address = line.trim().strip_prefix("listening on http://");
-        self.address = address.unwrap_or_else(|| panic!("{}", server.log())).into();
+        let url = line
+            .trim()
+            .strip_prefix("listening on ")
+            .and_then(|url| url.split_once("://"));
+        let (scheme, address) = url.unwrap_or_else(|| panic!("{}", server.log()));
+        self.encrypted = scheme == "https";
+        self.address = address.into();
         self.server = Some(server);
     }
 
@@ -83,6 +96,15 @@ impl Service {
         &self.address
     }
 
+    /// Where programs find it. Certificates are made out to `localhost`.
+    pub fn url(&self) -> String {
+        let port = self.address.rsplit(':').next().unwrap_or_default();
+        match self.encrypted {
+            true => format!("https://localhost:{port}"),
+            false => format!("http://{}", self.address),
+        }
+    }
+
     /// A connection.
     ///
     /// # Panics
@@ -96,7 +118,7 @@ impl Service {
     pub fn worker(&self, name: &str) -> Process {
         let mut command = self.bench.command(&crate::worker());
         command.args(["run", "--device", "cpu", "--name", name, "--server"]);
-        command.arg(format!("http://{}", self.address));
+        command.arg(self.url()).envs(self.worker_variables.iter().cloned());
         Process::start(&mut command, &self.bench.path(format!("{name}.log")))
     }
 
@@ -104,7 +126,8 @@ impl Service {
     pub fn client_command(&self, line: &str) -> Command {
         let mut command = self.bench.command(&program("guardsplat"));
         command
-            .env("GUARDSPLAT_SERVER", format!("http://{}", self.address))
+            .env("GUARDSPLAT_SERVER", self.url())
+            .envs(self.client_variables.iter().cloned())
             .args(line.split_whitespace())
             .stdin(Stdio::null());
         command

@@ -8,6 +8,7 @@ mod main_job;
 mod memory;
 mod queue;
 mod restarts;
+mod strangers;
 #[path = "../../../worker/tests/support/tiny.rs"]
 mod tiny;
 
