@@ -92,6 +92,17 @@ impl Clip {
         })
     }
 
+    /// The hash of the weights that [`Clip::shipped`] loads, without loading them.
+    ///
+    /// # Errors
+    /// As [`Clip::load`], of the file of weights.
+    pub fn shipped_hash() -> Result<String> {
+        match std::env::var_os("GUARDSPLAT_CLIP") {
+            Some(dir) => TensorFile::open(&weights_path(Path::new(&dir))?)?.sha256(),
+            None => TensorFile::from_bytes("guardsplat-clip", SHIPPED_WEIGHTS)?.sha256(),
+        }
+    }
+
     /// A frozen model from its parts, for one that was just trained or that has no file.
     pub fn from_model(config: ClipConfig, hash: String, model: ClipModel) -> Self {
         Self {

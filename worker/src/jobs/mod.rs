@@ -7,11 +7,13 @@ mod attempt;
 mod backoff;
 mod bench;
 mod convert;
+mod direct;
 mod embedding;
 mod error;
 mod folder;
 mod lease;
 mod new_key;
+mod offer;
 mod server;
 mod signals;
 mod transfer;
@@ -26,6 +28,7 @@ use guardsplat_worker::device::DeviceChoice;
 use accelerator::Accelerator;
 pub use error::{Error, Result};
 use folder::Folder;
+use offer::Offer;
 use server::Server;
 use worker::Worker;
 
@@ -75,7 +78,7 @@ async fn work(options: &Options) -> Result<()> {
         leaving,
         folder,
         accelerator,
-        name,
+        offer: Offer::new(name, &device, options.memory),
     };
     worker.serve().await
 }

@@ -18,6 +18,7 @@ const ALIVE: Duration = Duration::from_secs(10);
 #[derive(Clone)]
 pub struct Server {
     channel: Channel,
+    encrypted: bool,
 }
 
 impl Server {
@@ -42,7 +43,13 @@ impl Server {
             .connect_lazy();
         Ok(Self {
             channel: target.authorised(channel),
+            encrypted: target.url.starts_with("https://"),
         })
+    }
+
+    /// Whether nobody on the way can read along.
+    pub fn is_encrypted(&self) -> bool {
+        self.encrypted
     }
 
     /// Calls of workers.

@@ -14,6 +14,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
+use super::direct;
 use super::error::{Error, Result};
 use super::lease::Lease;
 use super::server::{Server, persist};
@@ -30,12 +31,16 @@ fn damaged(what: &str, reason: String) -> Error {
     }
 }
 
-/// Fetches an artifact into a new file at `path`. A download that breaks off is taken up where it was.
+/// Fetches an artifact into a new file at `path`: from the store that has it where the server says where that is, else
+/// through the server. A download that breaks off is taken up where it was.
 ///
 /// # Errors
 /// What the server answers, a file that can't be written, or [`Error::Damaged`] where the bytes are not those that were
 /// announced.
 pub async fn download(server: &Server, name: &str, path: &Path) -> Result<Artifact> {
+    if let Some(artifact) = direct::download(server, name, path).await {
+        return Ok(artifact);
+    }
     let call = "download an artifact";
     let mut file = File::create(path).await.map_err(Error::io(path))?;
     let mut hash = Sha256::new();

@@ -1,7 +1,7 @@
 //! The worker's day: waits for a job, carries it out, says what became of it, until it is to leave.
 use std::time::{Duration, Instant};
 
-use guardsplat_proto::v1::{Job, LeaseJobRequest};
+use guardsplat_proto::v1::Job;
 use guardsplat_worker::stop::Stop;
 use tonic::Code;
 
@@ -11,6 +11,7 @@ use super::convert;
 use super::error::{Error, Result};
 use super::folder::Folder;
 use super::lease::{Ended, Lease, Reporter};
+use super::offer::Offer;
 use super::server::{Server, persist, within};
 use super::signals::Leaving;
 
@@ -39,8 +40,8 @@ pub struct Worker {
     pub folder: Folder,
     /// Where to compute.
     pub accelerator: Accelerator,
-    /// What it calls itself.
-    pub name: String,
+    /// What it calls itself, and what it can do.
+    pub offer: Offer,
 }
 
 impl Worker {
@@ -65,10 +66,7 @@ impl Worker {
     /// Waits for a job. Comes back without one now and then.
     async fn lease(&self) -> Result<Option<(Lease, Job)>> {
         let start = Instant::now();
-        let request = LeaseJobRequest {
-            worker: self.name.clone(),
-            wait: convert::duration(WAIT),
-        };
+        let request = self.offer.request(WAIT);
         let call = "ask for a job";
         let answer = persist(call, async || {
             let mut server = self.server.worker();

@@ -25,7 +25,7 @@ async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
         leaving: signals::listen(false).unwrap(),
         folder: Folder::new(folder).unwrap(),
         accelerator,
-        name: "test".into(),
+        offer: Offer::new("test".into(), "cpu", None),
     }
 }
 
