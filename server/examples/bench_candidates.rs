@@ -129,6 +129,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
             token: lease.token.clone(),
         },
         secret: true,
+        evidence: false,
         path: "nowhere".into(),
     };
     let artifact = ledger.create_artifact(artifact, 0).await?.id;

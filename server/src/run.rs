@@ -2,6 +2,7 @@
 mod folder;
 mod health;
 pub(crate) mod ledger;
+mod store;
 
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -16,8 +17,7 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::access;
-use crate::api::{self, Api, Door, Guard, Limits, Rates};
-use crate::artifacts::ArtifactStore;
+use crate::api::{self, Api, Door, Guard, Keep, Limits, Rates};
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
@@ -70,8 +70,7 @@ impl Server {
             (None, None) => KeySource::DataFolder,
         };
         let master = secrets::load(source, folder.path()).map_err(startup)?;
-        let store =
-            ArtifactStore::open(&folder.path().join("artifacts"), settings.max_artifact_bytes).map_err(startup)?;
+        let store = store::open(&settings, folder.path()).await?;
         let ledger = ledger::open(&settings, folder.path()).await.map_err(startup)?;
         let listener = TcpListener::bind(settings.listen)
             .await
@@ -80,6 +79,7 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, api::now())
             .await
             .map_err(startup)?;
+        store::claim(&store, &notary).await?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
         let tls = tls::load(&settings)?;
         let mut worker = None;
@@ -214,7 +214,18 @@ fn limits(settings: &Settings) -> Limits {
             calls: settings.max_calls_per_minute,
         },
         abandoned_after: settings.abandoned_after(),
+        signed_url: Some(Duration::from_secs(settings.signed_url_seconds)).filter(|time| !time.is_zero()),
+        keep: Keep {
+            uploads: days(settings.keep_uploads_days),
+            outputs: days(settings.keep_outputs_days),
+            jobs: days(settings.keep_jobs_days),
+        },
     }
+}
+
+/// Days as the ledger counts time; 0 is for ever.
+fn days(days: u64) -> Option<Duration> {
+    Some(Duration::from_secs(days * 24 * 60 * 60)).filter(|time| !time.is_zero())
 }
 
 /// Why the server can't start, with all causes that are not part of the text before.

@@ -33,6 +33,7 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.JobService/WatchJob", LOOK),
     ("/guardsplat.v1.ArtifactService/UploadArtifact", WORK),
     ("/guardsplat.v1.ArtifactService/DownloadArtifact", READ),
+    ("/guardsplat.v1.ArtifactService/GetDownloadUrl", READ),
     ("/guardsplat.v1.ArtifactService/GetArtifact", WORK),
     ("/guardsplat.v1.ArtifactService/DeleteArtifact", WORK),
     ("/guardsplat.v1.KeyService/GetKey", LOOK),

@@ -26,6 +26,7 @@ mod completion;
 mod convert;
 mod deadline;
 mod evidence;
+mod expiry;
 mod explained;
 mod fingerprint;
 mod guard;
@@ -37,6 +38,7 @@ mod listen;
 mod message;
 mod meter;
 mod names;
+mod orphans;
 mod output;
 mod own;
 mod page;
@@ -60,6 +62,7 @@ mod watch;
 mod worker;
 
 pub use clock::now;
+pub use expiry::Keep;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::{Door, serve};
@@ -93,6 +96,10 @@ pub struct Limits {
     pub rates: Rates,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
+    /// How long an address is good for at which the store gives out an artifact; none for no such addresses.
+    pub signed_url: Option<Duration>,
+    /// How long things are kept.
+    pub keep: Keep,
 }
 
 impl Default for Limits {
@@ -108,6 +115,8 @@ impl Default for Limits {
             max_bytes_of_project: None,
             rates: Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
+            signed_url: None,
+            keep: Keep::default(),
         }
     }
 }

@@ -18,6 +18,7 @@ mod error;
 mod numbers;
 pub mod postgres;
 mod registry;
+pub mod retention;
 pub mod retry;
 pub mod sqlite;
 mod token;
@@ -39,6 +40,7 @@ pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
     SealedSigningKey,
 };
+pub use retention::{Before, Expired, RetentionLedger};
 pub use sqlite::SqliteLedger;
 pub use types::{
     ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow,
@@ -49,7 +51,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: AccessLedger {
+pub trait Ledger: AccessLedger + RetentionLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.

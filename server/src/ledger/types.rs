@@ -183,6 +183,8 @@ pub struct NewArtifact {
     pub origin: Origin,
     /// A key file: never visible.
     pub secret: bool,
+    /// A signed report: it stays, and so does its job, however long things are kept.
+    pub evidence: bool,
     /// Where the store has the bytes.
     pub path: String,
 }

@@ -55,6 +55,14 @@ pub struct Flags {
     /// here: give a password in the variable, the file, or libpq's PGPASSFILE [default: ledger.sqlite in the folder]
     #[arg(long, value_name = "URL")]
     pub database: Option<DatabaseUrl>,
+    /// Where artifacts are: s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX or file:///FOLDER; credentials
+    /// are taken from the environment [default: artifacts in the data folder]
+    #[arg(long, value_name = "URL")]
+    pub artifacts: Option<String>,
+    /// Seconds that an address is good for at which clients fetch an artifact from the store itself; 0 for none
+    /// [default: 0]
+    #[arg(long, value_name = "SECONDS")]
+    pub signed_url_seconds: Option<u64>,
     /// Most bytes of an artifact [default: 4294967296]
     #[arg(long, value_name = "BYTES")]
     pub max_artifact_bytes: Option<u64>,
@@ -91,6 +99,15 @@ pub struct Flags {
     /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
+    /// Days that an upload is kept after it was last used; 0 for ever [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_uploads_days: Option<u64>,
+    /// Days that what a job made is kept after its end; 0 for as long as the job [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_outputs_days: Option<u64>,
+    /// Days that a job is kept after its end; 0 for ever [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_jobs_days: Option<u64>,
     /// Whether to run a worker of its own [default: true]
     #[arg(long, value_name = "true|false")]
     pub embedded_worker: Option<bool>,
@@ -131,6 +148,8 @@ impl Flags {
             tls_client_ca,
             data_dir,
             database,
+            artifacts,
+            signed_url_seconds,
             max_artifact_bytes,
             max_queued_jobs,
             max_queued_jobs_per_project,
@@ -143,6 +162,9 @@ impl Flags {
             max_attempts,
             upload_timeout_seconds,
             abandoned_after_seconds,
+            keep_uploads_days,
+            keep_outputs_days,
+            keep_jobs_days,
             embedded_worker,
             worker_binary,
             worker_device,
@@ -160,6 +182,8 @@ impl Flags {
         set(&mut settings.tls_client_ca, tls_client_ca.map(Some));
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.database, database.map(Some));
+        set(&mut settings.artifacts, artifacts.map(Some));
+        set(&mut settings.signed_url_seconds, signed_url_seconds);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
         set(&mut settings.max_queued_jobs_per_project, max_queued_jobs_per_project);
@@ -175,6 +199,9 @@ impl Flags {
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
         set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
+        set(&mut settings.keep_uploads_days, keep_uploads_days);
+        set(&mut settings.keep_outputs_days, keep_outputs_days);
+        set(&mut settings.keep_jobs_days, keep_jobs_days);
         set(&mut settings.embedded_worker, embedded_worker);
         set(&mut settings.worker_binary, worker_binary.map(Some));
         set(&mut settings.worker_device, worker_device);

@@ -4,9 +4,12 @@ use std::path::Path;
 use tracing_subscriber::EnvFilter;
 
 use super::{Access, Settings, SettingsError};
+use crate::artifacts::Place;
 use crate::ledger::postgres;
 
 const DAY: u64 = 24 * 60 * 60;
+/// A hundred years.
+const MOST_DAYS: u64 = 36_500;
 
 impl Settings {
     /// Refuses values that could not work, and names the limits.
@@ -39,6 +42,11 @@ impl Settings {
             ("max_attempts", self.max_attempts.into(), 1, 100),
             ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),
             ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
+            // A week is the longest that S3 signs for.
+            ("signed_url_seconds", self.signed_url_seconds, 0, 7 * DAY),
+            ("keep_uploads_days", self.keep_uploads_days, 0, MOST_DAYS),
+            ("keep_outputs_days", self.keep_outputs_days, 0, MOST_DAYS),
+            ("keep_jobs_days", self.keep_jobs_days, 0, MOST_DAYS),
             ("stop_seconds", self.stop_seconds, 1, 60 * 60),
         ];
         for (field, value, least, most) in numbers {
@@ -78,6 +86,7 @@ impl Settings {
                 reason,
             })?;
         }
+        self.place()?;
         // Filters on fields of spans are regular expressions that the library compiles without limits: 70 bytes of one
         // took gigabytes.
         if self.log_filter.contains(['[', '{']) {
@@ -91,6 +100,15 @@ impl Settings {
             reason: error.to_string(),
         })?;
         Ok(())
+    }
+
+    /// Where artifacts are, if not in the data folder.
+    pub fn place(&self) -> Result<Option<Place>, SettingsError> {
+        let place = self.artifacts.as_deref().map(Place::parse).transpose();
+        place.map_err(|reason| SettingsError::Invalid {
+            field: "artifacts",
+            reason,
+        })
     }
 
     /// Refuses to be open to a network by oversight.

@@ -37,6 +37,10 @@ pub struct Settings {
     pub data_dir: PathBuf,
     /// The database of the ledger, for several servers; a file in the folder where none is named.
     pub database: Option<DatabaseUrl>,
+    /// URL of the store of artifacts; a folder in the data folder where none is named.
+    pub artifacts: Option<String>,
+    /// Seconds that an address is good for at which the store itself gives out an artifact; 0 for no such addresses.
+    pub signed_url_seconds: u64,
     /// Most bytes of an artifact.
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
@@ -61,6 +65,12 @@ pub struct Settings {
     pub upload_timeout_seconds: u64,
     /// Seconds after which bytes that nobody published are removed.
     pub abandoned_after_seconds: u64,
+    /// Days that an upload is kept after it was last used; 0 for ever.
+    pub keep_uploads_days: u64,
+    /// Days that what a job made is kept after its end; 0 for as long as the job.
+    pub keep_outputs_days: u64,
+    /// Days that a job is kept after its end; 0 for ever.
+    pub keep_jobs_days: u64,
     /// Whether the server runs a worker of its own.
     pub embedded_worker: bool,
     /// Program of that worker.
@@ -136,6 +146,8 @@ impl Default for Settings {
             tls_client_ca: None,
             data_dir: "guardsplat-data".into(),
             database: None,
+            artifacts: None,
+            signed_url_seconds: 0,
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
             max_queued_jobs_per_project: 0,
@@ -148,6 +160,9 @@ impl Default for Settings {
             max_attempts: 3,
             upload_timeout_seconds: 60,
             abandoned_after_seconds: 24 * 60 * 60,
+            keep_uploads_days: 0,
+            keep_outputs_days: 0,
+            keep_jobs_days: 0,
             embedded_worker: true,
             worker_binary: None,
             worker_device: WorkerDevice::Auto,

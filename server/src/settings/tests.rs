@@ -74,6 +74,8 @@ fn every_setting_can_be_set_everywhere() {
             "database",
             "postgres://somebody:5ec2e7@db.example/ledger?sslmode=verify-full",
         ),
+        ("artifacts", "s3://bucket/prefix"),
+        ("signed_url_seconds", "16"),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
         ("max_queued_jobs_per_project", "11"),
@@ -86,6 +88,9 @@ fn every_setting_can_be_set_everywhere() {
         ("max_attempts", "7"),
         ("upload_timeout_seconds", "8"),
         ("abandoned_after_seconds", "9"),
+        ("keep_uploads_days", "17"),
+        ("keep_outputs_days", "18"),
+        ("keep_jobs_days", "19"),
         ("embedded_worker", "false"),
         ("worker_binary", "/bin/worker"),
         ("worker_device", "wgpu"),
@@ -321,6 +326,23 @@ fn the_password_of_the_database_is_not_shown() {
     ] {
         let text = error(broken, &[], &[]);
         assert!(!text.contains("5ec2e7"), "{text}");
+    }
+}
+
+/// A URL of a store takes no credentials; one that has some is refused, and they are not repeated.
+#[test]
+fn credentials_in_the_url_of_the_store_are_not_shown() {
+    for url in ["s3://id:5ec2e7@bucket", "https://5ec2e7.example", "az://c?sig=5ec2e7"] {
+        for text in [
+            error(&format!("artifacts = \"{url}\""), &[], &[]),
+            error("", &[("GUARDSPLAT_ARTIFACTS", url)], &[]),
+            error("", &[], &["--artifacts", url]),
+        ] {
+            assert!(
+                text.starts_with("setting artifacts: ") && !text.contains("5ec2e7"),
+                "{text}"
+            );
+        }
     }
 }
 

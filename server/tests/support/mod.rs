@@ -1,5 +1,6 @@
 //! Starts the server's program on folders and ports of its own.
 pub mod postgres;
+pub mod s3;
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

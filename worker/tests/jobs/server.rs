@@ -232,6 +232,13 @@ impl ArtifactService for Service {
         Err(Status::unimplemented("not for workers"))
     }
 
+    async fn get_download_url(
+        &self,
+        _: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        Err(Status::unimplemented("not for workers"))
+    }
+
     async fn get_artifact(&self, _: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         Err(Status::unimplemented("not for workers"))
     }

@@ -78,6 +78,17 @@ impl Server {
     /// A server over a ledger that others may use too. The folder has the master key, and its artifacts.
     pub async fn over(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits, tokens: bool) -> Self {
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
+        Self::with_store(ledger, store, folder, limits, tokens).await
+    }
+
+    /// A server over a store that others may use too.
+    pub async fn with_store(
+        ledger: Arc<dyn Ledger>,
+        store: ArtifactStore,
+        folder: TempDir,
+        limits: Limits,
+        tokens: bool,
+    ) -> Self {
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
         let notary = Notary::open(ledger.as_ref(), &master, 0).await.unwrap();
         let api = Api::new(ledger.clone(), store, master, notary, limits);
@@ -114,9 +125,15 @@ impl Server {
 
     /// Another server with the same master key, and a folder of its own.
     pub async fn twin(&self, ledger: Arc<dyn Ledger>) -> Self {
+        let folder = self.folder_of_a_twin();
+        Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
+    }
+
+    /// A new folder with the same master key.
+    pub fn folder_of_a_twin(&self) -> TempDir {
         let folder = TempDir::new().unwrap();
         std::fs::copy(self.folder.path().join("master.key"), folder.path().join("master.key")).unwrap();
-        Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
+        folder
     }
 
     /// Stops in good order, and starts another server over the same folder.

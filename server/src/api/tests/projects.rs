@@ -203,6 +203,7 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
         "DownloadArtifact" => named!(DownloadArtifactRequest, artifact, offset: 0),
+        "GetDownloadUrl" => named!(GetDownloadUrlRequest, artifact),
         "GetArtifact" => named!(GetArtifactRequest, artifact),
         "DeleteArtifact" => named!(DeleteArtifactRequest, artifact),
         "GetKey" => named!(GetKeyRequest, key),
@@ -307,7 +308,14 @@ async fn workers_read_what_running_jobs_need_and_nothing_else() {
             offset: 0,
         };
         let path = "/guardsplat.v1.ArtifactService/DownloadArtifact";
-        call(&server.channel, path, Some(&worker), request.encode_to_vec()).await
+        let bytes = call(&server.channel, path, Some(&worker), request.encode_to_vec()).await;
+        let request = GetDownloadUrlRequest {
+            name: studio.artifact.clone(),
+        };
+        let path = "/guardsplat.v1.ArtifactService/GetDownloadUrl";
+        let url = call(&server.channel, path, Some(&worker), request.encode_to_vec()).await;
+        assert_eq!(url.is_ok(), bytes.is_ok());
+        bytes
     };
     assert_eq!(not_found(download().await), studio.artifact);
     let (job, token) = server.take_as(&worker).await;

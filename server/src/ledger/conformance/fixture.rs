@@ -82,6 +82,7 @@ pub fn new_artifact(origin: Origin, secret: bool) -> NewArtifact {
         sha256: "ab".repeat(32),
         origin,
         secret,
+        evidence: false,
         path,
     }
 }

@@ -12,6 +12,7 @@ pub mod model;
 mod outputs;
 mod queue;
 mod registry;
+mod retention;
 mod submission;
 
 use std::sync::Arc;
@@ -26,6 +27,7 @@ pub(crate) use fencing::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
 pub(crate) use registry::*;
+pub(crate) use retention::*;
 pub(crate) use submission::*;
 
 /// A place for one ledger, empty at first.
@@ -107,6 +109,11 @@ macro_rules! conformance_suite {
             a_request_is_of_a_project
             what_a_running_job_reads_is_known
             what_a_project_takes_is_counted
+            nothing_goes_by_itself
+            uploads_go_when_they_were_not_used_for_long
+            jobs_go_with_what_they_made
+            paths_are_known_while_there_are_rows
+            nothing_referenced_goes_by_age
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

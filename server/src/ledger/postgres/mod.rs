@@ -13,6 +13,7 @@ mod notices;
 mod open;
 mod presence;
 mod registry;
+mod retention;
 mod rows;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -7,6 +7,7 @@ mod keys;
 mod leases;
 mod open;
 mod registry;
+mod retention;
 mod rows;
 #[cfg(test)]
 mod tests;

@@ -72,5 +72,10 @@ fn migrator() -> Migrator {
             "projects",
             include_str!("../../../migrations/sqlite/0005_projects.sql"),
         ),
+        step(
+            6,
+            "retention",
+            include_str!("../../../migrations/sqlite/0006_retention.sql"),
+        ),
     ])
 }

@@ -139,6 +139,8 @@ async fn a_file_of_the_first_version_is_taken_along() {
         "DROP INDEX artifacts_by_project",
         "ALTER TABLE jobs DROP COLUMN project",
         "ALTER TABLE artifacts DROP COLUMN project",
+        "ALTER TABLE artifacts DROP COLUMN evidence",
+        "DROP INDEX jobs_by_end",
         "ALTER TABLE keys DROP COLUMN project",
         "CREATE INDEX jobs_by_time ON jobs (create_time, id)",
         "CREATE INDEX jobs_by_state ON jobs (state, create_time, id)",
