@@ -77,6 +77,8 @@ pub struct State {
     pub create_errors: VecDeque<Status>,
     /// After how many bytes the next downloads end.
     pub download_ends: VecDeque<usize>,
+    /// Where artifacts can be fetched from besides: what addresses begin with.
+    pub addresses: Option<String>,
     /// Whether downloads are damaged on their way.
     pub damage: bool,
 }

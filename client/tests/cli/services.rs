@@ -9,11 +9,12 @@ use guardsplat_proto::v1::registry_service_server::RegistryService;
 use guardsplat_proto::v1::{
     Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
     DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
-    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetJobRequest,
-    GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job, Key, ListAssetsRequest, ListAssetsResponse,
-    ListCommitmentsRequest, ListCommitmentsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
-    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, UpdateKeyStateRequest,
-    UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response, upload_artifact_request,
+    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetDownloadUrlRequest,
+    GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job,
+    Key, ListAssetsRequest, ListAssetsResponse, ListCommitmentsRequest, ListCommitmentsResponse, ListJobsRequest,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
+    UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response,
+    upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -113,6 +114,21 @@ impl ArtifactService for Fake {
             items.push(Err(Status::unavailable("going down")));
         }
         Ok(Response::new(replies(items)))
+    }
+
+    async fn get_download_url(
+        &self,
+        request: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        let name = request.into_inner().name;
+        let state = self.state();
+        let (artifact, _) = state.artifacts.get(&name).ok_or_else(|| not_found(&name))?;
+        let address = state.addresses.as_ref();
+        Ok(Response::new(GetDownloadUrlResponse {
+            artifact: Some(artifact.clone()),
+            url: address.map(|begin| format!("{begin}/{name}")).unwrap_or_default(),
+            expire_time: None,
+        }))
     }
 
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
