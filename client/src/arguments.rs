@@ -94,6 +94,9 @@ pub enum Command {
     /// Tokens of the project: who may call for it, and what
     #[command(subcommand)]
     Token(commands::token::Command),
+    /// URLs that the service calls when jobs are over; receivers for such calls, and for notifications of an S3 store
+    #[command(subcommand)]
+    Hook(commands::hook::Command),
     /// Signed evidence that jobs with an asset or a claim leave
     #[command(subcommand)]
     Report(commands::report::Command),
@@ -168,6 +171,15 @@ mod tests {
             "token create --scope embed --scope verify --expires 90d --display-name N",
             "token list --json",
             "token revoke T",
+            "hook create https://h/x --kind embed --kind verify --state succeeded --display-name N",
+            "hook list --json",
+            "hook delete H",
+            "hook deliveries --hook H --state dead --limit 7",
+            "hook redeliver D",
+            "hook listen --listen 127.0.0.1:0 --secret-file F --folder D -- ./publish.sh a -b",
+            "hook s3 --store-token-file F --bucket B --folder D --key K --message 0 --preset draft",
+            "hook s3 --bucket B --folder D --key K -- ./message.sh",
+            "hook s3 --bucket B --prefix http://store:9000/b/ --key K --message 0",
             "report open J -o F",
             "report check F --public-key P",
             "report key",
@@ -202,6 +214,10 @@ mod tests {
                 "{two}"
             );
         }
+        assert!(wrong("hook s3 --bucket B --folder D --key K").contains("--message"));
+        assert!(wrong("hook s3 --bucket B --key K --message 0").contains("--folder"));
+        assert!(wrong("hook s3 --bucket B --prefix h --key K --message 0").contains("--prefix"));
+        assert!(wrong("hook s3 --bucket B --folder D --key K --message 0 -- ./m.sh").contains("cannot be used"));
         assert!(wrong("token create").contains("--scope"));
         assert!(wrong("token create --scope worker").contains("guardsplat-server token create"));
         assert!(wrong("token create --scope embed --expires soon").contains("--expires"));

@@ -18,6 +18,7 @@ mod settings;
 mod show;
 mod transfer;
 mod watch;
+mod webhook;
 
 use std::process::ExitCode;
 

@@ -4,6 +4,7 @@ pub mod api;
 pub mod artifacts;
 pub mod embedded;
 pub mod error;
+pub mod hooks;
 pub mod ledger;
 pub mod marks;
 pub mod notary;

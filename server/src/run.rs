@@ -5,6 +5,7 @@ pub(crate) mod ledger;
 
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::path::Path;
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,6 +21,7 @@ use crate::api::{self, Api, Door, Guard, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
+use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
@@ -56,6 +58,7 @@ pub struct Server {
     side: Option<(TcpListener, Guard)>,
     ledger: Arc<dyn Ledger>,
     api: Api,
+    poster: Poster,
     /// Held until the end, so that no other server uses the folder.
     _folder: DataFolder,
 }
@@ -81,6 +84,7 @@ impl Server {
             .await
             .map_err(startup)?;
         let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
+        let poster = poster(&settings)?;
         let tls = tls::load(&settings)?;
         let mut worker = None;
         let mut side = None;
@@ -118,6 +122,7 @@ impl Server {
             side,
             ledger,
             api,
+            poster,
             _folder: folder,
         })
     }
@@ -141,6 +146,7 @@ impl Server {
         });
         let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
         let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
+        let deliveries = tokio::spawn(api::deliveries(self.api.clone(), self.poster));
         // It ends with the API.
         tokio::spawn(api::relay(self.api.clone()));
         let worker = self
@@ -173,6 +179,9 @@ impl Server {
         };
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
             tracing::warn!("housekeeping is cut off");
+        }
+        if timeout(LEAST_DRAIN, deliveries).await.is_err() {
+            tracing::warn!("what hooks are to be told is cut off");
         }
         if timeout(LEAST_DRAIN, self.ledger.close()).await.is_err() {
             tracing::warn!("the ledger is cut off; what it acknowledged is on disk all the same");
@@ -214,7 +223,27 @@ fn limits(settings: &Settings) -> Limits {
             calls: settings.max_calls_per_minute,
         },
         abandoned_after: settings.abandoned_after(),
+        hooks: rules(settings),
     }
+}
+
+fn rules(settings: &Settings) -> Rules {
+    Rules {
+        allow_http: settings.hook_allow_http,
+        allow_private: settings.hook_allow_private,
+        give_up_after: Duration::from_secs(settings.hook_give_up_seconds),
+    }
+}
+
+/// What sends messages to hooks.
+fn poster(settings: &Settings) -> Result<Poster> {
+    let told = |path: &Path, reason: String| Error::Startup(format!("hook_ca {}: {reason}", path.display()));
+    let ca = match &settings.hook_ca {
+        Some(path) => Some(std::fs::read(path).map_err(|error| told(path, error.to_string()))?),
+        None => None,
+    };
+    let place = settings.hook_ca.as_deref().unwrap_or(Path::new(""));
+    Poster::new(rules(settings), ca.as_deref()).map_err(|reason| told(place, reason))
 }
 
 /// Why the server can't start, with all causes that are not part of the text before.

@@ -1,4 +1,5 @@
 //! The server as a process: it starts, answers, looks after its worker, stops in good order, and starts again.
+mod hooks;
 mod support;
 mod tls;
 mod tokens;

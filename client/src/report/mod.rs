@@ -1,6 +1,7 @@
 //! What commands print as JSON: names and meanings as in the engine's own, where they mean the same.
 mod artifact;
 mod embed;
+mod hook;
 mod job;
 mod key;
 mod registry;
@@ -9,6 +10,7 @@ mod verify;
 
 pub use artifact::ArtifactReport;
 pub use embed::EmbedReport;
+pub use hook::{DeliveryReport, HookReport};
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};
 pub use registry::{AssetReport, OwnerReport};

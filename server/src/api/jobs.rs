@@ -93,6 +93,7 @@ impl Api {
             inputs: submission.inputs,
             key: submission.key,
             request_id: submission.request_id.map(|id| own::request(project, id)),
+            asked_id: submission.request_id,
             fingerprint,
             max_attempts: self.limits().max_attempts,
         };

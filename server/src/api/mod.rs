@@ -1,8 +1,9 @@
-//! The API over gRPC: the six services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+//! The API over gRPC: the seven services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
 use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
+use guardsplat_proto::v1::hook_service_server::HookServiceServer;
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
@@ -13,6 +14,7 @@ use tonic::service::Routes;
 
 use crate::artifacts::ArtifactStore;
 use crate::error::{Error, Result};
+use crate::hooks::Rules;
 use crate::ledger::Ledger;
 use crate::notary::Notary;
 use crate::secrets::MasterKey;
@@ -25,10 +27,12 @@ mod clock;
 mod completion;
 mod convert;
 mod deadline;
+mod deliveries;
 mod evidence;
 mod explained;
 mod fingerprint;
 mod guard;
+mod hooks;
 mod housekeeping;
 mod jobs;
 mod keys;
@@ -60,6 +64,7 @@ mod watch;
 mod worker;
 
 pub use clock::now;
+pub use deliveries::deliveries;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::{Door, serve};
@@ -93,6 +98,8 @@ pub struct Limits {
     pub rates: Rates,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
+    /// What hooks may be, and how long they are told.
+    pub hooks: Rules,
 }
 
 impl Default for Limits {
@@ -108,11 +115,12 @@ impl Default for Limits {
             max_bytes_of_project: None,
             rates: Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
+            hooks: Rules::default(),
         }
     }
 }
 
-/// What the six services share. Cheap to clone.
+/// What the seven services share. Cheap to clone.
 #[derive(Clone)]
 pub struct Api {
     shared: Arc<Shared>,
@@ -154,7 +162,7 @@ impl Api {
         }
     }
 
-    /// The six services and reflection. Health, which knows more than the API, is added by the caller.
+    /// The seven services and reflection. Health, which knows more than the API, is added by the caller.
     pub fn routes(&self) -> Result<Routes> {
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -169,6 +177,7 @@ impl Api {
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(TokenServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(HookServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(reflection().build_v1().map_err(failed)?)
                 .add_service(reflection().build_v1alpha().map_err(failed)?),

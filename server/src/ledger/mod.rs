@@ -15,6 +15,7 @@ mod chain;
 pub mod conformance;
 mod elsewhere;
 mod error;
+pub mod hooks;
 mod numbers;
 pub mod postgres;
 mod registry;
@@ -34,6 +35,9 @@ use uuid::Uuid;
 pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
+pub use hooks::{
+    DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
+};
 pub use postgres::PostgresLedger;
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
@@ -49,7 +53,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: AccessLedger {
+pub trait Ledger: AccessLedger + HookLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.

@@ -121,6 +121,8 @@ pub struct NewJob {
     pub key: Option<KeyId>,
     /// Names the request, so that it can be repeated.
     pub request_id: Option<Uuid>,
+    /// What the caller called the request, whose name in `request_id` is that of all projects.
+    pub asked_id: Option<Uuid>,
     /// SHA-256 of the request, with what its artifacts hold in place of their names.
     pub fingerprint: [u8; 32],
     /// How many attempts there may be.

@@ -91,6 +91,18 @@ pub struct Flags {
     /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
+    /// Whether hooks may be called without TLS [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub hook_allow_http: Option<bool>,
+    /// Whether hooks may be called at addresses that are not public [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub hook_allow_private: Option<bool>,
+    /// File of the certificates (PEM) that hooks' are checked with [default: none, those of public authorities]
+    #[arg(long, value_name = "FILE")]
+    pub hook_ca: Option<PathBuf>,
+    /// Seconds after which a message that a hook did not acknowledge is given up [default: 259200]
+    #[arg(long, value_name = "SECONDS")]
+    pub hook_give_up_seconds: Option<u64>,
     /// Whether to run a worker of its own [default: true]
     #[arg(long, value_name = "true|false")]
     pub embedded_worker: Option<bool>,
@@ -143,6 +155,10 @@ impl Flags {
             max_attempts,
             upload_timeout_seconds,
             abandoned_after_seconds,
+            hook_allow_http,
+            hook_allow_private,
+            hook_ca,
+            hook_give_up_seconds,
             embedded_worker,
             worker_binary,
             worker_device,
@@ -175,6 +191,10 @@ impl Flags {
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
         set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
+        set(&mut settings.hook_allow_http, hook_allow_http);
+        set(&mut settings.hook_allow_private, hook_allow_private);
+        set(&mut settings.hook_ca, hook_ca.map(Some));
+        set(&mut settings.hook_give_up_seconds, hook_give_up_seconds);
         set(&mut settings.embedded_worker, embedded_worker);
         set(&mut settings.worker_binary, worker_binary.map(Some));
         set(&mut settings.worker_device, worker_device);

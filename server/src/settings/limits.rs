@@ -39,6 +39,7 @@ impl Settings {
             ("max_attempts", self.max_attempts.into(), 1, 100),
             ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),
             ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
+            ("hook_give_up_seconds", self.hook_give_up_seconds, 1, 365 * DAY),
             ("stop_seconds", self.stop_seconds, 1, 60 * 60),
         ];
         for (field, value, least, most) in numbers {
@@ -65,6 +66,7 @@ impl Settings {
             ("tls_certificate", &self.tls_certificate),
             ("tls_key", &self.tls_key),
             ("tls_client_ca", &self.tls_client_ca),
+            ("hook_ca", &self.hook_ca),
             ("worker_binary", &self.worker_binary),
             ("master_key_file", &self.master_key_file),
         ] {

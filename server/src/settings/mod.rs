@@ -61,6 +61,14 @@ pub struct Settings {
     pub upload_timeout_seconds: u64,
     /// Seconds after which bytes that nobody published are removed.
     pub abandoned_after_seconds: u64,
+    /// Whether hooks may be called without TLS.
+    pub hook_allow_http: bool,
+    /// Whether hooks may be called at addresses that are not public.
+    pub hook_allow_private: bool,
+    /// File of the certificates that hooks' are checked with; those of public authorities where none is named.
+    pub hook_ca: Option<PathBuf>,
+    /// Seconds after which a message that a hook did not acknowledge is given up.
+    pub hook_give_up_seconds: u64,
     /// Whether the server runs a worker of its own.
     pub embedded_worker: bool,
     /// Program of that worker.
@@ -148,6 +156,10 @@ impl Default for Settings {
             max_attempts: 3,
             upload_timeout_seconds: 60,
             abandoned_after_seconds: 24 * 60 * 60,
+            hook_allow_http: false,
+            hook_allow_private: false,
+            hook_ca: None,
+            hook_give_up_seconds: 3 * 24 * 60 * 60,
             embedded_worker: true,
             worker_binary: None,
             worker_device: WorkerDevice::Auto,

@@ -5,6 +5,7 @@ mod artifacts;
 mod calls;
 mod claims;
 mod harness;
+mod hooks;
 mod housekeeping;
 mod jobs;
 mod key_states;

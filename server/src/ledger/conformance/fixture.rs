@@ -34,6 +34,7 @@ pub fn new_job() -> NewJob {
         inputs: Vec::new(),
         key: None,
         request_id: None,
+        asked_id: None,
         fingerprint: [7; 32],
         max_attempts: 3,
     }

@@ -8,6 +8,7 @@ mod attempts;
 mod cancelling;
 mod fencing;
 pub(crate) mod fixture;
+mod hooks;
 pub mod model;
 mod outputs;
 mod queue;
@@ -23,6 +24,7 @@ pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
+pub(crate) use hooks::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
 pub(crate) use registry::*;
@@ -107,6 +109,15 @@ macro_rules! conformance_suite {
             a_request_is_of_a_project
             what_a_running_job_reads_is_known
             what_a_project_takes_is_counted
+            a_hook_is_kept_listed_and_deleted
+            every_end_of_a_job_makes_one_delivery
+            a_hook_is_told_of_what_it_wants_only
+            a_delivery_is_sent_until_it_is_acknowledged
+            a_delivery_is_given_up_and_sent_again
+            a_delivery_that_was_lost_is_given_to_another
+            servers_never_share_a_delivery
+            deliveries_come_in_pages_and_are_forgotten
+            a_hook_may_go_while_its_jobs_end
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

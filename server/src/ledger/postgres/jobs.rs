@@ -45,8 +45,8 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10) ON CONFLICT (request_id) DO NOTHING RETURNING *",
+         create_time, update_time, queue_time, project, asked_id) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10, $11) ON CONFLICT (request_id) DO NOTHING RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -58,6 +58,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(new.asked_id)
     .fetch_optional(&mut *db)
     .await?;
     let Some(row) = row else {

@@ -9,7 +9,7 @@ use super::super::transition::{Next, after_attempt, after_release, end_of};
 use super::super::types::{Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
 use super::super::{LedgerError, Result, token};
 use super::transition::leave;
-use super::{artifacts, jobs, keys, rows};
+use super::{artifacts, hooks, jobs, keys, rows};
 
 /// One statement takes the first job of the queue that nobody else is taking, and either counts an attempt and leases
 /// it, or fails it because no attempt is left. So a job that kills its worker is bounded even if nobody lives to tell.
@@ -47,6 +47,7 @@ pub(super) async fn claim(db: &mut PgConnection, worker: &str, lease: Duration, 
         if job.state == JobState::Running {
             return Ok(Some(Lease { job, token }));
         }
+        hooks::announce(db, &job, now).await?;
     }
 }
 

@@ -6,6 +6,7 @@ mod access;
 mod artifacts;
 mod commitments;
 mod database;
+mod hooks;
 mod jobs;
 mod keys;
 mod leases;

@@ -181,5 +181,6 @@ pub(super) fn steps() -> Vec<Migration> {
             "projects",
             include_str!("../../../migrations/postgres/0003_projects.sql"),
         ),
+        step(5, "hooks", include_str!("../../../migrations/postgres/0005_hooks.sql")),
     ]
 }

@@ -55,8 +55,8 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10) RETURNING *",
+         create_time, update_time, queue_time, project, asked_id) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10, ?11) RETURNING *",
     )
     .bind(new.id.as_bytes().as_slice())
     .bind(&new.display_name)
@@ -68,6 +68,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(new.asked_id.as_ref().map(|id| id.as_bytes().as_slice()))
     .fetch_one(&mut *db)
     .await?;
     for input in &new.inputs {

@@ -2,6 +2,7 @@
 mod access;
 mod artifacts;
 mod commitments;
+mod hooks;
 mod jobs;
 mod keys;
 mod leases;

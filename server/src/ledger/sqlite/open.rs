@@ -72,5 +72,6 @@ fn migrator() -> Migrator {
             "projects",
             include_str!("../../../migrations/sqlite/0005_projects.sql"),
         ),
+        step(7, "hooks", include_str!("../../../migrations/sqlite/0007_hooks.sql")),
     ])
 }

@@ -6,7 +6,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{AccessLedger, Ledger, LedgerError, PostgresLedger, Usage};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
-use super::super::{access, commitments, keys, open, registry};
+use super::super::{access, commitments, hooks, keys, open, registry};
 use super::Place;
 
 #[tokio::test]
@@ -118,6 +118,18 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (access::OF_PROJECT, "tokens_by_project", page),
         (access::USAGE, "artifacts_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
+        (hooks::HOOKS, "hooks_by_project", page),
+        (hooks::CLAIM, "deliveries_due", "bigint, uuid[], bytea, bigint"),
+        (
+            hooks::OF_PROJECT,
+            "deliveries_by_project",
+            "bigint, uuid, bigint, text, int",
+        ),
+        (
+            hooks::OF_HOOK,
+            "deliveries_by_hook",
+            "bigint, uuid, bigint, text, int, uuid",
+        ),
         (registry::ASSETS, "assets_by_time", assets),
         (registry::OF_OWNER, "assets_by_owner", assets),
         (registry::OF_KEY, "assets_by_key", assets),

@@ -7,7 +7,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{Ledger, NewJob};
 use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
 use super::super::leases::CLAIM;
-use super::super::{access, commitments, keys, registry};
+use super::super::{access, commitments, hooks, keys, registry};
 use super::Folder;
 use super::file::raw;
 
@@ -56,6 +56,16 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (
             access::USAGE,
             "COVERING INDEX artifacts_by_project (project=? AND state=?)",
+        ),
+        (hooks::HOOKS, "INDEX hooks_by_project (project=? AND (create_time,id)<"),
+        (hooks::DUE, "INDEX deliveries_due (next_time<?)"),
+        (
+            hooks::OF_PROJECT,
+            "INDEX deliveries_by_project (project=? AND (create_time,id)<",
+        ),
+        (
+            hooks::OF_HOOK,
+            "INDEX deliveries_by_hook (hook_id=? AND (create_time,id)<",
         ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
