@@ -111,6 +111,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         inputs: Vec::new(),
         key: None,
         request_id: None,
+        asked_id: None,
         fingerprint: [0; 32],
         max_attempts: 1,
     };

@@ -173,7 +173,7 @@ pub struct DeliveryRow {
 /// Which deliveries a list is of.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DeliveryFilter {
-    /// Those to this hook.
+    /// Those to this hook, which must be the project's.
     pub hook: Option<HookId>,
     /// Those in this state.
     pub state: Option<DeliveryState>,

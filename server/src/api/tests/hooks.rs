@@ -386,15 +386,12 @@ async fn hooks_are_of_a_project_and_tell_their_secret_once() {
         hook.name
     );
     let list = ListHooksRequest::default();
-    assert_eq!(
-        hooks
-            .list_hooks(asking(&admin, list.clone()))
-            .await
-            .unwrap()
-            .into_inner()
-            .hooks,
-        [hook.clone()]
-    );
+    let own = hooks
+        .list_hooks(asking(&admin, list.clone()))
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(own.hooks, std::slice::from_ref(&hook));
     assert_eq!(
         hooks
             .list_hooks(asking(&stranger, list))

@@ -25,7 +25,7 @@ pub(super) const OF_PROJECT: &str = "SELECT * FROM deliveries \
 
 /// A page of those to one hook.
 pub(super) const OF_HOOK: &str = "SELECT * FROM deliveries \
-    WHERE hook_id = $6 AND project = $4 AND ($5 IS NULL OR state = $5) AND (create_time, id) < ($1, $2) \
+    WHERE hook_id = $4 AND ($5 IS NULL OR state = $5) AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
 /// Takes the delivery that has been due for longest and that nobody else is taking.
@@ -200,15 +200,13 @@ async fn list_deliveries(
     limit: u32,
 ) -> Result<Vec<DeliveryRow>> {
     let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-    let mut query = sqlx::query(if filter.hook.is_some() { OF_HOOK } else { OF_PROJECT })
-        .bind(time)
-        .bind(id)
-        .bind(i64::from(limit))
-        .bind(project)
-        .bind(filter.state.map(|state| state as i32));
-    if let Some(hook) = filter.hook {
-        query = query.bind(hook);
-    }
+    let page = sqlx::query(if filter.hook.is_some() { OF_HOOK } else { OF_PROJECT });
+    let page = page.bind(time).bind(id).bind(i64::from(limit));
+    let page = match filter.hook {
+        Some(hook) => page.bind(hook),
+        None => page.bind(project),
+    };
+    let query = page.bind(filter.state.map(|state| state as i32));
     query.fetch_all(db).await?.iter().map(delivery).collect()
 }
 

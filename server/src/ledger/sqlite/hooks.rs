@@ -25,7 +25,7 @@ pub(super) const OF_PROJECT: &str = "SELECT * FROM deliveries \
 
 /// A page of those to one hook.
 pub(super) const OF_HOOK: &str = "SELECT * FROM deliveries \
-    WHERE hook_id = ?6 AND project = ?4 AND (?5 IS NULL OR state = ?5) AND (create_time, id) < (?1, ?2) \
+    WHERE hook_id = ?4 AND (?5 IS NULL OR state = ?5) AND (create_time, id) < (?1, ?2) \
     ORDER BY create_time DESC, id DESC LIMIT ?3";
 
 /// The delivery that has been due for longest, to no hook of a JSON list of ids in hexadecimal.
@@ -69,15 +69,13 @@ impl HookLedger for SqliteLedger {
         limit: u32,
     ) -> Result<Vec<DeliveryRow>> {
         let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-        let mut query = sqlx::query(if filter.hook.is_some() { OF_HOOK } else { OF_PROJECT })
-            .bind(time)
-            .bind(id.as_bytes().as_slice())
-            .bind(limit)
-            .bind(project)
-            .bind(filter.state.map(|state| state as i64));
-        if let Some(hook) = &filter.hook {
-            query = query.bind(hook.as_bytes().as_slice());
-        }
+        let page = sqlx::query(if filter.hook.is_some() { OF_HOOK } else { OF_PROJECT });
+        let page = page.bind(time).bind(id.as_bytes().as_slice()).bind(limit);
+        let page = match &filter.hook {
+            Some(hook) => page.bind(hook.as_bytes().as_slice()),
+            None => page.bind(project),
+        };
+        let query = page.bind(filter.state.map(|state| state as i64));
         let found = query.fetch_all(&mut *self.readers.acquire().await?).await?;
         found.iter().map(delivery).collect()
     }

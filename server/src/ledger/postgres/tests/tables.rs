@@ -125,11 +125,7 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             "deliveries_by_project",
             "bigint, uuid, bigint, text, int",
         ),
-        (
-            hooks::OF_HOOK,
-            "deliveries_by_hook",
-            "bigint, uuid, bigint, text, int, uuid",
-        ),
+        (hooks::OF_HOOK, "deliveries_by_hook", "bigint, uuid, bigint, uuid, int"),
         (registry::ASSETS, "assets_by_time", assets),
         (registry::OF_OWNER, "assets_by_owner", assets),
         (registry::OF_KEY, "assets_by_key", assets),
