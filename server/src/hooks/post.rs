@@ -43,8 +43,9 @@ pub enum PostError {
     /// The name leads nowhere.
     #[error("the name of the host could not be looked up: {0}")]
     NoAddress(String),
-    /// It leads where nobody may be led.
-    #[error("the host has the address {address}, which {}", why(*.reach))]
+    /// It leads where nobody may be led. What names of its network the server can look up is nobody's business, so the
+    /// text does not have the address.
+    #[error("the host has an address that {}", why(*.reach))]
     Refused {
         /// Where it leads.
         address: IpAddr,
