@@ -16,6 +16,7 @@ mod report;
 mod server;
 mod settings;
 mod show;
+mod trace;
 mod transfer;
 mod watch;
 

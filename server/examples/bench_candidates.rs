@@ -113,6 +113,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         request_id: None,
         fingerprint: [0; 32],
         max_attempts: 1,
+        trace_parent: None,
     };
     let job = ledger.create_job(job, 0).await?.id;
     let lease = ledger

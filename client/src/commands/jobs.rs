@@ -1,8 +1,12 @@
-//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`.
+//! `jobs list`, `jobs get`, `jobs watch`, `jobs cancel`; and for those that failed `jobs dead`, `jobs attempts` and
+//! `jobs requeue`.
 use clap::{Args, Subcommand, ValueEnum};
+use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::{Result as Outcome, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
-use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job, ListJobsRequest};
+use guardsplat_proto::v1::{
+    CancelJobRequest, GetJobRequest, Job, JobAttempt, ListJobAttemptsRequest, ListJobsRequest, RequeueJobRequest,
+};
 use serde::Serialize;
 
 use crate::context::Context;
@@ -11,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::names;
 use crate::output::{Exit, print_json, print_json_line, print_line, printable, say};
-use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, word};
+use crate::report::{AttemptReport, EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, outcome_word, word};
 use crate::show::Show;
 use crate::watch::watch;
 
@@ -41,6 +45,51 @@ pub enum Command {
         /// jobs/ID, or the id alone
         job: String,
     },
+    /// Jobs that failed, newest first, with what went wrong
+    Dead(Dead),
+    /// The attempts of a job, newest first: when, by which worker, and how each ended
+    Attempts {
+        /// jobs/ID, or the id alone
+        job: String,
+    },
+    /// Queues a job that failed once more, its attempts counted anew; needs a token with the scope admin
+    Requeue {
+        /// jobs/ID, or the id alone
+        job: String,
+    },
+}
+
+/// Arguments of `jobs dead`.
+#[derive(Args)]
+pub struct Dead {
+    /// Only jobs that failed for this reason; may be given several times
+    #[arg(long, value_enum)]
+    reason: Vec<ReasonName>,
+    /// Most jobs to list
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..))]
+    limit: u32,
+}
+
+/// Why jobs fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ReasonName {
+    InvalidInput,
+    TargetMissed,
+    WorkerLost,
+    Internal,
+    AttemptsExhausted,
+}
+
+impl From<ReasonName> for Reason {
+    fn from(name: ReasonName) -> Self {
+        match name {
+            ReasonName::InvalidInput => Self::InvalidInput,
+            ReasonName::TargetMissed => Self::TargetMissed,
+            ReasonName::WorkerLost => Self::WorkerLost,
+            ReasonName::Internal => Self::Internal,
+            ReasonName::AttemptsExhausted => Self::AttemptsExhausted,
+        }
+    }
 }
 
 /// Arguments of `jobs list`.
@@ -84,6 +133,11 @@ struct Listed {
 }
 
 #[derive(Serialize)]
+struct Attempts {
+    attempts: Vec<AttemptReport>,
+}
+
+#[derive(Serialize)]
 struct Watched<'a> {
     cursor: &'a str,
     job: JobReport,
@@ -110,20 +164,76 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
+        Command::Dead(arguments) => dead(context, arguments).await,
+        Command::Attempts { job } => attempts(context, names::job(job)?).await,
+        Command::Requeue { job } => {
+            let request = RequeueJobRequest { name: names::job(job)? };
+            let sent = context.once("queueing the job once more", request, async |channel, request| {
+                JobServiceClient::new(channel).requeue_job(request).await
+            });
+            tell(context, &sent.await?);
+            Ok(Exit::Done)
+        }
     }
 }
 
 async fn list(context: &Context, arguments: &List) -> Result<Exit> {
     let states: Vec<i32> = arguments.state.iter().map(|&name| State::from(name).into()).collect();
-    let limit = arguments.limit as usize;
+    let (jobs, more) = pages(context, states, Vec::new(), arguments.limit).await?;
+    print_list(context, &jobs, more, line);
+    Ok(Exit::Done)
+}
+
+async fn dead(context: &Context, arguments: &Dead) -> Result<Exit> {
+    let named = match arguments.reason.as_slice() {
+        [] => ReasonName::value_variants(),
+        some => some,
+    };
+    let reasons = named.iter().map(|&name| Reason::from(name).into()).collect();
+    let (jobs, more) = pages(context, Vec::new(), reasons, arguments.limit).await?;
+    print_list(context, &jobs, more, |job| match &job.failure {
+        Some(failure) => {
+            let reason = word(failure.reason().as_str_name(), "REASON_");
+            format!("{}\n    {} ({reason})", line(job), printable(&failure.message))
+        }
+        None => line(job),
+    });
+    Ok(Exit::Done)
+}
+
+async fn attempts(context: &Context, name: String) -> Result<Exit> {
+    let request = ListJobAttemptsRequest { name };
+    let sent = context.call("reading attempts", request, async |channel, request| {
+        JobServiceClient::new(channel).list_job_attempts(request).await
+    });
+    let attempts = sent.await?.attempts;
+    if context.json {
+        print_json(&Attempts {
+            attempts: attempts.iter().map(Into::into).collect(),
+        });
+        return Ok(Exit::Done);
+    }
+    for attempt in &attempts {
+        print_line(&attempt_line(attempt));
+    }
+    if attempts.is_empty() {
+        context.console.say("no attempts yet");
+    }
+    Ok(Exit::Done)
+}
+
+/// Jobs of all pages, at most so many, and whether there are more.
+async fn pages(context: &Context, states: Vec<i32>, reasons: Vec<i32>, most: u32) -> Result<(Vec<Job>, bool)> {
+    let limit = most as usize;
     let mut jobs = Vec::new();
     let mut page_token = String::new();
     let more = loop {
         let request = ListJobsRequest {
             // Every page of a list is asked for in the same way.
-            page_size: i32::try_from(arguments.limit.min(PAGE)).unwrap_or(i32::MAX),
+            page_size: i32::try_from(most.min(PAGE)).unwrap_or(i32::MAX),
             page_token,
             states: states.clone(),
+            reasons: reasons.clone(),
         };
         let sent = context.call("listing jobs", request, async |channel, request| {
             JobServiceClient::new(channel).list_jobs(request).await
@@ -136,22 +246,25 @@ async fn list(context: &Context, arguments: &List) -> Result<Exit> {
         }
     };
     jobs.truncate(limit);
+    Ok((jobs, more))
+}
+
+fn print_list(context: &Context, jobs: &[Job], more: bool, text: impl Fn(&Job) -> String) {
     if context.json {
         print_json(&Listed {
             jobs: jobs.iter().map(Into::into).collect(),
             more,
         });
-        return Ok(Exit::Done);
+        return;
     }
-    for job in &jobs {
-        print_line(&line(job));
+    for job in jobs {
+        print_line(&text(job));
     }
     if jobs.is_empty() {
         context.console.say("no jobs");
     } else if more {
         context.console.say("there are more; --limit shows them");
     }
-    Ok(Exit::Done)
 }
 
 async fn follow(context: &Context, name: String, cursor: Option<String>) -> Result<Exit> {
@@ -237,6 +350,24 @@ fn tell(context: &Context, job: &Job) {
         Some(Outcome::KeyResult(result)) => print_line(&KeyResultReport::from(result).line()),
         None => {}
     }
+}
+
+/// An attempt for people.
+fn attempt_line(attempt: &JobAttempt) -> String {
+    let time = |time: Option<prost_types::Timestamp>| time.map(|time| time.to_string()).unwrap_or_default();
+    let mut line = format!(
+        "{:3}  {:9}  {}  {}  {}",
+        attempt.number,
+        outcome_word(attempt),
+        time(attempt.start_time),
+        time(attempt.end_time),
+        printable(&attempt.worker)
+    );
+    if let Some(failure) = &attempt.failure {
+        let reason = word(failure.reason().as_str_name(), "REASON_");
+        line += &format!("\n     {} ({reason})", printable(&failure.message));
+    }
+    line
 }
 
 /// A job on one line.

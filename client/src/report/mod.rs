@@ -1,5 +1,6 @@
 //! What commands print as JSON: names and meanings as in the engine's own, where they mean the same.
 mod artifact;
+mod attempt;
 mod embed;
 mod job;
 mod key;
@@ -8,6 +9,7 @@ mod token;
 mod verify;
 
 pub use artifact::ArtifactReport;
+pub use attempt::{AttemptReport, outcome_word};
 pub use embed::EmbedReport;
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};

@@ -10,10 +10,11 @@ use guardsplat_proto::v1::{
     Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
     DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
     ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetJobRequest,
-    GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job, Key, ListAssetsRequest, ListAssetsResponse,
-    ListCommitmentsRequest, ListCommitmentsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
-    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, UpdateKeyStateRequest,
-    UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response, upload_artifact_request,
+    GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
+    ListCommitmentsRequest, ListCommitmentsResponse, ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
+    RequeueJobRequest, UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse,
+    download_artifact_response, job_attempt, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -172,7 +173,11 @@ impl JobService for Fake {
         let request = request.into_inner();
         let state = self.state();
         let from: usize = request.page_token.parse().unwrap_or(0);
-        let wanted = |job: &&Job| request.states.is_empty() || request.states.contains(&job.state);
+        let reason = |job: &Job| job.failure.as_ref().map_or(0, |failure| failure.reason);
+        let wanted = |job: &&Job| {
+            (request.states.is_empty() || request.states.contains(&job.state))
+                && (request.reasons.is_empty() || request.reasons.contains(&reason(job)))
+        };
         let all: Vec<Job> = state.jobs.values().rev().filter(wanted).cloned().collect();
         // Pages are smaller than asked for, which a server may do.
         let to = (from + 2).min(all.len());
@@ -189,6 +194,32 @@ impl JobService for Fake {
         let job = state.jobs.get_mut(&name).ok_or_else(|| not_found(&name))?;
         job.set_state(JobState::Cancelled);
         Ok(Response::new(job.clone()))
+    }
+
+    async fn requeue_job(&self, request: Request<RequeueJobRequest>) -> Result<Response<Job>, Status> {
+        let name = request.into_inner().name;
+        let mut state = self.state();
+        let job = state.jobs.get_mut(&name).ok_or_else(|| not_found(&name))?;
+        job.set_state(JobState::Queued);
+        job.failure = None;
+        Ok(Response::new(job.clone()))
+    }
+
+    async fn list_job_attempts(
+        &self,
+        request: Request<ListJobAttemptsRequest>,
+    ) -> Result<Response<ListJobAttemptsResponse>, Status> {
+        let name = request.into_inner().name;
+        let job = self.state().jobs.get(&name).cloned().ok_or_else(|| not_found(&name))?;
+        let attempt = JobAttempt {
+            number: 1,
+            worker: "a worker".into(),
+            outcome: job_attempt::Outcome::Failed.into(),
+            failure: job.failure,
+            ..JobAttempt::default()
+        };
+        let attempts = vec![attempt];
+        Ok(Response::new(ListJobAttemptsResponse { attempts }))
     }
 
     type WatchJobStream = Replies<WatchJobResponse>;

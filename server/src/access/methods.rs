@@ -31,6 +31,8 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.JobService/ListJobs", LOOK),
     ("/guardsplat.v1.JobService/CancelJob", WORK),
     ("/guardsplat.v1.JobService/WatchJob", LOOK),
+    ("/guardsplat.v1.JobService/RequeueJob", ADMIN),
+    ("/guardsplat.v1.JobService/ListJobAttempts", LOOK),
     ("/guardsplat.v1.ArtifactService/UploadArtifact", WORK),
     ("/guardsplat.v1.ArtifactService/DownloadArtifact", READ),
     ("/guardsplat.v1.ArtifactService/GetArtifact", WORK),

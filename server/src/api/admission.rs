@@ -40,6 +40,18 @@ impl Api {
         Ok(())
     }
 
+    /// Refuses a job that would be one too many.
+    pub(super) async fn room_in_queue(&self) -> Result<()> {
+        let limit = self.limits().max_queued;
+        if u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) < limit {
+            return Ok(());
+        }
+        Err(Error::QueueFull {
+            limit,
+            retry_after: QUEUE_RETRY,
+        })
+    }
+
     /// Whether a request made a job before.
     pub(super) async fn is_known(&self, project: &str, submission: &Submission) -> Result<bool> {
         match submission.request_id {

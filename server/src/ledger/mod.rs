@@ -16,6 +16,7 @@ pub mod conformance;
 mod elsewhere;
 mod error;
 mod numbers;
+mod operations;
 pub mod postgres;
 mod registry;
 pub mod retry;
@@ -34,6 +35,7 @@ use uuid::Uuid;
 pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
+pub use operations::{AttemptRow, OperationsLedger, Outcome, Tally, Waiting};
 pub use postgres::PostgresLedger;
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
@@ -49,7 +51,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: AccessLedger {
+pub trait Ledger: AccessLedger + OperationsLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.

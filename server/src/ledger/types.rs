@@ -44,7 +44,7 @@ pub enum JobState {
 }
 
 impl JobState {
-    /// Whether nothing of the job changes any more.
+    /// Whether nothing of the job changes any more, but that a failed one may be queued once more.
     pub fn is_over(self) -> bool {
         matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
     }
@@ -98,6 +98,8 @@ pub struct JobRow {
     pub run_after: Option<i64>,
     /// One more with every change.
     pub revision: i64,
+    /// What it is a part of, as W3C Trace Context has it; none where nobody traces.
+    pub trace_parent: Option<String>,
     /// Queued jobs ahead of it; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
     pub queue_position: Option<i64>,
 }
@@ -125,6 +127,8 @@ pub struct NewJob {
     pub fingerprint: [u8; 32],
     /// How many attempts there may be.
     pub max_attempts: i32,
+    /// What the request is a part of, as W3C Trace Context has it.
+    pub trace_parent: Option<String>,
 }
 
 /// The right to one attempt of a job.

@@ -96,6 +96,7 @@ async fn wrong_calls_are_told_what_is_wrong() {
             page_size: 1,
             page_token,
             states,
+            ..ListJobsRequest::default()
         })
         .await
         .unwrap_err();

@@ -255,6 +255,7 @@ impl WorkerService for Service {
                     lease_token: token_of(&job.name),
                     lease_duration: Some(Duration::from_secs(2).try_into().unwrap()),
                     job: Some(job),
+                    ..LeaseJobResponse::default()
                 }));
             }
             if tokio::time::timeout_at(deadline, self.0.grew.notified()).await.is_err() {

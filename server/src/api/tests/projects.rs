@@ -200,6 +200,8 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         }
         "GetJob" => named!(GetJobRequest, job),
         "CancelJob" => named!(CancelJobRequest, job),
+        "RequeueJob" => named!(RequeueJobRequest, job),
+        "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
         "DownloadArtifact" => named!(DownloadArtifactRequest, artifact, offset: 0),

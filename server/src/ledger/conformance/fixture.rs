@@ -36,6 +36,7 @@ pub fn new_job() -> NewJob {
         request_id: None,
         fingerprint: [7; 32],
         max_attempts: 3,
+        trace_parent: None,
     }
 }
 

@@ -9,6 +9,7 @@ mod cancelling;
 mod fencing;
 pub(crate) mod fixture;
 pub mod model;
+mod operations;
 mod outputs;
 mod queue;
 mod registry;
@@ -23,6 +24,7 @@ pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
+pub(crate) use operations::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
 pub(crate) use registry::*;
@@ -107,6 +109,12 @@ macro_rules! conformance_suite {
             a_request_is_of_a_project
             what_a_running_job_reads_is_known
             what_a_project_takes_is_counted
+            every_attempt_is_kept_with_its_end
+            the_newest_twenty_attempts_are_kept
+            a_failed_job_is_queued_once_more
+            what_is_queued_once_more_needs_its_inputs
+            jobs_are_counted_by_kind_state_and_reason
+            a_job_keeps_the_trace_it_is_a_part_of
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

@@ -37,6 +37,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         end_time: None,
         run_after: None,
         revision: 1,
+        trace_parent: None,
         queue_position: Some(0),
     };
     assert_eq!(made, expected);

@@ -45,8 +45,8 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10) ON CONFLICT (request_id) DO NOTHING RETURNING *",
+         create_time, update_time, queue_time, project, trace_parent) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10, $11) ON CONFLICT (request_id) DO NOTHING RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -58,6 +58,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(&new.trace_parent)
     .fetch_optional(&mut *db)
     .await?;
     let Some(row) = row else {
@@ -84,7 +85,7 @@ async fn made_before(db: &mut PgConnection, new: &NewJob) -> Result<Option<JobRo
 }
 
 /// Sees that all inputs are visible and the project's, and holds them: they can't be deleted before this job is there to need them.
-async fn inputs_are_there(db: &mut PgConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
+pub(super) async fn inputs_are_there(db: &mut PgConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
     let held = sqlx::query_scalar(
         "SELECT id FROM artifacts WHERE id = ANY($1) AND project = $2 AND state = 3 AND NOT secret \
          ORDER BY id FOR SHARE",

@@ -11,6 +11,7 @@ mod keys;
 mod leases;
 mod notices;
 mod open;
+mod operations;
 mod presence;
 mod registry;
 mod rows;

@@ -181,5 +181,10 @@ pub(super) fn steps() -> Vec<Migration> {
             "projects",
             include_str!("../../../migrations/postgres/0003_projects.sql"),
         ),
+        step(
+            6,
+            "operations",
+            include_str!("../../../migrations/postgres/0006_operations.sql"),
+        ),
     ]
 }

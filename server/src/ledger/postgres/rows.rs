@@ -27,6 +27,7 @@ pub(super) fn job(row: &PgRow) -> Result<JobRow> {
         end_time: row.try_get("end_time")?,
         run_after: row.try_get("run_after")?,
         revision: row.try_get("revision")?,
+        trace_parent: row.try_get("trace_parent")?,
         queue_position: None,
     })
 }

@@ -34,16 +34,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
         let fingerprint: Vec<u8> = row.try_get("fingerprint")?;
         return again::job(request, rows::job(&row)?, &fingerprint, &new);
     }
-    for input in &new.inputs {
-        let visible =
-            sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0 AND project = ?2")
-                .bind(input.as_bytes().as_slice())
-                .bind(&new.project);
-        visible
-            .fetch_optional(&mut *db)
-            .await?
-            .ok_or_else(|| LedgerError::no_artifact(*input))?;
-    }
+    inputs_are_there(db, &new.project, &new.inputs).await?;
     if let Some(key) = new.key {
         let there = sqlx::query("SELECT 1 FROM keys WHERE id = ?1 AND project = ?2")
             .bind(key.as_bytes().as_slice())
@@ -55,8 +46,8 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10) RETURNING *",
+         create_time, update_time, queue_time, project, trace_parent) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10, ?11) RETURNING *",
     )
     .bind(new.id.as_bytes().as_slice())
     .bind(&new.display_name)
@@ -68,6 +59,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(&new.trace_parent)
     .fetch_one(&mut *db)
     .await?;
     for input in &new.inputs {
@@ -79,6 +71,21 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
             .await?;
     }
     rows::job(&row)
+}
+
+/// Sees that all inputs are visible and the project's.
+pub(super) async fn inputs_are_there(db: &mut SqliteConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
+    for input in inputs {
+        let visible =
+            sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0 AND project = ?2")
+                .bind(input.as_bytes().as_slice())
+                .bind(project);
+        visible
+            .fetch_optional(&mut *db)
+            .await?
+            .ok_or_else(|| LedgerError::no_artifact(*input))?;
+    }
+    Ok(())
 }
 
 pub(super) async fn find_request(db: &mut SqliteConnection, request: Uuid) -> Result<Option<JobRow>> {

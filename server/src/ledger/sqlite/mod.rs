@@ -2,10 +2,12 @@
 mod access;
 mod artifacts;
 mod commitments;
+pub mod copy;
 mod jobs;
 mod keys;
 mod leases;
 mod open;
+mod operations;
 mod registry;
 mod rows;
 #[cfg(test)]
