@@ -21,12 +21,16 @@ use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
+use crate::metrics::{self, Page};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::settings::{Access, Settings};
 use crate::tls;
-use folder::DataFolder;
-use health::Health;
+use crate::traces::Traces;
+pub(crate) use folder::DataFolder;
+use health::{Health, Watched};
+
+pub use health::Readiness;
 
 /// Calls that have begun get at least so long to end, even if the worker took all the time there was.
 const LEAST_DRAIN: Duration = Duration::from_secs(1);
@@ -54,7 +58,10 @@ pub struct Server {
     door: Door,
     /// Where the own worker comes in while the door for all others speaks TLS.
     side: Option<(TcpListener, Guard)>,
+    /// Where metrics are to be had.
+    metrics: Option<TcpListener>,
     ledger: Arc<dyn Ledger>,
+    store: ArtifactStore,
     api: Api,
     /// Held until the end, so that no other server uses the folder.
     _folder: DataFolder,
@@ -80,7 +87,8 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, api::now())
             .await
             .map_err(startup)?;
-        let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
+        let traces = Traces::from_environment()?;
+        let api = Api::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
         let tls = tls::load(&settings)?;
         let mut worker = None;
         let mut side = None;
@@ -107,7 +115,15 @@ impl Server {
             Access::Open => Guard::open(api.meter()),
             Access::Tokens => Guard::tokens(api.meter(), ledger.clone(), own_token),
         };
-        let door = Door { guard, tls };
+        let door = Door {
+            guard,
+            tls,
+            measured: api.measured(),
+        };
+        let metrics = match settings.metrics_listen {
+            Some(wanted) => Some(listen_for_metrics(wanted).await?),
+            None => None,
+        };
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,
@@ -116,7 +132,9 @@ impl Server {
             worker,
             door,
             side,
+            metrics,
             ledger,
+            store,
             api,
             _folder: folder,
         })
@@ -130,13 +148,32 @@ impl Server {
     /// Answers calls until `shutdown`, then stops: says so to whoever asks for its health, takes no more work, has the
     /// worker hand back what it has, lets calls end, and closes the ledger.
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<()> {
-        let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
+        let watched = Watched {
+            ledger: self.ledger.clone(),
+            store: self.store,
+            workers: self.api.workers(),
+            metrics: self.api.metrics(),
+        };
+        let (mut health, health_service) = Health::start(watched, health::EVERY).await;
+        // To the end: who looks after the server wants to see it stop.
+        let page = self.metrics.map(|listener| {
+            let page = Page {
+                metrics: self.api.metrics(),
+                ledger: self.ledger.clone(),
+                readiness: health.readiness(),
+            };
+            tokio::spawn(metrics::serve(listener, page))
+        });
         let routes = self.api.routes()?.add_service(health_service);
         let (drain, drained) = oneshot::channel();
         // A sender that is gone says the same.
         let drained = drained.map(|_| ()).shared();
         let side = self.side.map(|(listener, guard)| {
-            let door = Door { guard, tls: None };
+            let door = Door {
+                guard,
+                tls: None,
+                measured: self.api.measured(),
+            };
             tokio::spawn(api::serve(routes.clone(), door, listener, drained.clone()))
         });
         let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
@@ -171,6 +208,10 @@ impl Server {
                 drain_until(calls, limit).await
             }
         };
+        if let Some(page) = page {
+            page.abort();
+        }
+        self.api.traces().close().await;
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
             tracing::warn!("housekeeping is cut off");
         }
@@ -183,6 +224,15 @@ impl Server {
             None => Ok(()),
         }
     }
+}
+
+/// Listens where metrics are asked for, and says where, as any port may have been wanted.
+async fn listen_for_metrics(wanted: SocketAddr) -> Result<TcpListener> {
+    let failed = |error| Error::Startup(format!("listening for metrics on {wanted}: {error}"));
+    let listener = TcpListener::bind(wanted).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    tracing::info!(%address, "metrics are at http://{address}/metrics");
+    Ok(listener)
 }
 
 type Calls = JoinHandle<Result<()>>;

@@ -26,6 +26,7 @@ impl ArtifactService for Api {
         let project = caller(&request)?.project;
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
         let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
+        self.metrics().uploaded(false, row.size);
         Ok(Response::new(convert::artifact(row)))
     }
 

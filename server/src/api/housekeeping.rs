@@ -7,7 +7,7 @@ use super::status::chain;
 use super::{Api, clock};
 use crate::artifacts::ArtifactPath;
 use crate::error::Result;
-use crate::ledger::ArtifactRow;
+use crate::ledger::{ArtifactRow, JobId};
 
 /// How late an expired lease may be noticed.
 const REAP_EVERY: Duration = Duration::from_secs(1);
@@ -65,6 +65,7 @@ impl Api {
         for &job in &ended {
             tracing::warn!(%job, "the lease has expired: its worker is gone");
             self.reports().forget(job);
+            self.count_lost(job).await;
             self.changes().job(job);
         }
         if !ended.is_empty() {
@@ -72,6 +73,20 @@ impl Api {
             self.changes().queue_moved();
         }
         Ok(())
+    }
+
+    /// Counts an attempt whose worker was lost. Figures are not worth an error.
+    async fn count_lost(&self, id: JobId) {
+        let metrics = self.metrics();
+        let now = Instant::now().into_std();
+        self.stages().end(id, "lost", now, &metrics, self.traces());
+        match self.ledger().get_job(id).await {
+            Ok(Some(job)) => {
+                metrics.attempt_ended(&job, true);
+            }
+            Ok(None) => {}
+            Err(error) => tracing::warn!(job = %id, error = %chain(&error), "a lost attempt is not counted"),
+        }
     }
 
     /// Deletes what uploads and attempts left behind. What was begun before this server was `started` is nobody's any

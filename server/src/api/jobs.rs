@@ -2,8 +2,8 @@
 use futures::stream::BoxStream;
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::{
-    CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobsRequest, ListJobsResponse, WatchJobRequest,
-    WatchJobResponse,
+    CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobAttemptsRequest, ListJobAttemptsResponse,
+    ListJobsRequest, ListJobsResponse, RequeueJobRequest, WatchJobRequest, WatchJobResponse,
 };
 use prost::Message as _;
 use tonic::{Request, Response, Status};
@@ -13,7 +13,7 @@ use super::guard::{caller, payer};
 use super::meter::Class;
 use super::names::Kind;
 use super::submission::{self, Submission};
-use super::{Api, clock, convert, fingerprint, keys, message, own, page, watch};
+use super::{Api, clock, convert, fingerprint, keys, measured, message, operations, own, page, watch};
 use crate::access::Caller;
 use crate::error::{Error, Result};
 use crate::ledger::{JobKind, NewJob};
@@ -25,7 +25,9 @@ const MAX_PAGE_BYTES: usize = 2 << 20;
 impl JobService for Api {
     async fn create_job(&self, request: Request<CreateJobRequest>) -> Result<Response<Job>, Status> {
         let caller = caller(&request)?;
-        Ok(Response::new(self.submit(request.into_inner(), &caller).await?))
+        let trace_parent = measured::trace_parent(&request);
+        let job = self.submit(request.into_inner(), trace_parent, &caller).await?;
+        Ok(Response::new(job))
     }
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
@@ -45,6 +47,8 @@ impl JobService for Api {
         let job = self.own_job(&caller.project, id).await?;
         caller.must(own::scope_of(job.kind))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
+        // A running job ends when its worker has heard of it.
+        self.metrics().job_ended(&row);
         self.changes().job(id);
         self.changes().queue_moved();
         Ok(Response::new(convert::job(row)?))
@@ -58,10 +62,24 @@ impl JobService for Api {
         let watching = watch::watch(self.clone(), project, &name, &cursor);
         Ok(Response::new(watching.await?))
     }
+
+    async fn requeue_job(&self, request: Request<RequeueJobRequest>) -> Result<Response<Job>, Status> {
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.requeue(&project, &request.get_ref().name).await?))
+    }
+
+    async fn list_job_attempts(
+        &self,
+        request: Request<ListJobAttemptsRequest>,
+    ) -> Result<Response<ListJobAttemptsResponse>, Status> {
+        let project = caller(&request)?.project;
+        let attempts = self.attempts(&project, &request.get_ref().name).await?;
+        Ok(Response::new(ListJobAttemptsResponse { attempts }))
+    }
 }
 
 impl Api {
-    async fn submit(&self, request: CreateJobRequest, caller: &Caller) -> Result<Job> {
+    async fn submit(&self, request: CreateJobRequest, trace_parent: Option<String>, caller: &Caller) -> Result<Job> {
         let submission = submission::check(request)?;
         caller.must(own::scope_of(submission.kind))?;
         let project = caller.project.as_str();
@@ -95,9 +113,15 @@ impl Api {
             request_id: submission.request_id.map(|id| own::request(project, id)),
             fingerprint,
             max_attempts: self.limits().max_attempts,
+            trace_parent,
         };
+        let id = new.id;
         let row = self.ledger().create_job(new, clock::now()).await;
         let row = row.map_err(|error| own::as_asked(error, submission.request_id))?;
+        // A request that was sent again has made its job before.
+        if row.id == id {
+            self.metrics().created(row.kind);
+        }
         self.changes().queue_grew();
         convert::job(row)
     }
@@ -117,10 +141,19 @@ impl Api {
         let size = page::size(request.page_size)?;
         let states = convert::states(&request.states)?;
         let numbers: Vec<u8> = states.iter().map(|&state| state as u8).collect();
-        let query: [&[u8]; 2] = [b"jobs", &numbers];
-        let before = page::position(&query, &request.page_token)?;
+        let reasons = operations::reasons(&request.reasons, &states)?;
+        let reasons_asked: Vec<u8> = reasons.iter().map(|&reason| reason as u8).collect();
+        // As it was before there were reasons to ask for, so that tokens of then are known.
+        let query: &[&[u8]] = match reasons.is_empty() {
+            true => &[b"jobs", &numbers],
+            false => &[b"failed", &reasons_asked],
+        };
+        let before = page::position(query, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_jobs(project, &states, before, size + 1).await?;
+        let rows = match reasons.is_empty() {
+            true => self.ledger().list_jobs(project, &states, before, size + 1).await?,
+            false => self.ledger().list_failed(project, &reasons, before, size + 1).await?,
+        };
         let (count, mut bytes) = (rows.len(), 0);
         let mut jobs = Vec::with_capacity(count.min(size as usize));
         let mut last = None;
@@ -137,7 +170,7 @@ impl Api {
         let more = last.filter(|_| count > jobs.len());
         Ok(ListJobsResponse {
             jobs,
-            next_page_token: more.map(|at| page::token(&query, at)).unwrap_or_default(),
+            next_page_token: more.map(|at| page::token(query, at)).unwrap_or_default(),
         })
     }
 }

@@ -18,6 +18,7 @@ use super::{Api, clock, convert, text};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
 use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease};
+use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// How late a job is found that became ready by time alone, after a failed attempt.
@@ -35,6 +36,8 @@ impl Api {
         let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
         let end = Instant::now() + wait;
         let mut listener = self.changes().listen();
+        let workers = self.workers();
+        let _waiting = workers.wait();
         loop {
             listener.check_running()?;
             if let Some(lease) = self.claim(&worker).await? {
@@ -47,6 +50,7 @@ impl Api {
                 };
                 return Ok(LeaseJobResponse {
                     job: Some(job),
+                    trace_parent: lease.job.trace_parent.unwrap_or_default(),
                     lease_token: lease.token,
                     lease_duration: Some(clock::proto_duration(self.limits().lease)),
                 });
@@ -81,8 +85,7 @@ impl Api {
         let failed = self
             .ledger()
             .fail(id, &lease.token, Some(failure), true, false, clock::now());
-        failed.await?;
-        self.attempt_over(id);
+        self.attempt_over(&failed.await?);
         Ok(())
     }
 
@@ -92,16 +95,27 @@ impl Api {
         let (send, receive) = oneshot::channel();
         let (api, worker) = (self.clone(), worker.to_owned());
         tokio::spawn(async move {
-            let claimed = api.ledger().claim(&worker, api.limits().lease, clock::now()).await;
-            if let Ok(Some(lease)) = &claimed {
+            let mut claimed = api.ledger().claim(&worker, api.limits().lease, clock::now()).await;
+            if let Ok(Some(lease)) = &mut claimed {
                 tracing::info!(job = %lease.job.id, worker, attempt = lease.job.attempt, "job given to a worker");
+                api.metrics().given(&lease.job);
+                let span = api.traces().attempt(&lease.job);
+                // The worker's spans go below the attempt's.
+                if let Some(span) = &span {
+                    lease.job.trace_parent = Some(traces::text(traces::context(span)));
+                }
+                let (id, kind, now) = (lease.job.id, lease.job.kind, Instant::now().into_std());
+                api.stages().begin(id, kind, span, now);
                 api.changes().job(lease.job.id);
                 api.changes().queue_moved();
             }
             if let Err(Ok(Some(lease))) = send.send(claimed) {
                 let id = lease.job.id;
                 match api.ledger().release(id, &lease.token, clock::now()).await {
-                    Ok(_) => api.changes().job(id),
+                    Ok(job) => {
+                        api.ended(&job);
+                        api.changes().job(id);
+                    }
                     Err(error) => {
                         tracing::warn!(job = %id, error = %chain(&error), "not taken back from a worker that left");
                     }
@@ -162,8 +176,13 @@ impl Api {
             .ledger()
             .fail(job.id, token, Some(failure), false, false, clock::now())
             .await;
-        self.attempt_over(job.id);
-        failed.map_or_else(Error::from, |_| refusal)
+        match failed {
+            Ok(job) => {
+                self.attempt_over(&job);
+                refusal
+            }
+            Err(error) => error.into(),
+        }
     }
 }
 

@@ -14,8 +14,10 @@ use tonic::service::Routes;
 use crate::artifacts::ArtifactStore;
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
+use crate::metrics::Metrics;
 use crate::notary::Notary;
 use crate::secrets::MasterKey;
+use crate::traces::Traces;
 
 mod admission;
 mod artifacts;
@@ -34,9 +36,11 @@ mod jobs;
 mod keys;
 mod lease;
 mod listen;
+mod measured;
 mod message;
 mod meter;
 mod names;
+mod operations;
 mod output;
 mod own;
 mod page;
@@ -46,6 +50,7 @@ mod quota;
 mod refusals;
 mod registry;
 mod relay;
+mod stages;
 mod status;
 #[doc(hidden)]
 pub mod strangers;
@@ -58,14 +63,17 @@ mod tokens;
 mod upload;
 mod watch;
 mod worker;
+mod workers;
 
 pub use clock::now;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::{Door, serve};
+pub use measured::Measured;
 pub use meter::{Meter, Rates};
 pub use relay::relay;
 pub use text::display_name as check_display_name;
+pub use workers::Workers;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
 const MAX_MESSAGE: usize = 4 << 20;
@@ -125,6 +133,10 @@ struct Shared {
     notary: Notary,
     limits: Limits,
     meter: Arc<Meter>,
+    metrics: Arc<Metrics>,
+    workers: Arc<Workers>,
+    stages: stages::Stages,
+    traces: Traces,
     changes: changes::Changes,
     reports: progress::Reports,
 }
@@ -146,6 +158,10 @@ impl Api {
             notary,
             meter: Arc::new(Meter::new(limits.rates)),
             limits,
+            metrics: Arc::default(),
+            workers: Arc::default(),
+            stages: stages::Stages::default(),
+            traces: Traces::default(),
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
         };
@@ -184,6 +200,41 @@ impl Api {
     /// What counts calls, for the guard.
     pub fn meter(&self) -> Arc<Meter> {
         self.shared.meter.clone()
+    }
+
+    /// What is measured.
+    pub fn metrics(&self) -> Arc<Metrics> {
+        self.shared.metrics.clone()
+    }
+
+    /// Which workers are there.
+    pub fn workers(&self) -> Arc<Workers> {
+        self.shared.workers.clone()
+    }
+
+    /// The same, with traces of what it does. For an API that nobody shares yet.
+    pub fn traced(mut self, traces: Traces) -> Self {
+        if let Some(shared) = Arc::get_mut(&mut self.shared) {
+            shared.traces = traces;
+        }
+        self
+    }
+
+    /// Where traces go.
+    pub fn traces(&self) -> &Traces {
+        &self.shared.traces
+    }
+
+    /// What counts and traces calls, for the listener.
+    pub fn measured(&self) -> Measured {
+        Measured {
+            metrics: self.metrics(),
+            traces: self.shared.traces.clone(),
+        }
+    }
+
+    fn stages(&self) -> &stages::Stages {
+        &self.shared.stages
     }
 
     fn ledger(&self) -> &dyn Ledger {

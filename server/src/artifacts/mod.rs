@@ -7,6 +7,7 @@ mod check;
 mod error;
 mod local;
 mod path;
+mod probe;
 mod reader;
 mod sealed;
 mod writer;

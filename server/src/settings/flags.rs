@@ -33,6 +33,9 @@ pub struct Flags {
     /// Address and port to listen on; port 0 takes any that is free [default: 127.0.0.1:50051]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
+    /// Address and port of /metrics, /livez and /readyz, over plain HTTP [default: none]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub metrics_listen: Option<SocketAddr>,
     /// Who may call: anybody, or whoever shows a token [default: open]
     #[arg(long, value_name = "WHO")]
     pub access: Option<Access>,
@@ -124,6 +127,7 @@ impl Flags {
         let Self {
             config: _,
             listen,
+            metrics_listen,
             access,
             allow_open_network,
             tls_certificate,
@@ -153,6 +157,7 @@ impl Flags {
             log_filter,
         } = self;
         set(&mut settings.listen, listen);
+        set(&mut settings.metrics_listen, metrics_listen.map(Some));
         set(&mut settings.access, access);
         set(&mut settings.allow_open_network, allow_open_network);
         set(&mut settings.tls_certificate, tls_certificate.map(Some));

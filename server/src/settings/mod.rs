@@ -23,6 +23,8 @@ pub use layers::{load, parse};
 pub struct Settings {
     /// Where the server listens.
     pub listen: SocketAddr,
+    /// Where metrics and readiness are told, over plain HTTP; nowhere where none is named.
+    pub metrics_listen: Option<SocketAddr>,
     /// Who may call.
     pub access: Access,
     /// Whether other machines may reach a server that asks nobody for a token.
@@ -129,6 +131,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
+            metrics_listen: None,
             access: Access::Open,
             allow_open_network: false,
             tls_certificate: None,

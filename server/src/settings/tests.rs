@@ -64,6 +64,7 @@ fn each_layer_overrides_the_one_before() {
 fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
+        ("metrics_listen", "127.0.0.1:9464"),
         ("access", "tokens"),
         ("allow_open_network", "true"),
         ("tls_certificate", "/c.pem"),
