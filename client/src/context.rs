@@ -68,7 +68,8 @@ impl Context {
         }
     }
 
-    fn request<M>(&self, message: M) -> Request<M> {
+    /// A call that says what it is a part of.
+    pub fn request<M>(&self, message: M) -> Request<M> {
         let mut request = Request::new(message);
         if let Some(parent) = &self.trace {
             request.metadata_mut().insert(trace::HEADER, parent.clone());

@@ -105,7 +105,7 @@ impl Traces {
             KeyValue::new("guardsplat.kind", metrics::kind(job.kind)),
             KeyValue::new("guardsplat.attempt", i64::from(job.attempt)),
         ];
-        if job.attempt == 1 {
+        if metrics::is_first(job) {
             let waited = tracer
                 .span_builder("wait in queue")
                 .with_start_time(time(job.create_time))

@@ -1,21 +1,18 @@
-//! `jobs list`, `jobs get`, `jobs watch`, `jobs cancel`; and for those that failed `jobs dead`, `jobs attempts` and
-//! `jobs requeue`.
+//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `dead`.
 use clap::{Args, Subcommand, ValueEnum};
-use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::{Result as Outcome, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
-use guardsplat_proto::v1::{
-    CancelJobRequest, GetJobRequest, Job, JobAttempt, ListJobAttemptsRequest, ListJobsRequest, RequeueJobRequest,
-};
+use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job, ListJobsRequest};
 use serde::Serialize;
 
+use super::dead;
 use crate::context::Context;
 use crate::create::{missed_target, no_result, succeeded};
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
 use crate::names;
 use crate::output::{Exit, print_json, print_json_line, print_line, printable, say};
-use crate::report::{AttemptReport, EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, outcome_word, word};
+use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, word};
 use crate::show::Show;
 use crate::watch::watch;
 
@@ -46,7 +43,7 @@ pub enum Command {
         job: String,
     },
     /// Jobs that failed, newest first, with what went wrong
-    Dead(Dead),
+    Dead(dead::Dead),
     /// The attempts of a job, newest first: when, by which worker, and how each ended
     Attempts {
         /// jobs/ID, or the id alone
@@ -57,39 +54,6 @@ pub enum Command {
         /// jobs/ID, or the id alone
         job: String,
     },
-}
-
-/// Arguments of `jobs dead`.
-#[derive(Args)]
-pub struct Dead {
-    /// Only jobs that failed for this reason; may be given several times
-    #[arg(long, value_enum)]
-    reason: Vec<ReasonName>,
-    /// Most jobs to list
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..))]
-    limit: u32,
-}
-
-/// Why jobs fail.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ReasonName {
-    InvalidInput,
-    TargetMissed,
-    WorkerLost,
-    Internal,
-    AttemptsExhausted,
-}
-
-impl From<ReasonName> for Reason {
-    fn from(name: ReasonName) -> Self {
-        match name {
-            ReasonName::InvalidInput => Self::InvalidInput,
-            ReasonName::TargetMissed => Self::TargetMissed,
-            ReasonName::WorkerLost => Self::WorkerLost,
-            ReasonName::Internal => Self::Internal,
-            ReasonName::AttemptsExhausted => Self::AttemptsExhausted,
-        }
-    }
 }
 
 /// Arguments of `jobs list`.
@@ -133,11 +97,6 @@ struct Listed {
 }
 
 #[derive(Serialize)]
-struct Attempts {
-    attempts: Vec<AttemptReport>,
-}
-
-#[derive(Serialize)]
 struct Watched<'a> {
     cursor: &'a str,
     job: JobReport,
@@ -164,16 +123,9 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
-        Command::Dead(arguments) => dead(context, arguments).await,
-        Command::Attempts { job } => attempts(context, names::job(job)?).await,
-        Command::Requeue { job } => {
-            let request = RequeueJobRequest { name: names::job(job)? };
-            let sent = context.once("queueing the job once more", request, async |channel, request| {
-                JobServiceClient::new(channel).requeue_job(request).await
-            });
-            tell(context, &sent.await?);
-            Ok(Exit::Done)
-        }
+        Command::Dead(arguments) => dead::list(context, arguments).await,
+        Command::Attempts { job } => dead::attempts(context, names::job(job)?).await,
+        Command::Requeue { job } => dead::requeue(context, names::job(job)?).await,
     }
 }
 
@@ -184,46 +136,13 @@ async fn list(context: &Context, arguments: &List) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-async fn dead(context: &Context, arguments: &Dead) -> Result<Exit> {
-    let named = match arguments.reason.as_slice() {
-        [] => ReasonName::value_variants(),
-        some => some,
-    };
-    let reasons = named.iter().map(|&name| Reason::from(name).into()).collect();
-    let (jobs, more) = pages(context, Vec::new(), reasons, arguments.limit).await?;
-    print_list(context, &jobs, more, |job| match &job.failure {
-        Some(failure) => {
-            let reason = word(failure.reason().as_str_name(), "REASON_");
-            format!("{}\n    {} ({reason})", line(job), printable(&failure.message))
-        }
-        None => line(job),
-    });
-    Ok(Exit::Done)
-}
-
-async fn attempts(context: &Context, name: String) -> Result<Exit> {
-    let request = ListJobAttemptsRequest { name };
-    let sent = context.call("reading attempts", request, async |channel, request| {
-        JobServiceClient::new(channel).list_job_attempts(request).await
-    });
-    let attempts = sent.await?.attempts;
-    if context.json {
-        print_json(&Attempts {
-            attempts: attempts.iter().map(Into::into).collect(),
-        });
-        return Ok(Exit::Done);
-    }
-    for attempt in &attempts {
-        print_line(&attempt_line(attempt));
-    }
-    if attempts.is_empty() {
-        context.console.say("no attempts yet");
-    }
-    Ok(Exit::Done)
-}
-
 /// Jobs of all pages, at most so many, and whether there are more.
-async fn pages(context: &Context, states: Vec<i32>, reasons: Vec<i32>, most: u32) -> Result<(Vec<Job>, bool)> {
+pub(super) async fn pages(
+    context: &Context,
+    states: Vec<i32>,
+    reasons: Vec<i32>,
+    most: u32,
+) -> Result<(Vec<Job>, bool)> {
     let limit = most as usize;
     let mut jobs = Vec::new();
     let mut page_token = String::new();
@@ -249,7 +168,8 @@ async fn pages(context: &Context, states: Vec<i32>, reasons: Vec<i32>, most: u32
     Ok((jobs, more))
 }
 
-fn print_list(context: &Context, jobs: &[Job], more: bool, text: impl Fn(&Job) -> String) {
+/// Tells of jobs.
+pub(super) fn print_list(context: &Context, jobs: &[Job], more: bool, text: impl Fn(&Job) -> String) {
     if context.json {
         print_json(&Listed {
             jobs: jobs.iter().map(Into::into).collect(),
@@ -324,7 +244,8 @@ fn outcome(context: &Context, job: Job) -> Result<Exit> {
     Ok(exit)
 }
 
-fn tell(context: &Context, job: &Job) {
+/// Tells of a job.
+pub(super) fn tell(context: &Context, job: &Job) {
     if context.json {
         print_json(&JobReport::from(job));
         return;
@@ -352,26 +273,8 @@ fn tell(context: &Context, job: &Job) {
     }
 }
 
-/// An attempt for people.
-fn attempt_line(attempt: &JobAttempt) -> String {
-    let time = |time: Option<prost_types::Timestamp>| time.map(|time| time.to_string()).unwrap_or_default();
-    let mut line = format!(
-        "{:3}  {:9}  {}  {}  {}",
-        attempt.number,
-        outcome_word(attempt),
-        time(attempt.start_time),
-        time(attempt.end_time),
-        printable(&attempt.worker)
-    );
-    if let Some(failure) = &attempt.failure {
-        let reason = word(failure.reason().as_str_name(), "REASON_");
-        line += &format!("\n     {} ({reason})", printable(&failure.message));
-    }
-    line
-}
-
 /// A job on one line.
-fn line(job: &Job) -> String {
+pub(super) fn line(job: &Job) -> String {
     let created = job.create_time.map(|time| time.to_string()).unwrap_or_default();
     format!(
         "{}  {:9}  {:10}  {created}  {}",

@@ -2,6 +2,7 @@
 pub mod artifact;
 pub mod asset;
 pub mod completions;
+mod dead;
 pub mod embed;
 pub mod jobs;
 pub mod key;

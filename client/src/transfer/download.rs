@@ -55,7 +55,10 @@ async fn attempt(
         // No file is longer than this.
         offset: i64::try_from(file.written()).unwrap_or(i64::MAX),
     };
-    let mut stream = match context.in_time(client.download_artifact(request)).await {
+    let mut stream = match context
+        .in_time(client.download_artifact(context.request(request)))
+        .await
+    {
         Ok(response) => response.into_inner(),
         Err(status) => return Ok(Err(status)),
     };

@@ -193,3 +193,11 @@ pub fn code(code: tonic::Code) -> &'static str {
         Unauthenticated => "UNAUTHENTICATED",
     }
 }
+
+/// The labels of a job that is over.
+pub fn over(job: JobKind, end: JobState) -> Ended {
+    Ended {
+        kind: kind(job),
+        state: state(end),
+    }
+}

@@ -1,6 +1,8 @@
 //! That figures are what happened, and that their number is bounded.
+use guardsplat_proto::v1::EmbedResult;
+
 use super::*;
-use crate::ledger::{Failure, Waiting};
+use crate::ledger::{Failure, JobKind, JobRow, JobState, REASON_WORKER_LOST, Waiting};
 
 fn job(state: JobState, attempt: i32) -> JobRow {
     JobRow {
@@ -21,7 +23,7 @@ fn job(state: JobState, attempt: i32) -> JobRow {
         start_time: Some(3_500_000),
         end_time: state.is_over().then_some(9_500_000),
         run_after: None,
-        revision: 1,
+        revision: 2,
         trace_parent: None,
         queue_position: None,
     }
@@ -38,7 +40,10 @@ fn has(metrics: &Metrics, lines: &[&str]) {
 fn attempts_end_in_each_of_their_ways() {
     let metrics = Metrics::default();
     metrics.given(&job(JobState::Running, 1));
-    metrics.given(&job(JobState::Running, 2));
+    metrics.given(&JobRow {
+        revision: 4,
+        ..job(JobState::Running, 2)
+    });
     let failed = |state, reason| JobRow {
         failure: Some(Failure {
             reason,
@@ -65,7 +70,7 @@ fn attempts_end_in_each_of_their_ways() {
             r#"guardsplat_job_retries_total{kind="embed"} 2"#,
             r#"guardsplat_jobs_ended_total{kind="embed",state="failed"} 1"#,
             r#"guardsplat_jobs_ended_total{kind="embed",state="succeeded"} 1"#,
-            // The second attempt waited on purpose.
+            // The second attempt waited for other reasons.
             r#"guardsplat_job_wait_seconds_sum{kind="embed"} 2.5"#,
             r#"guardsplat_job_wait_seconds_count{kind="embed"} 1"#,
             r#"guardsplat_job_run_seconds_sum{kind="embed",state="failed"} 6.0"#,

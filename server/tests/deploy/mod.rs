@@ -303,6 +303,7 @@ fn units_are_sound() {
     }
     let verified = Command::new("systemd-analyze").arg("verify").args(paths).output();
     let Ok(output) = verified else {
+        assert!(std::env::var_os("CI").is_none(), "there is no systemd-analyze");
         eprintln!("skipped: there is no systemd-analyze");
         return;
     };
