@@ -65,7 +65,6 @@ async fn metrics_and_readiness_have_an_address_of_their_own() {
         let request = LeaseJobRequest {
             worker: "stub".into(),
             wait,
-            ..LeaseJobRequest::default()
         };
         worker.lease_job(request).await
     });
