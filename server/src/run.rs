@@ -203,6 +203,7 @@ fn limits(settings: &Settings) -> Limits {
         // Its limit is far below.
         max_attempts: i32::try_from(settings.max_attempts).unwrap_or(i32::MAX),
         max_queued: settings.max_queued_jobs,
+        max_priority: settings.max_priority,
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
         false_positive_rate: settings.false_positive_rate,

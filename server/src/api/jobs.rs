@@ -31,7 +31,7 @@ impl JobService for Api {
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
         let row = self.own_job(&caller(&request)?.project, id).await?;
-        Ok(Response::new(convert::job(row)?))
+        Ok(Response::new(self.told(row).await?))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
@@ -60,11 +60,28 @@ impl JobService for Api {
     }
 }
 
+/// Claims are answered while somebody waits; scenes are marked overnight.
+const PRIORITY_OF_VERIFY: i32 = 5;
+
+/// How urgent a job is: as it says, or by its kind; never above the highest that callers may have.
+fn urgency(submission: &Submission, highest: i32) -> Result<i32> {
+    match submission.priority {
+        Some(priority) if priority > highest => Err(Error::invalid(
+            "job.priority",
+            format!("is {priority}, the highest that this server takes is {highest}"),
+        )),
+        Some(priority) => Ok(priority),
+        None if submission.kind == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
+        None => Ok(highest.min(0)),
+    }
+}
+
 impl Api {
     async fn submit(&self, request: CreateJobRequest, caller: &Caller) -> Result<Job> {
         let submission = submission::check(request)?;
         caller.must(own::scope_of(submission.kind))?;
         let project = caller.project.as_str();
+        let mut clip = None;
         if let Some(id) = submission.key {
             let key = self.own_key(project, id).await?;
             if let Some((field, text)) = &submission.message {
@@ -78,11 +95,14 @@ impl Api {
             if let Some(claim) = &submission.claim {
                 self.check_claim(project, claim, &key, &submission).await?;
             }
+            clip = Some(key.clip_sha256).filter(|hash| !hash.is_empty());
         }
         if submission.kind == JobKind::Verify {
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
-        self.admit(project, &submission).await?;
+        let priority = urgency(&submission, self.limits().max_priority)?;
+        let mut needs = self.admit(project, &submission).await?;
+        needs.clip = clip;
         let fingerprint = self.fingerprint(project, &submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
@@ -95,11 +115,13 @@ impl Api {
             request_id: submission.request_id.map(|id| own::request(project, id)),
             fingerprint,
             max_attempts: self.limits().max_attempts,
+            priority,
+            needs,
         };
         let row = self.ledger().create_job(new, clock::now()).await;
         let row = row.map_err(|error| own::as_asked(error, submission.request_id))?;
         self.changes().queue_grew();
-        convert::job(row)
+        self.told(row).await
     }
 
     /// What a request is known by when it is sent again; needed only where it has a name.
@@ -126,7 +148,7 @@ impl Api {
         let mut last = None;
         for row in rows.into_iter().take(size as usize) {
             let position = (row.create_time, row.id);
-            let job = convert::job(row)?;
+            let job = self.told(row).await?;
             bytes += job.encoded_len();
             if bytes > MAX_PAGE_BYTES && !jobs.is_empty() {
                 break;

@@ -13,11 +13,12 @@ use tonic::Status;
 
 use super::changes::For;
 use super::names::Kind;
+use super::placement::described;
 use super::status::chain;
-use super::{Api, clock, convert, text};
+use super::{Api, clock, convert};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
-use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease};
+use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, Taker};
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// How late a job is found that became ready by time alone, after a failed attempt.
@@ -26,18 +27,23 @@ const LOOK_AGAIN: Duration = Duration::from_secs(1);
 impl Api {
     /// Leases a job, waiting for one if need be.
     pub(super) async fn lease(&self, request: LeaseJobRequest) -> Result<LeaseJobResponse> {
-        let LeaseJobRequest { worker, wait } = request;
-        if worker.is_empty() {
-            return Err(Error::invalid("worker", "is missing"));
-        }
-        text::display_name("worker", &worker)?;
+        let LeaseJobRequest {
+            worker,
+            wait,
+            device,
+            memory_bytes,
+            clip_sha256,
+        } = request;
+        let worker = described(worker, device, memory_bytes, clip_sha256)?;
         let wait = clock::duration(wait.unwrap_or_default()).filter(|&wait| wait <= MAX_WAIT);
         let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
         let end = Instant::now() + wait;
         let mut listener = self.changes().listen();
         loop {
             listener.check_running()?;
-            if let Some(lease) = self.claim(&worker).await? {
+            self.worker_is_there(&worker).await?;
+            let taker = self.taker(&worker).await?;
+            if let Some(lease) = self.claim(taker).await? {
                 let job = match self.for_worker(&lease).await {
                     Ok(job) => job,
                     Err(error) => {
@@ -88,13 +94,13 @@ impl Api {
 
     /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
     /// attempt would be lost, and the time of a lease with it.
-    async fn claim(&self, worker: &str) -> Result<Option<Lease>> {
+    async fn claim(&self, taker: Taker) -> Result<Option<Lease>> {
         let (send, receive) = oneshot::channel();
-        let (api, worker) = (self.clone(), worker.to_owned());
+        let api = self.clone();
         tokio::spawn(async move {
-            let claimed = api.ledger().claim(&worker, api.limits().lease, clock::now()).await;
+            let claimed = api.ledger().claim_for(&taker, api.limits().lease, clock::now()).await;
             if let Ok(Some(lease)) = &claimed {
-                tracing::info!(job = %lease.job.id, worker, attempt = lease.job.attempt, "job given to a worker");
+                tracing::info!(job = %lease.job.id, worker = taker.worker, attempt = lease.job.attempt, "job given to a worker");
                 api.changes().job(lease.job.id);
                 api.changes().queue_moved();
             }

@@ -14,6 +14,7 @@ use tonic::service::Routes;
 use crate::artifacts::ArtifactStore;
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
+use crate::ledger::queue::PRIORITIES;
 use crate::notary::Notary;
 use crate::secrets::MasterKey;
 
@@ -40,6 +41,7 @@ mod names;
 mod output;
 mod own;
 mod page;
+mod placement;
 mod problems;
 mod progress;
 mod quota;
@@ -79,6 +81,8 @@ pub struct Limits {
     pub max_attempts: i32,
     /// Jobs that may wait; more are refused.
     pub max_queued: u64,
+    /// The highest priority that a caller may ask for.
+    pub max_priority: i32,
     /// Bytes of memory that a job may take; one whose scene takes more is refused. `None` leaves that to the workers.
     pub max_job_memory: Option<u64>,
     /// An upload of which nothing arrives for so long is broken off.
@@ -101,6 +105,7 @@ impl Default for Limits {
             lease: Duration::from_secs(30),
             max_attempts: 3,
             max_queued: 10_000,
+            max_priority: *PRIORITIES.end(),
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
             false_positive_rate: 1e-6,
@@ -127,6 +132,7 @@ struct Shared {
     meter: Arc<Meter>,
     changes: changes::Changes,
     reports: progress::Reports,
+    placement: placement::Placement,
 }
 
 impl Api {
@@ -148,6 +154,7 @@ impl Api {
             limits,
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
+            placement: placement::Placement::default(),
         };
         Self {
             shared: Arc::new(shared),
@@ -212,6 +219,10 @@ impl Api {
 
     fn reports(&self) -> &progress::Reports {
         &self.shared.reports
+    }
+
+    fn placement(&self) -> &placement::Placement {
+        &self.shared.placement
     }
 
     /// Breaks off an upload that takes so long that its bytes would count as abandoned.

@@ -7,7 +7,7 @@ use tonic::Status;
 
 use super::changes::{For, Heard, Listener};
 use super::names::Kind;
-use super::{Api, convert, token};
+use super::{Api, token};
 use crate::error::{Error, Result};
 use crate::ledger::{JobId, JobRow, JobState};
 
@@ -73,6 +73,7 @@ pub async fn watch(
         listener,
         id,
         seen,
+        waits: None,
         over: false,
     };
     // A job that is not there is told at once, not from within the stream.
@@ -94,6 +95,8 @@ struct Watcher {
     listener: Listener,
     id: JobId,
     seen: Option<Seen>,
+    /// Whether nobody could have it, as was last told.
+    waits: Option<bool>,
     over: bool,
 }
 
@@ -111,12 +114,12 @@ impl Watcher {
             let (seen, state) = (Seen::of(&row), row.state);
             let before = self.seen.replace(seen);
             self.over = state.is_over();
-            if before != Some(seen) {
+            let job = self.api.told(row).await?;
+            // No part of the cursor: whoever comes back is told of it once more.
+            let waits = self.waits.replace(!job.waiting_reason.is_empty());
+            if before != Some(seen) || waits.is_some_and(|waits| waits == job.waiting_reason.is_empty()) {
                 let cursor = seen.cursor(self.id);
-                return Ok(Some(WatchJobResponse {
-                    job: Some(convert::job(row)?),
-                    cursor,
-                }));
+                return Ok(Some(WatchJobResponse { job: Some(job), cursor }));
             }
             if !self.over {
                 self.wait(state).await?;

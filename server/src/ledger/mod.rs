@@ -1,10 +1,10 @@
 //! The job ledger: jobs, leases, artifacts and keys as rows of a database. The ledger is the whole queue. Beside it
 //! the registry: owners, assets, and the chain of commitments, which only grows.
 //!
-//! A job is given to a worker by [`Ledger::claim`], which counts the attempt and hands out a fresh lease token. From
-//! then on every write for that attempt carries the token and is checked against the job's in the transaction that
-//! writes; a worker that was given up can never overwrite its successor. What an attempt makes stays invisible until
-//! [`Ledger::complete`] publishes it together with the result.
+//! A job is given to a worker by [`QueueLedger::claim_for`], which counts the attempt and hands out a fresh lease token;
+//! [`queue`] says in which order. From then on every write for that attempt carries the token and is checked against the
+//! job's in the transaction that writes; a worker that was given up can never overwrite its successor. What an attempt
+//! makes stays invisible until [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
 pub mod access;
@@ -17,6 +17,7 @@ mod elsewhere;
 mod error;
 mod numbers;
 pub mod postgres;
+pub mod queue;
 mod registry;
 pub mod retry;
 pub mod sqlite;
@@ -35,6 +36,7 @@ pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
 pub use postgres::PostgresLedger;
+pub use queue::{Needs, QueueLedger, SeenWorker, Taker};
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
     SealedSigningKey,
@@ -49,7 +51,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: AccessLedger {
+pub trait Ledger: AccessLedger + QueueLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.
@@ -81,9 +83,10 @@ pub trait Ledger: AccessLedger {
     /// `NotFound`; `Finished` when there is nothing left to end.
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow>;
 
-    /// Gives the next job to a worker, counting the attempt. A job whose attempts are used up is never given out; it
-    /// fails here.
-    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>>;
+    /// Gives the next job to a worker that takes any, as [`QueueLedger::claim_for`] does.
+    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
+        self.claim_for(&Taker::of_anything(worker), lease, now).await
+    }
 
     /// The job, if `token` is its current lease.
     ///

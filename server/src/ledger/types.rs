@@ -3,6 +3,7 @@ use std::fmt;
 
 use uuid::Uuid;
 
+use super::queue::Needs;
 use super::registry::KeyState;
 
 /// Name of a job; a version 7 UUID.
@@ -72,6 +73,10 @@ pub struct JobRow {
     pub kind: JobKind,
     /// The encoded `guardsplat.v1` message of its kind.
     pub spec: Vec<u8>,
+    /// How urgent it is.
+    pub priority: i32,
+    /// What its worker must have.
+    pub needs: Needs,
     /// What became of it.
     pub state: JobState,
     /// Somebody asked for the end of it while it was running.
@@ -98,7 +103,7 @@ pub struct JobRow {
     pub run_after: Option<i64>,
     /// One more with every change.
     pub revision: i64,
-    /// Queued jobs ahead of it; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
+    /// Queued jobs ahead of it as things stand; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
     pub queue_position: Option<i64>,
 }
 
@@ -125,6 +130,10 @@ pub struct NewJob {
     pub fingerprint: [u8; 32],
     /// How many attempts there may be.
     pub max_attempts: i32,
+    /// How urgent it is: one of [`PRIORITIES`](super::queue::PRIORITIES).
+    pub priority: i32,
+    /// What its worker must have.
+    pub needs: Needs,
 }
 
 /// The right to one attempt of a job.

@@ -76,6 +76,9 @@ pub struct Flags {
     /// Most other calls of one caller in a minute; 0 is no limit [default: 60000]
     #[arg(long, value_name = "CALLS")]
     pub max_calls_per_minute: Option<u32>,
+    /// The highest priority that a job may be submitted with, -10 to 10 [default: 10]
+    #[arg(long, value_name = "PRIORITY", allow_negative_numbers = true)]
+    pub max_priority: Option<i32>,
     /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
     #[arg(long, value_name = "MEBIBYTES")]
     pub max_job_memory_mebibytes: Option<u64>,
@@ -138,6 +141,7 @@ impl Flags {
             max_submissions_per_minute,
             max_claims_per_minute,
             max_calls_per_minute,
+            max_priority,
             max_job_memory_mebibytes,
             lease_seconds,
             max_attempts,
@@ -170,6 +174,7 @@ impl Flags {
         set(&mut settings.max_submissions_per_minute, max_submissions_per_minute);
         set(&mut settings.max_claims_per_minute, max_claims_per_minute);
         set(&mut settings.max_calls_per_minute, max_calls_per_minute);
+        set(&mut settings.max_priority, max_priority);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);

@@ -5,6 +5,7 @@ use tracing_subscriber::EnvFilter;
 
 use super::{Access, Settings, SettingsError};
 use crate::ledger::postgres;
+use crate::ledger::queue::PRIORITIES;
 
 const DAY: u64 = 24 * 60 * 60;
 
@@ -50,6 +51,13 @@ impl Settings {
                     most,
                 });
             }
+        }
+        let [least, most] = [*PRIORITIES.start(), *PRIORITIES.end()];
+        if !PRIORITIES.contains(&self.max_priority) {
+            return Err(SettingsError::Invalid {
+                field: "max_priority",
+                reason: format!("{} is not between {least} and {most}", self.max_priority),
+            });
         }
         // NaN is outside of every range.
         if !(1e-30..=0.1).contains(&self.false_positive_rate) {

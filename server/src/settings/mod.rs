@@ -51,6 +51,8 @@ pub struct Settings {
     pub max_claims_per_minute: u32,
     /// Most other calls of one caller in a minute; 0 for no limit.
     pub max_calls_per_minute: u32,
+    /// The highest priority that a job may be submitted with.
+    pub max_priority: i32,
     /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
     pub max_job_memory_mebibytes: u64,
     /// Seconds until a worker that says nothing is given up.
@@ -143,6 +145,7 @@ impl Default for Settings {
             max_submissions_per_minute: 6_000,
             max_claims_per_minute: 6_000,
             max_calls_per_minute: 60_000,
+            max_priority: 10,
             max_job_memory_mebibytes: 0,
             lease_seconds: 30,
             max_attempts: 3,

@@ -81,6 +81,7 @@ fn every_setting_can_be_set_everywhere() {
         ("max_submissions_per_minute", "13"),
         ("max_claims_per_minute", "14"),
         ("max_calls_per_minute", "15"),
+        ("max_priority", "5"),
         ("max_job_memory_mebibytes", "2000"),
         ("lease_seconds", "6"),
         ("max_attempts", "7"),

@@ -108,6 +108,7 @@ async fn wrong_calls_are_told_what_is_wrong() {
     let mut request = Request::new(LeaseJobRequest {
         worker: "hasty".into(),
         wait: Duration::from_secs(30).try_into().ok(),
+        ..LeaseJobRequest::default()
     });
     request.set_timeout(Duration::from_millis(200));
     let status = WorkerServiceClient::new(channel).lease_job(request).await.unwrap_err();

@@ -22,6 +22,7 @@ use std::path::PathBuf;
 
 use guardsplat_proto::connect::Target;
 use guardsplat_worker::device::DeviceChoice;
+use guardsplat_worker::memory::Limits;
 
 use accelerator::Accelerator;
 pub use error::{Error, Result};
@@ -31,6 +32,9 @@ use worker::Worker;
 
 /// Most characters of a machine's name in a worker's.
 const HOST_CHARACTERS: usize = 40;
+
+/// Most characters of a device's name that a server takes.
+const DEVICE_CHARACTERS: usize = 63;
 
 /// What a worker is started with.
 pub struct Options {
@@ -76,6 +80,12 @@ async fn work(options: &Options) -> Result<()> {
         folder,
         accelerator,
         name,
+        device: device
+            .chars()
+            .filter(|c| !c.is_control())
+            .take(DEVICE_CHARACTERS)
+            .collect(),
+        memory: Limits::of_machine(options.memory).memory,
     };
     worker.serve().await
 }

@@ -41,6 +41,10 @@ pub struct Worker {
     pub accelerator: Accelerator,
     /// What it calls itself.
     pub name: String,
+    /// What it computes on, as the server is told.
+    pub device: String,
+    /// Bytes of memory that a job may take, as the server is told.
+    pub memory: u64,
 }
 
 impl Worker {
@@ -68,6 +72,10 @@ impl Worker {
         let request = LeaseJobRequest {
             worker: self.name.clone(),
             wait: convert::duration(WAIT),
+            device: self.device.clone(),
+            memory_bytes: self.memory,
+            // Any CLIP: which ones were added to this machine is not looked up.
+            ..LeaseJobRequest::default()
         };
         let call = "ask for a job";
         let answer = persist(call, async || {

@@ -205,6 +205,7 @@ impl Server {
         let request = LeaseJobRequest {
             worker: "test".into(),
             wait,
+            ..LeaseJobRequest::default()
         };
         self.worker.clone().lease_job(request).await.unwrap().into_inner()
     }

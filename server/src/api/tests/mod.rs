@@ -12,6 +12,7 @@ mod keys;
 mod limits;
 mod lists;
 mod projects;
+mod queue;
 mod registry;
 mod search_speed;
 mod several;

@@ -403,6 +403,7 @@ impl Server {
         let request = LeaseJobRequest {
             worker: "w".into(),
             wait: None,
+            ..LeaseJobRequest::default()
         };
         let lease = self
             .worker

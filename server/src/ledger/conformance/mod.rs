@@ -12,6 +12,7 @@ pub mod model;
 mod outputs;
 mod queue;
 mod registry;
+pub mod speed;
 mod submission;
 
 use std::sync::Arc;
@@ -56,6 +57,13 @@ macro_rules! conformance_suite {
             states_select_jobs
             first_in_first_out
             positions_count_the_jobs_ahead
+            the_most_urgent_job_goes_first
+            projects_take_turns
+            nobody_waits_for_ever
+            positions_foresee_the_order
+            a_repeated_job_keeps_its_priority
+            a_job_goes_to_a_worker_that_can_hold_it
+            workers_are_seen_for_a_while
             many_claims_never_share_a_job
             the_fourth_claim_gets_nothing
             a_job_without_attempts_is_never_given_out

@@ -181,5 +181,6 @@ pub(super) fn steps() -> Vec<Migration> {
             "projects",
             include_str!("../../../migrations/postgres/0003_projects.sql"),
         ),
+        step(7, "queue", include_str!("../../../migrations/postgres/0007_queue.sql")),
     ]
 }

@@ -6,6 +6,7 @@ mod jobs;
 mod keys;
 mod leases;
 mod open;
+mod queue;
 mod registry;
 mod rows;
 #[cfg(test)]
@@ -27,7 +28,7 @@ use super::registry::{
     SealedSigningKey,
 };
 use super::types::{
-    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
+    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, NewArtifact, NewJob,
 };
 use super::{Elsewhere, Ledger, LedgerError, Result, token};
 use writer::Writer;
@@ -86,13 +87,6 @@ impl Ledger for SqliteLedger {
 
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
         self.writer.run(move |db| Box::pin(jobs::cancel(db, id, now))).await
-    }
-
-    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
-        let worker = worker.to_owned();
-        self.writer
-            .run(move |db| Box::pin(leases::claim(db, worker, lease, now)))
-            .await
     }
 
     async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {

@@ -72,5 +72,6 @@ fn migrator() -> Migrator {
             "projects",
             include_str!("../../../migrations/sqlite/0005_projects.sql"),
         ),
+        step(9, "queue", include_str!("../../../migrations/sqlite/0009_queue.sql")),
     ])
 }

@@ -26,6 +26,8 @@ async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
         folder: Folder::new(folder).unwrap(),
         accelerator,
         name: "test".into(),
+        device: "cpu".into(),
+        memory: 1 << 30,
     }
 }
 

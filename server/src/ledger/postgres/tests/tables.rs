@@ -4,8 +4,8 @@ use sqlx::migrate::Migrator;
 
 use super::super::super::conformance::fixture::*;
 use super::super::super::{AccessLedger, Ledger, LedgerError, PostgresLedger, Usage};
-use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
-use super::super::leases::CLAIM;
+use super::super::jobs::{GET, PAGE, PAGE_OF_STATE};
+use super::super::queue::{CLAIM, QUEUE};
 use super::super::{access, commitments, keys, open, registry};
 use super::Place;
 
@@ -108,7 +108,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
     }
     let (page, assets) = ("bigint, uuid, bigint, text", "bigint, uuid, bigint, uuid, uuid, text");
     let by_index = [
-        (CLAIM, "jobs_queue", "text, bytea, bigint, bigint, int"),
+        (
+            CLAIM,
+            "jobs_queue",
+            "text, bytea, bigint, bigint, int, bigint, bigint, bigint, text[]",
+        ),
         (GET, "jobs_queue", "uuid"),
         (PAGE, "jobs_by_time", page),
         (PAGE_OF_STATE, "jobs_by_state", "bigint, uuid, bigint, text, int"),
@@ -146,9 +150,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             .unwrap();
         let explain = sqlx::AssertSqlSafe(format!("EXPLAIN EXECUTE s{i}{values}"));
         let plan = sqlx::raw_sql(explain).fetch_all(&mut db).await.unwrap();
+        // Lanes, which are few; and the whole queue, of which there is no index.
+        let sorts = [CLAIM, QUEUE].contains(&statement);
         let plan: String = plan.iter().map(|row| row.get::<String, _>(0) + "\n").collect();
         assert!(
-            plan.contains(index) && !plan.contains("Sort") && !plan.contains("Seq Scan on"),
+            plan.contains(index) && (!plan.contains("Sort") || sorts) && !plan.contains("Seq Scan on"),
             "{statement}:\n{plan}"
         );
     }
