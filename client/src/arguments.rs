@@ -111,6 +111,9 @@ pub struct Submission {
     /// run; drawn at random unless given
     #[arg(long, value_name = "UUID")]
     pub request_id: Option<Uuid>,
+    /// How urgent the job is, -10 to 10: workers are given jobs of a higher number first [default: 5 for verify, else 0]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-10..=10))]
+    pub priority: Option<i32>,
     /// Ends as soon as the job is queued, and prints it
     #[arg(long)]
     pub no_wait: bool,
@@ -212,6 +215,8 @@ mod tests {
         assert!(wrong(&long).contains("64 characters, at most 63"));
         assert!(parse(&long.replacen('é', "", 1)).is_ok());
         assert!(wrong("key list --timeout 0").contains("--timeout"));
+        assert!(wrong("key create --bits 8 --priority 11").contains("-10..=10"));
+        assert!(parse("key create --bits 8 --priority -10").is_ok());
         assert!(wrong("embed IN -o O --key K --message 0 --request-id 7").contains("--request-id"));
     }
 }

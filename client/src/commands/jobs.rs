@@ -217,8 +217,14 @@ fn tell(context: &Context, job: &Job) {
         return;
     }
     print_line(&line(job));
+    if let Some(priority) = job.priority {
+        print_line(&format!("priority: {priority}"));
+    }
     if let Some(position) = job.queue_position {
         print_line(&format!("jobs before it: {position}"));
+    }
+    if !job.waiting_reason.is_empty() {
+        print_line(&format!("it waits: {}", printable(&job.waiting_reason)));
     }
     if job.cancel_requested && job.state() == State::Running {
         print_line("its end was asked for");
