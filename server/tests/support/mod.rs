@@ -106,7 +106,8 @@ impl Bench {
         }
     }
 
-    async fn start_as(&self, arguments: &[&str]) -> Server {
+    /// Starts a server with these arguments, which go before those that all have.
+    pub async fn start_as(&self, arguments: &[&str]) -> Server {
         let Server { mut child, .. } = self.begin(arguments);
         let mut line = String::new();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
@@ -188,6 +189,10 @@ pub struct Server {
 impl Server {
     pub fn address(&self) -> &str {
         &self.address
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id().unwrap()
     }
 
     pub async fn channel(&self) -> Channel {
