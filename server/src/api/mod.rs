@@ -42,6 +42,7 @@ mod output;
 mod own;
 mod page;
 mod placement;
+mod positions;
 mod problems;
 mod progress;
 mod quota;
@@ -133,6 +134,7 @@ struct Shared {
     changes: changes::Changes,
     reports: progress::Reports,
     placement: placement::Placement,
+    positions: positions::Positions,
 }
 
 impl Api {
@@ -155,6 +157,7 @@ impl Api {
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
             placement: placement::Placement::default(),
+            positions: positions::Positions::default(),
         };
         Self {
             shared: Arc::new(shared),

@@ -7,8 +7,8 @@
 //! gets one turn before all others. Jobs that the worker can't hold are passed over.
 use std::time::Duration;
 
-use super::types::Lease;
-use super::{JobId, Result};
+use super::Result;
+use super::types::{JobId, JobRow, Lease};
 
 /// What may be asked for.
 pub const PRIORITIES: std::ops::RangeInclusive<i32> = -10..=10;
@@ -80,6 +80,9 @@ pub trait QueueLedger: Send + Sync + 'static {
 
     /// Workers that were seen since then, or that have a job, by name.
     async fn workers_since(&self, since: i64) -> Result<Vec<SeenWorker>>;
+
+    /// One job as it stands, without its position in the queue.
+    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>>;
 
     /// The queue in its order, as things stand.
     async fn queue(&self) -> Result<Vec<JobId>>;

@@ -3,7 +3,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::super::queue::PATIENCE;
-use super::super::{JobId, Ledger, Needs, NewJob, SeenWorker, Taker};
+use super::super::{JobId, JobRow, Ledger, Needs, NewJob, SeenWorker, Taker};
 use super::Factory;
 use super::fixture::*;
 
@@ -150,7 +150,14 @@ pub(crate) async fn positions_foresee_the_order(factory: &dyn Factory) {
     for round in 0..8 {
         let queue = ledger.queue().await.unwrap();
         for (place, id) in queue.iter().enumerate() {
-            assert_eq!(job(&*ledger, *id).await.queue_position, Some(place as i64));
+            let row = job(&*ledger, *id).await;
+            assert_eq!(row.queue_position, Some(place as i64));
+            let peeked = ledger.peek_job(*id).await.unwrap().unwrap();
+            let without = JobRow {
+                queue_position: None,
+                ..row
+            };
+            assert_eq!(peeked, without);
         }
         let mut listed = Vec::new();
         for project in ["a", "b", "c"] {

@@ -190,6 +190,11 @@ pub(super) async fn cancel(db: &mut PgConnection, id: JobId, now: i64) -> Result
     }
 }
 
+pub(super) async fn peek(db: &mut PgConnection, id: JobId) -> Result<Option<JobRow>> {
+    let row = sqlx::query("SELECT * FROM jobs WHERE id = $1").bind(id);
+    row.fetch_optional(db).await?.as_ref().map(rows::job).transpose()
+}
+
 /// A job that nobody else changes until the transaction ends.
 pub(super) async fn locked(db: &mut PgConnection, id: JobId) -> Result<Option<PgRow>> {
     let query = sqlx::query("SELECT * FROM jobs WHERE id = $1 FOR UPDATE").bind(id);

@@ -5,9 +5,9 @@ use sqlx::PgConnection;
 
 use super::super::queue::{FORGOTTEN, PATIENCE, QueueLedger, SeenWorker, Taker};
 use super::super::transition::{end_of, micros};
-use super::super::types::{JobId, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
+use super::super::types::{JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
 use super::super::{Result, token};
-use super::{PostgresLedger, rows, with};
+use super::{PostgresLedger, jobs, rows, with};
 
 /// One statement takes the next job that the worker can hold and that nobody else is taking, and either counts an
 /// attempt and leases it, or fails it because no attempt is left. So a job that kills its worker is bounded even if
@@ -85,6 +85,10 @@ impl QueueLedger for PostgresLedger {
 
     async fn workers_since(&self, since: i64) -> Result<Vec<SeenWorker>> {
         self.database.read(with!([] db => workers(db, since))).await
+    }
+
+    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>> {
+        self.database.read(with!([] db => jobs::peek(db, id))).await
     }
 
     async fn queue(&self) -> Result<Vec<JobId>> {

@@ -5,9 +5,9 @@ use sqlx::SqliteConnection;
 
 use super::super::queue::{FORGOTTEN, PATIENCE, QueueLedger, SeenWorker, Taker};
 use super::super::transition::{end_of, micros};
-use super::super::types::{JobId, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
+use super::super::types::{JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
 use super::super::{Result, token};
-use super::{SqliteLedger, rows};
+use super::{SqliteLedger, jobs, rows};
 
 /// One statement takes the next job that the worker can hold, and either counts an attempt and leases it, or fails it
 /// because no attempt is left. So a job that kills its worker is bounded even if nobody lives to tell.
@@ -85,6 +85,11 @@ impl QueueLedger for SqliteLedger {
         );
         let seen = query.bind(since).fetch_all(&self.readers).await?;
         seen.iter().map(rows::worker).collect()
+    }
+
+    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>> {
+        let row = jobs::by_id(&mut *self.readers.acquire().await?, id).await?;
+        row.as_ref().map(rows::job).transpose()
     }
 
     async fn queue(&self) -> Result<Vec<JobId>> {
