@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use futures::{StreamExt, TryStreamExt, stream};
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobKind, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
+    Completion, JobKind, KeyId, Ledger, Needs, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
     candidates,
 };
 use guardsplat_server::notary::{self, Notary};
@@ -113,6 +113,8 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         request_id: None,
         fingerprint: [0; 32],
         max_attempts: 1,
+        priority: 0,
+        needs: Needs::default(),
     };
     let job = ledger.create_job(job, 0).await?.id;
     let lease = ledger

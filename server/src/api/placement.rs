@@ -211,7 +211,7 @@ mod tests {
         assert_eq!(taker(&small, &[]).memory, Some(2 << 30));
         for no_larger in [
             &[][..],
-            &[small.clone()],
+            std::slice::from_ref(&small),
             &[worker(Some(1), &[])],
             &[worker(Some(9), &["a"])],
         ] {

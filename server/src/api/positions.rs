@@ -12,13 +12,16 @@ use crate::ledger::JobId;
 /// How long they are good for. Who heard of a move waits as long, and so never sees places from before it.
 pub const FRESH: Duration = Duration::from_millis(500);
 
+/// Of each job, how many go first.
+type Places = HashMap<JobId, i64>;
+
 /// The places as they were last counted.
 #[derive(Default)]
-pub struct Positions(Mutex<Option<(Instant, Arc<HashMap<JobId, i64>>)>>);
+pub struct Positions(Mutex<Option<(Instant, Arc<Places>)>>);
 
 impl Api {
     /// Queued jobs before each that is queued.
-    pub(super) async fn positions(&self) -> Result<Arc<HashMap<JobId, i64>>> {
+    pub(super) async fn positions(&self) -> Result<Arc<Places>> {
         // Held while they are counted: others wait for the outcome instead of counting too.
         let mut last = self.shared.positions.0.lock().await;
         if let Some((counted, positions)) = &*last
@@ -28,7 +31,7 @@ impl Api {
         }
         let counted = Instant::now();
         let queue = self.ledger().queue().await?;
-        let positions: Arc<HashMap<_, _>> = Arc::new(queue.into_iter().zip(0..).collect());
+        let positions: Arc<Places> = Arc::new(queue.into_iter().zip(0..).collect());
         *last = Some((counted, positions.clone()));
         Ok(positions)
     }
