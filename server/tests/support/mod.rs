@@ -191,6 +191,7 @@ impl Server {
         &self.address
     }
 
+    #[allow(dead_code)] // the tests of faults look at its memory
     pub fn pid(&self) -> u32 {
         self.child.id().unwrap()
     }

@@ -121,8 +121,10 @@ conformance_suite!(Place::fresh().await);
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "a measurement"]
 async fn claims_of_a_long_queue() {
-    if let Some(place) = Place::fresh().await {
-        speed::claims_of_a_long_queue("postgresql", &place).await;
+    for projects in speed::PROJECTS {
+        if let Some(place) = Place::fresh().await {
+            speed::claims_of_a_long_queue("postgresql", &place, projects).await;
+        }
     }
 }
 

@@ -154,5 +154,8 @@ async fn a_thousand_submissions() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "a measurement"]
 async fn claims_of_a_long_queue() {
-    crate::ledger::conformance::speed::claims_of_a_long_queue("sqlite", &Folder::new()).await;
+    use crate::ledger::conformance::speed::{PROJECTS, claims_of_a_long_queue};
+    for projects in PROJECTS {
+        claims_of_a_long_queue("sqlite", &Folder::new(), projects).await;
+    }
 }
