@@ -55,6 +55,8 @@ setup_tests() {
     type -P kill >/dev/null || missing+=(procps)
     # Pages of evidence are looked at in a browser.
     type -P chromium >/dev/null || missing+=(chromium)
+    # Looks at the units in deploy/systemd.
+    command -v systemd-analyze >/dev/null || missing+=(systemd)
     has_postgresql || missing+=(postgresql)
     # The interpreter may be there without what makes an environment of its own.
     python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3 python3-venv)

@@ -2,8 +2,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     "guardsplat/v1/artifact_service.proto",
+    "guardsplat/v1/hook_service.proto",
     "guardsplat/v1/job.proto",
     "guardsplat/v1/job_service.proto",
     "guardsplat/v1/key_service.proto",

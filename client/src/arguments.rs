@@ -94,6 +94,9 @@ pub enum Command {
     /// Tokens of the project: who may call for it, and what
     #[command(subcommand)]
     Token(commands::token::Command),
+    /// URLs that the service calls when jobs are over; receivers for such calls, and for notifications of an S3 store
+    #[command(subcommand)]
+    Hook(commands::hook::Command),
     /// Signed evidence that jobs with an asset or a claim leave
     #[command(subcommand)]
     Report(commands::report::Command),
@@ -111,6 +114,9 @@ pub struct Submission {
     /// run; drawn at random unless given
     #[arg(long, value_name = "UUID")]
     pub request_id: Option<Uuid>,
+    /// How urgent the job is, -10 to 10: workers are given jobs of a higher number first [default: 5 for verify, else 0]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-10..=10))]
+    pub priority: Option<i32>,
     /// Ends as soon as the job is queued, and prints it
     #[arg(long)]
     pub no_wait: bool,
@@ -168,6 +174,15 @@ mod tests {
             "token create --scope embed --scope verify --expires 90d --display-name N",
             "token list --json",
             "token revoke T",
+            "hook create https://h/x --kind embed --kind verify --state succeeded --display-name N",
+            "hook list --json",
+            "hook delete H",
+            "hook deliveries --hook H --state dead --limit 7",
+            "hook redeliver D",
+            "hook listen --listen 127.0.0.1:0 --secret-file F --folder D -- ./publish.sh a -b",
+            "hook s3 --store-token-file F --bucket B --folder D --key K --message 0 --preset draft",
+            "hook s3 --bucket B --folder D --key K -- ./message.sh",
+            "hook s3 --bucket B --prefix http://store:9000/b/ --key K --message 0",
             "report open J -o F",
             "report check F --public-key P",
             "report key",
@@ -175,6 +190,9 @@ mod tests {
             "jobs get J",
             "jobs watch J --cursor C",
             "jobs cancel J",
+            "jobs dead --reason target-missed --reason internal --limit 5",
+            "jobs attempts J --json",
+            "jobs requeue J",
             "artifact put F",
             "artifact get A -o F",
             "artifact delete A",
@@ -202,6 +220,10 @@ mod tests {
                 "{two}"
             );
         }
+        assert!(wrong("hook s3 --bucket B --folder D --key K").contains("--message"));
+        assert!(wrong("hook s3 --bucket B --key K --message 0").contains("--folder"));
+        assert!(wrong("hook s3 --bucket B --prefix h --key K --message 0").contains("--prefix"));
+        assert!(wrong("hook s3 --bucket B --folder D --key K --message 0 -- ./m.sh").contains("cannot be used"));
         assert!(wrong("token create").contains("--scope"));
         assert!(wrong("token create --scope worker").contains("guardsplat-server token create"));
         assert!(wrong("token create --scope embed --expires soon").contains("--expires"));
@@ -212,6 +234,8 @@ mod tests {
         assert!(wrong(&long).contains("64 characters, at most 63"));
         assert!(parse(&long.replacen('é', "", 1)).is_ok());
         assert!(wrong("key list --timeout 0").contains("--timeout"));
+        assert!(wrong("key create --bits 8 --priority 11").contains("-10..=10"));
+        assert!(parse("key create --bits 8 --priority -10").is_ok());
         assert!(wrong("embed IN -o O --key K --message 0 --request-id 7").contains("--request-id"));
     }
 }

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use guardsplat_proto::connect::Channel;
 use tokio::time::timeout;
+use tonic::metadata::{Ascii, MetadataValue};
 use tonic::{Request, Response, Status};
 
 use crate::arguments::Global;
@@ -14,6 +15,7 @@ use crate::error::{Error, Result, why_lost};
 use crate::interrupt::Stage;
 use crate::server::{Server, is_lost};
 use crate::settings::Settings;
+use crate::trace;
 
 /// What the commands share.
 pub struct Context {
@@ -23,6 +25,8 @@ pub struct Context {
     pub console: Console,
     /// Whether results go out as JSON.
     pub json: bool,
+    /// What its calls are a part of, where somebody traces.
+    trace: Option<MetadataValue<Ascii>>,
     /// How far the command is, for when it is interrupted.
     pub stage: RefCell<Stage>,
 }
@@ -34,6 +38,7 @@ impl Context {
             server: Server::new(&Settings::load(global)?)?,
             console: Console::new(),
             json: global.json,
+            trace: trace::parent(),
             stage: RefCell::new(Stage::Nothing),
         })
     }
@@ -57,10 +62,19 @@ impl Context {
     ) -> Result<R> {
         let channel = self.server.channel().await?;
         // Timed here: the transport's own limit looks like a lost connection, which would be waited for once more.
-        match self.in_time(send(channel, Request::new(message))).await {
+        match self.in_time(send(channel, self.request(message))).await {
             Ok(response) => Ok(response.into_inner()),
             Err(status) => Err(refused(doing, status)),
         }
+    }
+
+    /// A call that says what it is a part of.
+    pub fn request<M>(&self, message: M) -> Request<M> {
+        let mut request = Request::new(message);
+        if let Some(parent) = &self.trace {
+            request.metadata_mut().insert(trace::HEADER, parent.clone());
+        }
+        request
     }
 
     /// Calls the server, again if it is lost meanwhile: only for what may arrive twice.

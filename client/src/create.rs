@@ -25,6 +25,7 @@ pub async fn create(context: &Context, submission: &Submission, name: &str, spec
         job: Some(Job {
             display_name,
             spec: Some(spec),
+            priority: submission.priority,
             ..Job::default()
         }),
         // The same for every try, so that a lost answer does not make two jobs.

@@ -24,6 +24,18 @@ pub enum Error {
     /// A file can't be read or written.
     #[error("{}: {source}", path.display())]
     Io { path: PathBuf, source: std::io::Error },
+    /// Nobody can be heard.
+    #[error("listening on {address}: {source}")]
+    Listen {
+        address: std::net::SocketAddr,
+        source: std::io::Error,
+    },
+    /// A store did not give an object.
+    #[error("{url}: {reason}")]
+    Object { url: String, reason: String },
+    /// A program that was run for something failed.
+    #[error("{program}: {reason}")]
+    Program { program: String, reason: String },
     /// The process can't wait for anything.
     #[error("the system refuses what asynchronous work needs: {source}")]
     Runtime { source: std::io::Error },

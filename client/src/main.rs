@@ -16,8 +16,10 @@ mod report;
 mod server;
 mod settings;
 mod show;
+mod trace;
 mod transfer;
 mod watch;
+mod webhook;
 
 use std::process::ExitCode;
 

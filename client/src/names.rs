@@ -41,6 +41,22 @@ pub fn token(text: &str) -> Result<String> {
     })
 }
 
+/// `hooks/ID`, from that or from the id alone.
+pub fn hook(text: &str) -> Result<String> {
+    whole("hooks", text).ok_or_else(|| Error::BadOption {
+        field: "HOOK",
+        reason: format!("`{text}` is not the name of a hook, which is hooks/ and an id"),
+    })
+}
+
+/// `deliveries/ID`, from that or from the id alone.
+pub fn delivery(text: &str) -> Result<String> {
+    whole("deliveries", text).ok_or_else(|| Error::BadOption {
+        field: "DELIVERY",
+        reason: format!("`{text}` is not the name of a delivery, which is deliveries/ and an id"),
+    })
+}
+
 /// `owners/ID`, from that or from the id alone; `None` is for what may be a display name.
 pub fn owner(text: &str) -> Option<String> {
     whole("owners", text)

@@ -12,6 +12,7 @@ pub struct Show {
     failed_attempt: i32,
     running: bool,
     ending: bool,
+    waiting_reason: String,
 }
 
 impl Show {
@@ -26,6 +27,9 @@ impl Show {
         if job.cancel_requested && !self.ending {
             self.ending = true;
             console.say("its end was asked for");
+        }
+        if let Some(line) = self.nobody_for_it(job) {
+            console.say(&line);
         }
         match job.state() {
             State::Queued => console.show("queued", Unit::Waiting, 0, 0, &queue(job)),
@@ -49,6 +53,16 @@ impl Show {
     fn handed_back(&mut self, job: &Job) -> bool {
         let was_running = std::mem::replace(&mut self.running, job.state() == State::Running);
         was_running && job.state() == State::Queued && job.failure.is_none()
+    }
+
+    /// That no worker could be given it, once for each reason.
+    fn nobody_for_it(&mut self, job: &Job) -> Option<String> {
+        if job.waiting_reason == self.waiting_reason {
+            return None;
+        }
+        self.waiting_reason.clone_from(&job.waiting_reason);
+        let reason = printable(&job.waiting_reason);
+        (!job.waiting_reason.is_empty()).then(|| format!("it waits: {reason}"))
     }
 
     /// That an attempt failed, once.

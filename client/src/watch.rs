@@ -64,7 +64,7 @@ async fn open(context: &Context, name: &str, cursor: &str) -> Result<Result<Stre
         name: name.to_owned(),
         cursor: cursor.to_owned(),
     };
-    let opened = context.in_time(client.watch_job(request)).await;
+    let opened = context.in_time(client.watch_job(context.request(request))).await;
     Ok(opened.map(tonic::Response::into_inner))
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use futures::{StreamExt, TryStreamExt, stream};
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobKind, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
+    Completion, JobKind, KeyId, Ledger, Needs, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
     candidates,
 };
 use guardsplat_server::notary::{self, Notary};
@@ -111,8 +111,12 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         inputs: Vec::new(),
         key: None,
         request_id: None,
+        asked_id: None,
         fingerprint: [0; 32],
         max_attempts: 1,
+        trace_parent: None,
+        priority: 0,
+        needs: Needs::default(),
     };
     let job = ledger.create_job(job, 0).await?.id;
     let lease = ledger
@@ -129,6 +133,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
             token: lease.token.clone(),
         },
         secret: true,
+        evidence: false,
         path: "nowhere".into(),
     };
     let artifact = ledger.create_artifact(artifact, 0).await?.id;

@@ -20,6 +20,7 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout};
 
 use crate::access::TOKEN_VARIABLE;
+use crate::artifacts::is_of_stores;
 use crate::error::{Error, Result};
 use crate::secrets::MASTER_KEY_VARIABLE;
 use crate::settings::{DATABASE_VARIABLE, Settings};
@@ -97,6 +98,11 @@ impl WorkerProcess {
             .kill_on_drop(true);
         for variable in OF_CLIENTS {
             command.env_remove(variable);
+        }
+        for (variable, _) in std::env::vars_os() {
+            if variable.to_str().is_some_and(is_of_stores) {
+                command.env_remove(variable);
+            }
         }
         if let Some(token) = &self.token {
             // Arguments are seen by everybody on the machine, a variable by its owner.

@@ -45,6 +45,12 @@ pub enum Error {
         /// The job's full name.
         name: String,
     },
+    /// A job that has not failed, for something that only failed ones are for.
+    #[error("{name} has not failed, so it is not queued once more")]
+    NotFailed {
+        /// The job's full name.
+        name: String,
+    },
     /// A job that nobody asked to end, reported as cancelled.
     #[error("nobody asked for {name} to be cancelled")]
     NotCancelled {

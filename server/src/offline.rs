@@ -2,6 +2,7 @@
 //! way in where there is no token yet, and it works beside a server that runs.
 use std::fs::DirBuilder;
 use std::os::unix::fs::DirBuilderExt;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
@@ -10,6 +11,7 @@ use uuid::Uuid;
 
 use crate::access::{self, DEFAULT_PROJECT, Scope, Scopes, check_project};
 use crate::api;
+use crate::backup;
 use crate::error::{Error, Result};
 use crate::ledger::{AccessLedger, NewToken, TokenRow};
 use crate::run::{ledger, startup};
@@ -24,6 +26,21 @@ pub enum Command {
     /// Tokens: who may call, for which project, and what
     #[command(subcommand)]
     Token(Token),
+    /// Copies all that the server keeps to a folder, also while it runs; the master key only if that is asked for
+    Backup {
+        /// A folder that is empty or not there yet
+        #[arg(value_name = "FOLDER")]
+        to: PathBuf,
+        /// Puts the master key beside it; whoever has both reads every key file
+        #[arg(long)]
+        with_master_key: bool,
+    },
+    /// Makes the data folder, which must be empty or not there yet, of a backup
+    Restore {
+        /// The folder that `backup` made
+        #[arg(value_name = "FOLDER")]
+        from: PathBuf,
+    },
 }
 
 /// What there is to do with tokens.
@@ -73,7 +90,11 @@ pub struct Said {
 
 /// Carries out a command on the ledger of these settings.
 pub async fn run(settings: &Settings, command: Command) -> Result<Said> {
-    let Command::Token(command) = command;
+    let command = match command {
+        Command::Token(command) => command,
+        Command::Backup { to, with_master_key } => return backup::take(settings, &to, with_master_key).await,
+        Command::Restore { from } => return backup::restore(settings, &from).await,
+    };
     let folder = &settings.data_dir;
     let failed = |error: std::io::Error| Error::Startup(format!("data_dir {}: {error}", folder.display()));
     if settings.database.is_none() {

@@ -2,9 +2,11 @@
 mod folder;
 mod health;
 pub(crate) mod ledger;
+mod store;
 
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::path::Path;
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,17 +18,22 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::access;
-use crate::api::{self, Api, Door, Guard, Limits, Rates};
+use crate::api::{self, Api, Door, Guard, Keep, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
+use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
+use crate::metrics::{self, Page};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::settings::{Access, Settings};
 use crate::tls;
-use folder::DataFolder;
-use health::Health;
+use crate::traces::Traces;
+pub(crate) use folder::DataFolder;
+use health::{Health, Watched};
+
+pub use health::Readiness;
 
 /// Calls that have begun get at least so long to end, even if the worker took all the time there was.
 const LEAST_DRAIN: Duration = Duration::from_secs(1);
@@ -54,8 +61,12 @@ pub struct Server {
     door: Door,
     /// Where the own worker comes in while the door for all others speaks TLS.
     side: Option<(TcpListener, Guard)>,
+    /// Where metrics are to be had.
+    metrics: Option<TcpListener>,
     ledger: Arc<dyn Ledger>,
+    store: ArtifactStore,
     api: Api,
+    poster: Poster,
     /// Held until the end, so that no other server uses the folder.
     _folder: DataFolder,
 }
@@ -70,8 +81,7 @@ impl Server {
             (None, None) => KeySource::DataFolder,
         };
         let master = secrets::load(source, folder.path()).map_err(startup)?;
-        let store =
-            ArtifactStore::open(&folder.path().join("artifacts"), settings.max_artifact_bytes).map_err(startup)?;
+        let store = store::open(&settings, folder.path()).await?;
         let ledger = ledger::open(&settings, folder.path()).await.map_err(startup)?;
         let listener = TcpListener::bind(settings.listen)
             .await
@@ -80,7 +90,10 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, api::now())
             .await
             .map_err(startup)?;
-        let api = Api::new(ledger.clone(), store, master, notary, limits(&settings));
+        store::claim(&store, &notary).await?;
+        let traces = Traces::from_environment()?;
+        let api = Api::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
+        let poster = poster(&settings)?;
         let tls = tls::load(&settings)?;
         let mut worker = None;
         let mut side = None;
@@ -107,7 +120,15 @@ impl Server {
             Access::Open => Guard::open(api.meter()),
             Access::Tokens => Guard::tokens(api.meter(), ledger.clone(), own_token),
         };
-        let door = Door { guard, tls };
+        let door = Door {
+            guard,
+            tls,
+            measured: api.measured(),
+        };
+        let metrics = match settings.metrics_listen {
+            Some(wanted) => Some(listen_for_metrics(wanted).await?),
+            None => None,
+        };
         tracing::info!(data_dir = %folder.path().display(), %address, "opened");
         Ok(Self {
             settings,
@@ -116,8 +137,11 @@ impl Server {
             worker,
             door,
             side,
+            metrics,
             ledger,
+            store,
             api,
+            poster,
             _folder: folder,
         })
     }
@@ -130,17 +154,37 @@ impl Server {
     /// Answers calls until `shutdown`, then stops: says so to whoever asks for its health, takes no more work, has the
     /// worker hand back what it has, lets calls end, and closes the ledger.
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<()> {
-        let (mut health, health_service) = Health::start(self.ledger.clone(), health::EVERY).await;
+        let watched = Watched {
+            ledger: self.ledger.clone(),
+            store: self.store,
+            workers: self.api.alive(),
+            metrics: self.api.metrics(),
+        };
+        let (mut health, health_service) = Health::start(watched, health::EVERY).await;
+        // To the end: who looks after the server wants to see it stop.
+        let page = self.metrics.map(|listener| {
+            let page = Page {
+                metrics: self.api.metrics(),
+                ledger: self.ledger.clone(),
+                readiness: health.readiness(),
+            };
+            tokio::spawn(metrics::serve(listener, page))
+        });
         let routes = self.api.routes()?.add_service(health_service);
         let (drain, drained) = oneshot::channel();
         // A sender that is gone says the same.
         let drained = drained.map(|_| ()).shared();
         let side = self.side.map(|(listener, guard)| {
-            let door = Door { guard, tls: None };
+            let door = Door {
+                guard,
+                tls: None,
+                measured: self.api.measured(),
+            };
             tokio::spawn(api::serve(routes.clone(), door, listener, drained.clone()))
         });
         let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
         let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
+        let deliveries = tokio::spawn(api::deliveries(self.api.clone(), self.poster));
         // It ends with the API.
         tokio::spawn(api::relay(self.api.clone()));
         let worker = self
@@ -171,8 +215,15 @@ impl Server {
                 drain_until(calls, limit).await
             }
         };
+        if let Some(page) = page {
+            page.abort();
+        }
+        self.api.traces().close().await;
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
             tracing::warn!("housekeeping is cut off");
+        }
+        if timeout(LEAST_DRAIN, deliveries).await.is_err() {
+            tracing::warn!("what hooks are to be told is cut off");
         }
         if timeout(LEAST_DRAIN, self.ledger.close()).await.is_err() {
             tracing::warn!("the ledger is cut off; what it acknowledged is on disk all the same");
@@ -183,6 +234,15 @@ impl Server {
             None => Ok(()),
         }
     }
+}
+
+/// Listens where metrics are asked for, and says where, as any port may have been wanted.
+async fn listen_for_metrics(wanted: SocketAddr) -> Result<TcpListener> {
+    let failed = |error| Error::Startup(format!("listening for metrics on {wanted}: {error}"));
+    let listener = TcpListener::bind(wanted).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    tracing::info!(%address, "metrics are at http://{address}/metrics");
+    Ok(listener)
 }
 
 type Calls = JoinHandle<Result<()>>;
@@ -203,6 +263,7 @@ fn limits(settings: &Settings) -> Limits {
         // Its limit is far below.
         max_attempts: i32::try_from(settings.max_attempts).unwrap_or(i32::MAX),
         max_queued: settings.max_queued_jobs,
+        max_priority: settings.max_priority,
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
         false_positive_rate: settings.false_positive_rate,
@@ -214,7 +275,38 @@ fn limits(settings: &Settings) -> Limits {
             calls: settings.max_calls_per_minute,
         },
         abandoned_after: settings.abandoned_after(),
+        hooks: rules(settings),
+        signed_url: Some(Duration::from_secs(settings.signed_url_seconds)).filter(|time| !time.is_zero()),
+        keep: Keep {
+            uploads: days(settings.keep_uploads_days),
+            outputs: days(settings.keep_outputs_days),
+            jobs: days(settings.keep_jobs_days),
+        },
     }
+}
+
+fn rules(settings: &Settings) -> Rules {
+    Rules {
+        allow_http: settings.hook_allow_http,
+        allow_private: settings.hook_allow_private,
+        give_up_after: Duration::from_secs(settings.hook_give_up_seconds),
+    }
+}
+
+/// What sends messages to hooks.
+fn poster(settings: &Settings) -> Result<Poster> {
+    let told = |path: &Path, reason: String| Error::Startup(format!("hook_ca {}: {reason}", path.display()));
+    let ca = match &settings.hook_ca {
+        Some(path) => Some(std::fs::read(path).map_err(|error| told(path, error.to_string()))?),
+        None => None,
+    };
+    let place = settings.hook_ca.as_deref().unwrap_or(Path::new(""));
+    Poster::new(rules(settings), ca.as_deref()).map_err(|reason| told(place, reason))
+}
+
+/// Days as the ledger counts time; 0 is for ever.
+fn days(days: u64) -> Option<Duration> {
+    Some(Duration::from_secs(days * 24 * 60 * 60)).filter(|time| !time.is_zero())
 }
 
 /// Why the server can't start, with all causes that are not part of the text before.

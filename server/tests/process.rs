@@ -1,7 +1,13 @@
 //! The server as a process: it starts, answers, looks after its worker, stops in good order, and starts again.
+mod backup;
+mod deploy;
+mod flow;
+mod hooks;
+mod stores;
 mod support;
 mod tls;
 mod tokens;
+mod watched;
 
 use std::os::unix::process::ExitStatusExt;
 use std::time::Duration;

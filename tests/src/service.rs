@@ -235,6 +235,8 @@ impl Service {
             for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
                 match entry.metadata() {
                     Ok(metadata) if metadata.is_dir() => folders.push(entry.path()),
+                    // It says whose the others are.
+                    Ok(_) if entry.file_name() == "ledger" => {}
                     Ok(metadata) => sizes.push(metadata.len()),
                     Err(_) => {}
                 }

@@ -1,10 +1,11 @@
-//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`.
+//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `dead`.
 use clap::{Args, Subcommand, ValueEnum};
 use guardsplat_proto::v1::job::{Result as Outcome, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job, ListJobsRequest};
 use serde::Serialize;
 
+use super::dead;
 use crate::context::Context;
 use crate::create::{missed_target, no_result, succeeded};
 use crate::error::{Error, Result};
@@ -38,6 +39,18 @@ pub enum Command {
     },
     /// Ends a job: at once while it is queued, soon while it is running
     Cancel {
+        /// jobs/ID, or the id alone
+        job: String,
+    },
+    /// Jobs that failed, newest first, with what went wrong
+    Dead(dead::Dead),
+    /// The attempts of a job, newest first: when, by which worker, and how each ended
+    Attempts {
+        /// jobs/ID, or the id alone
+        job: String,
+    },
+    /// Queues a job that failed once more, its attempts counted anew; needs a token with the scope admin
+    Requeue {
         /// jobs/ID, or the id alone
         job: String,
     },
@@ -110,20 +123,36 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
+        Command::Dead(arguments) => dead::list(context, arguments).await,
+        Command::Attempts { job } => dead::attempts(context, names::job(job)?).await,
+        Command::Requeue { job } => dead::requeue(context, names::job(job)?).await,
     }
 }
 
 async fn list(context: &Context, arguments: &List) -> Result<Exit> {
     let states: Vec<i32> = arguments.state.iter().map(|&name| State::from(name).into()).collect();
-    let limit = arguments.limit as usize;
+    let (jobs, more) = pages(context, states, Vec::new(), arguments.limit).await?;
+    print_list(context, &jobs, more, line);
+    Ok(Exit::Done)
+}
+
+/// Jobs of all pages, at most so many, and whether there are more.
+pub(super) async fn pages(
+    context: &Context,
+    states: Vec<i32>,
+    reasons: Vec<i32>,
+    most: u32,
+) -> Result<(Vec<Job>, bool)> {
+    let limit = most as usize;
     let mut jobs = Vec::new();
     let mut page_token = String::new();
     let more = loop {
         let request = ListJobsRequest {
             // Every page of a list is asked for in the same way.
-            page_size: i32::try_from(arguments.limit.min(PAGE)).unwrap_or(i32::MAX),
+            page_size: i32::try_from(most.min(PAGE)).unwrap_or(i32::MAX),
             page_token,
             states: states.clone(),
+            reasons: reasons.clone(),
         };
         let sent = context.call("listing jobs", request, async |channel, request| {
             JobServiceClient::new(channel).list_jobs(request).await
@@ -136,22 +165,26 @@ async fn list(context: &Context, arguments: &List) -> Result<Exit> {
         }
     };
     jobs.truncate(limit);
+    Ok((jobs, more))
+}
+
+/// Tells of jobs.
+pub(super) fn print_list(context: &Context, jobs: &[Job], more: bool, text: impl Fn(&Job) -> String) {
     if context.json {
         print_json(&Listed {
             jobs: jobs.iter().map(Into::into).collect(),
             more,
         });
-        return Ok(Exit::Done);
+        return;
     }
-    for job in &jobs {
-        print_line(&line(job));
+    for job in jobs {
+        print_line(&text(job));
     }
     if jobs.is_empty() {
         context.console.say("no jobs");
     } else if more {
         context.console.say("there are more; --limit shows them");
     }
-    Ok(Exit::Done)
 }
 
 async fn follow(context: &Context, name: String, cursor: Option<String>) -> Result<Exit> {
@@ -211,14 +244,21 @@ fn outcome(context: &Context, job: Job) -> Result<Exit> {
     Ok(exit)
 }
 
-fn tell(context: &Context, job: &Job) {
+/// Tells of a job.
+pub(super) fn tell(context: &Context, job: &Job) {
     if context.json {
         print_json(&JobReport::from(job));
         return;
     }
     print_line(&line(job));
+    if let Some(priority) = job.priority {
+        print_line(&format!("priority: {priority}"));
+    }
     if let Some(position) = job.queue_position {
         print_line(&format!("jobs before it: {position}"));
+    }
+    if !job.waiting_reason.is_empty() {
+        print_line(&format!("it waits: {}", printable(&job.waiting_reason)));
     }
     if job.cancel_requested && job.state() == State::Running {
         print_line("its end was asked for");
@@ -240,7 +280,7 @@ fn tell(context: &Context, job: &Job) {
 }
 
 /// A job on one line.
-fn line(job: &Job) -> String {
+pub(super) fn line(job: &Job) -> String {
     let created = job.create_time.map(|time| time.to_string()).unwrap_or_default();
     format!(
         "{}  {:9}  {:10}  {created}  {}",

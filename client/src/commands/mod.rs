@@ -2,7 +2,9 @@
 pub mod artifact;
 pub mod asset;
 pub mod completions;
+mod dead;
 pub mod embed;
+pub mod hook;
 pub mod jobs;
 pub mod key;
 pub mod owner;
@@ -27,6 +29,7 @@ pub async fn run(context: &Context, command: Command) -> Result<Exit> {
         Command::Owner(command) => owner::run(context, &command).await,
         Command::Asset(command) => asset::run(context, &command).await,
         Command::Token(command) => token::run(context, &command).await,
+        Command::Hook(command) => hook::run(context, &command).await,
         Command::Report(command) => report::run(context, &command).await,
         Command::Completions(arguments) => Ok(completions::run(&arguments)),
     }

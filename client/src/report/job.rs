@@ -19,6 +19,9 @@ pub struct JobReport {
     attempt: i32,
     max_attempts: i32,
     queue_position: Option<i64>,
+    priority: Option<i32>,
+    /// Why nobody could be given it, while that is so.
+    waiting_reason: Option<String>,
     progress: Option<ProgressReport>,
     result: Option<ResultReport>,
     failure: Option<FailureReport>,
@@ -101,6 +104,8 @@ impl From<&Job> for JobReport {
             attempt: job.attempt,
             max_attempts: job.max_attempts,
             queue_position: job.queue_position,
+            priority: job.priority,
+            waiting_reason: some(&job.waiting_reason),
             progress: job.progress.as_ref().map(Into::into),
             result: job.result.as_ref().map(|result| match result {
                 Outcome::EmbedResult(result) => ResultReport::Embed(result.into()),
@@ -210,6 +215,7 @@ mod tests {
                 seed: Some(424_242),
             })),
             queue_position: Some(2),
+            priority: Some(-3),
             ..Job::default()
         };
         job.set_state(State::Queued);
@@ -217,6 +223,10 @@ mod tests {
         assert_eq!(json["kind"], "create_key");
         assert_eq!(json["state"], "queued");
         assert_eq!(json["queue_position"], 2);
+        assert_eq!(
+            (&json["priority"], &json["waiting_reason"]),
+            (&(-3).into(), &serde_json::Value::Null)
+        );
         assert_eq!(json["spec"]["seeded"], true);
         assert!(json["result"].is_null() && json["failure"].is_null());
         assert!(!json.to_string().contains("424242"));

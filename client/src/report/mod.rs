@@ -1,6 +1,8 @@
 //! What commands print as JSON: names and meanings as in the engine's own, where they mean the same.
 mod artifact;
+mod attempt;
 mod embed;
+mod hook;
 mod job;
 mod key;
 mod registry;
@@ -8,7 +10,9 @@ mod token;
 mod verify;
 
 pub use artifact::ArtifactReport;
+pub use attempt::{AttemptReport, outcome_word};
 pub use embed::EmbedReport;
+pub use hook::{DeliveryReport, HookReport};
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};
 pub use registry::{AssetReport, OwnerReport};

@@ -79,6 +79,11 @@ impl Destination {
         }
     }
 
+    /// Whether it is what it should be, as it is now.
+    pub fn is(&self, size: u64, sha256: &str) -> bool {
+        self.written == size && hex::encode(self.hasher.clone().finalize()) == sha256
+    }
+
     /// Gives the file its name, if it is what it should be; an older one stays until then.
     pub fn finish(self, size: u64, sha256: &str) -> Result<PathBuf> {
         if self.written != size {

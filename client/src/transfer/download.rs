@@ -7,6 +7,7 @@ use guardsplat_proto::v1::{Artifact, DownloadArtifactRequest};
 use tonic::{Code, Status};
 
 use super::destination::Destination;
+use super::direct;
 use crate::console::Unit;
 use crate::context::{Context, refused};
 use crate::error::{Error, Result};
@@ -14,8 +15,15 @@ use crate::server::is_lost;
 
 const DOING: &str = "fetching the artifact";
 
-/// Fetches the artifact called `name` into the file `path`.
+/// Fetches the artifact called `name` into the file `path`: from the store where the server says how, else from the server.
 pub async fn download(context: &Context, name: &str, path: &Path) -> Result<Artifact> {
+    match direct::download(context, name, path).await? {
+        Some(artifact) => Ok(artifact),
+        None => streamed(context, name, path).await,
+    }
+}
+
+async fn streamed(context: &Context, name: &str, path: &Path) -> Result<Artifact> {
     let mut file = Destination::new(path)?;
     let mut known: Option<Artifact> = None;
     let mut backoff = context.backoff();
@@ -55,7 +63,10 @@ async fn attempt(
         // No file is longer than this.
         offset: i64::try_from(file.written()).unwrap_or(i64::MAX),
     };
-    let mut stream = match context.in_time(client.download_artifact(request)).await {
+    let mut stream = match context
+        .in_time(client.download_artifact(context.request(request)))
+        .await
+    {
         Ok(response) => response.into_inner(),
         Err(status) => return Ok(Err(status)),
     };
@@ -96,6 +107,7 @@ async fn attempt(
     }
 }
 
-fn size(artifact: &Artifact) -> u64 {
+/// Length of an artifact in bytes.
+pub(super) fn size(artifact: &Artifact) -> u64 {
     u64::try_from(artifact.size_bytes).unwrap_or_default()
 }

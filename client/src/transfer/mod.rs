@@ -1,5 +1,6 @@
 //! Bytes on their way: to the server in chunks, and back into files that are whole or not there.
 mod destination;
+mod direct;
 mod download;
 mod source;
 mod upload;

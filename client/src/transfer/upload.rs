@@ -58,7 +58,7 @@ async fn attempt(context: &Context, source: &Source, before: u64, total: u64) ->
     let sent = Arc::new(AtomicU64::new(0));
     let (sender, receiver) = mpsc::channel(AHEAD);
     let reading = tokio::spawn(read(file, metadata(source), sender, Arc::clone(&sent)));
-    let answer = client.upload_artifact(ReceiverStream::new(receiver));
+    let answer = client.upload_artifact(context.request(ReceiverStream::new(receiver)));
     tokio::pin!(answer);
     let mut look = tokio::time::interval(LOOK);
     let (mut last, mut moved) = (0, Instant::now());

@@ -54,6 +54,7 @@ fn bench(missed: &[&str]) -> Bench {
     progress.set_stage(Stage::Optimising);
     let queued = Job {
         queue_position: Some(2),
+        waiting_reason: "nobody is large enough".into(),
         ..job(State::Queued)
     };
     let running = Job {
@@ -70,7 +71,7 @@ fn bench(missed: &[&str]) -> Bench {
 fn a_scene_goes_there_and_comes_back_marked() {
     let bench = bench(&[]);
     let ran = bench.run(&format!(
-        "{LINE} --preset draft --robust-to jpeg,8bit --seed 9 --size 128 --ignore-bad-rows --comparison c.png --json"
+        "{LINE} --preset draft --robust-to jpeg,8bit --seed 9 --size 128 --priority -2 --ignore-bad-rows --comparison c.png --json"
     ));
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
@@ -117,7 +118,8 @@ fn a_scene_goes_there_and_comes_back_marked() {
     );
     assert!(spec.ignore_bad_rows && json["ignored_rows"] == 2);
     let request = state.created.last().unwrap();
-    assert_eq!(request.job.as_ref().unwrap().display_name, "in.ply");
+    let sent = request.job.as_ref().unwrap();
+    assert_eq!((sent.display_name.as_str(), sent.priority), ("in.ply", Some(-2)));
     assert!(uuid::Uuid::try_parse(&request.request_id).is_ok());
 }
 
@@ -130,6 +132,7 @@ fn progress_goes_to_standard_error_as_lines() {
     assert_eq!(ran.out, expected);
     for line in [
         "upload 600005/600005 bytes",
+        "it waits: nobody is large enough",
         "queued 2 jobs before it",
         "marking 3/600 bits 75.0 %, PSNR 38.2 dB",
         "download 300000/300000 bytes",

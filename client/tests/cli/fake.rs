@@ -4,13 +4,14 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
+use guardsplat_proto::v1::hook_service_server::HookServiceServer;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec, State as JobState};
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
 use guardsplat_proto::v1::token_service_server::TokenServiceServer;
 use guardsplat_proto::v1::{
-    Artifact, Asset, CreateJobRequest, EmbedResult, Failure, Job, Key, Owner, Token, WatchJobRequest,
+    Artifact, Asset, CreateJobRequest, Delivery, EmbedResult, Failure, Hook, Job, Key, Owner, Token, WatchJobRequest,
 };
 use sha2::{Digest, Sha256};
 use tonic::service::InterceptorLayer;
@@ -64,6 +65,10 @@ pub struct State {
     pub registered: Vec<Asset>,
     /// Tokens that were made.
     pub tokens: Vec<Token>,
+    /// Hooks that were made.
+    pub hooks: Vec<Hook>,
+    /// What they were sent.
+    pub deliveries: Vec<Delivery>,
     /// What calls showed as authorisation, in their order.
     pub shown: Vec<Option<String>>,
     /// The public key, in hexadecimal.
@@ -77,6 +82,8 @@ pub struct State {
     pub create_errors: VecDeque<Status>,
     /// After how many bytes the next downloads end.
     pub download_ends: VecDeque<usize>,
+    /// Where artifacts can be fetched from besides: what addresses begin with.
+    pub addresses: Option<String>,
     /// Whether downloads are damaged on their way.
     pub damage: bool,
 }
@@ -129,6 +136,7 @@ impl Fake {
                     .layer(InterceptorLayer::new(note))
                     .add_service(ArtifactServiceServer::new(fake.clone()))
                     .add_service(JobServiceServer::new(fake.clone()))
+                    .add_service(HookServiceServer::new(fake.clone()))
                     .add_service(KeyServiceServer::new(fake.clone()))
                     .add_service(RegistryServiceServer::new(fake.clone()))
                     .add_service(TokenServiceServer::new(fake))

@@ -77,6 +77,38 @@ fn a_job_is_cancelled() {
 }
 
 #[test]
+fn dead_letters_are_listed_looked_at_and_tried_again() {
+    let bench = bench();
+    for (n, reason) in [(1, Reason::Internal), (2, Reason::TargetMissed), (4, Reason::Internal)] {
+        let mut state = bench.fake.state();
+        let job = state.jobs.get_mut(&name(n)).unwrap();
+        job.set_state(State::Failed);
+        job.failure = Some(guardsplat_proto::v1::Failure {
+            reason: reason.into(),
+            message: "out of\u{1b}[31m memory".into(),
+        });
+    }
+    assert_eq!(listed(&bench.run("jobs dead --json").json()), [4, 2, 1].map(name));
+    assert_eq!(
+        listed(&bench.run("jobs dead --reason internal --json").json()),
+        [4, 1].map(name)
+    );
+    let text = bench.run("jobs dead --reason target-missed").out;
+    assert!(text.contains("memory (target_missed)"), "{text}");
+    // What a worker says moves no terminal.
+    assert!(!text.contains('\u{1b}'), "{text}");
+    let json = bench.run(&format!("jobs attempts {} --json", name(4))).json();
+    let attempt = &json["attempts"][0];
+    assert_eq!((&attempt["number"], &attempt["outcome"]), (&1.into(), &"failed".into()));
+    assert_eq!(attempt["failure"]["reason"], "internal");
+    let text = bench.run(&format!("jobs attempts {}", name(4))).out;
+    assert!(text.contains("failed") && text.contains("a worker"), "{text}");
+    let ran = bench.run(&format!("jobs requeue {} --json", name(4)));
+    assert_eq!((ran.code, &ran.json()["state"]), (0, &"queued".into()));
+    assert_eq!(listed(&bench.run("jobs dead --json").json()), [2, 1].map(name));
+}
+
+#[test]
 fn a_watch_prints_one_line_a_message_and_exits_as_the_job() {
     let bench = bench();
     bench.fake.plan([

@@ -1,15 +1,20 @@
 //! The client as a user runs it, against a server that does what each test says.
 mod claims;
+mod direct;
 mod embed;
 mod errors;
 mod fake;
 mod hook;
+mod hooks;
 mod interrupt;
 mod jobs;
 mod keys;
+mod listen;
+mod posts;
 mod proxy;
 mod resume;
 mod run;
+mod s3;
 mod services;
 mod tokens;
 mod verify;

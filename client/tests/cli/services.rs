@@ -9,11 +9,13 @@ use guardsplat_proto::v1::registry_service_server::RegistryService;
 use guardsplat_proto::v1::{
     Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
     DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
-    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetJobRequest,
-    GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job, Key, ListAssetsRequest, ListAssetsResponse,
-    ListCommitmentsRequest, ListCommitmentsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
-    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, UpdateKeyStateRequest,
-    UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response, upload_artifact_request,
+    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetDownloadUrlRequest,
+    GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job,
+    JobAttempt, Key, ListAssetsRequest, ListAssetsResponse, ListCommitmentsRequest, ListCommitmentsResponse,
+    ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
+    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, RequeueJobRequest,
+    UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response,
+    job_attempt, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -115,6 +117,21 @@ impl ArtifactService for Fake {
         Ok(Response::new(replies(items)))
     }
 
+    async fn get_download_url(
+        &self,
+        request: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        let name = request.into_inner().name;
+        let state = self.state();
+        let (artifact, _) = state.artifacts.get(&name).ok_or_else(|| not_found(&name))?;
+        let address = state.addresses.as_ref();
+        Ok(Response::new(GetDownloadUrlResponse {
+            artifact: Some(artifact.clone()),
+            url: address.map(|begin| format!("{begin}/{name}")).unwrap_or_default(),
+            expire_time: None,
+        }))
+    }
+
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         Err(Status::unimplemented(request.into_inner().name))
     }
@@ -172,7 +189,11 @@ impl JobService for Fake {
         let request = request.into_inner();
         let state = self.state();
         let from: usize = request.page_token.parse().unwrap_or(0);
-        let wanted = |job: &&Job| request.states.is_empty() || request.states.contains(&job.state);
+        let reason = |job: &Job| job.failure.as_ref().map_or(0, |failure| failure.reason);
+        let wanted = |job: &&Job| {
+            (request.states.is_empty() || request.states.contains(&job.state))
+                && (request.reasons.is_empty() || request.reasons.contains(&reason(job)))
+        };
         let all: Vec<Job> = state.jobs.values().rev().filter(wanted).cloned().collect();
         // Pages are smaller than asked for, which a server may do.
         let to = (from + 2).min(all.len());
@@ -189,6 +210,32 @@ impl JobService for Fake {
         let job = state.jobs.get_mut(&name).ok_or_else(|| not_found(&name))?;
         job.set_state(JobState::Cancelled);
         Ok(Response::new(job.clone()))
+    }
+
+    async fn requeue_job(&self, request: Request<RequeueJobRequest>) -> Result<Response<Job>, Status> {
+        let name = request.into_inner().name;
+        let mut state = self.state();
+        let job = state.jobs.get_mut(&name).ok_or_else(|| not_found(&name))?;
+        job.set_state(JobState::Queued);
+        job.failure = None;
+        Ok(Response::new(job.clone()))
+    }
+
+    async fn list_job_attempts(
+        &self,
+        request: Request<ListJobAttemptsRequest>,
+    ) -> Result<Response<ListJobAttemptsResponse>, Status> {
+        let name = request.into_inner().name;
+        let job = self.state().jobs.get(&name).cloned().ok_or_else(|| not_found(&name))?;
+        let attempt = JobAttempt {
+            number: 1,
+            worker: "a worker".into(),
+            outcome: job_attempt::Outcome::Failed.into(),
+            failure: job.failure,
+            ..JobAttempt::default()
+        };
+        let attempts = vec![attempt];
+        Ok(Response::new(ListJobAttemptsResponse { attempts }))
     }
 
     type WatchJobStream = Replies<WatchJobResponse>;

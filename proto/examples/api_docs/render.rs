@@ -15,13 +15,14 @@ pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/api.md");
 const PREFACE: &str = include_str!("preface.md");
 const PACKAGE: &str = "guardsplat.v1";
 /// The order that a reader wants.
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     "job_service",
     "job",
     "artifact_service",
     "key_service",
     "registry_service",
     "token_service",
+    "hook_service",
     "worker_service",
 ];
 

@@ -9,35 +9,68 @@ use super::submission::Submission;
 use super::{Api, own};
 use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, JobKind};
+use crate::ledger::{ArtifactId, JobKind, Needs};
 
 /// When a submitter tries again while the queue is full.
 const QUEUE_RETRY: Duration = Duration::from_secs(10);
 
 impl Api {
     /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
-    pub(super) async fn admit(&self, project: &str, submission: &Submission) -> Result<()> {
-        let limit = self.limits().max_queued;
+    /// Says what the worker of one that there is room for must have, as far as its scene tells.
+    pub(super) async fn admit(&self, project: &str, submission: &Submission) -> Result<Needs> {
+        let limits = self.limits();
+        let limit = limits.max_queued;
         let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
-        let memory = self.limits().max_job_memory.zip(scene_of(submission));
-        let quotas = [self.limits().max_queued_of_project, self.limits().max_bytes_of_project];
-        let unlimited = !full && memory.is_none() && quotas == [None, None];
-        if unlimited || self.is_known(project, submission).await? {
-            return Ok(());
+        let quotas = [limits.max_queued_of_project, limits.max_bytes_of_project];
+        let unlimited = !full && limits.max_job_memory.is_none() && quotas == [None, None];
+        if !unlimited {
+            if self.is_known(project, submission).await? {
+                return Ok(Needs::default());
+            }
+            self.room_for_job(project, submission.kind).await?;
         }
-        self.room_for_job(project, submission.kind).await?;
         if full {
             return Err(Error::QueueFull {
                 limit,
                 retry_after: QUEUE_RETRY,
             });
         }
-        if let Some((limit, scene)) = memory
-            && let Some(summary) = self.summary(project, scene).await?
-        {
+        let Some(scene) = scene_of(submission) else {
+            return Ok(Needs::default());
+        };
+        let summary = match (self.summary(project, scene).await, limits.max_job_memory) {
+            // A job that nothing is held against does not hang on it either.
+            (Err(error), None) => {
+                tracing::warn!(%error, scene = %scene, "what a scene takes is not known");
+                None
+            }
+            (summary, _) => summary?,
+        };
+        let Some(summary) = summary else {
+            return Ok(Needs::default());
+        };
+        if let Some(limit) = limits.max_job_memory {
             check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
         }
-        Ok(())
+        let (least, likely) = taken(submission.kind, &summary);
+        let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
+        Ok(Needs {
+            memory: bytes(least),
+            likely_memory: bytes(likely),
+            clip: None,
+        })
+    }
+
+    /// Refuses a job that would be one too many.
+    pub(super) async fn room_in_queue(&self) -> Result<()> {
+        let limit = self.limits().max_queued;
+        if u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) < limit {
+            return Ok(());
+        }
+        Err(Error::QueueFull {
+            limit,
+            retry_after: QUEUE_RETRY,
+        })
     }
 
     /// Whether a request made a job before.
@@ -80,12 +113,17 @@ fn scene_of(submission: &Submission) -> Option<ArtifactId> {
     }
 }
 
-/// Refuses a scene that takes more than `limit` bytes, whatever else its job asks for.
-fn check(name: &str, kind: JobKind, summary: &Summary, limit: u64) -> Result<()> {
-    let (needed, likely) = match kind {
+/// Bytes that a scene takes at least, and probably.
+fn taken(kind: JobKind, summary: &Summary) -> (u64, u64) {
+    match kind {
         JobKind::Embed => (summary.least_to_mark(), summary.likely_to_mark()),
         JobKind::Verify | JobKind::CreateKey => (summary.least_to_read(), summary.likely_to_read()),
-    };
+    }
+}
+
+/// Refuses a scene that takes more than `limit` bytes, whatever else its job asks for.
+fn check(name: &str, kind: JobKind, summary: &Summary, limit: u64) -> Result<()> {
+    let (needed, likely) = taken(kind, summary);
     if needed <= limit {
         return Ok(());
     }

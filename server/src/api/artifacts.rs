@@ -3,7 +3,7 @@ use futures::stream::{self, BoxStream, StreamExt};
 use guardsplat_proto::v1::artifact_service_server::ArtifactService;
 use guardsplat_proto::v1::{
     Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, GetArtifactRequest,
-    UploadArtifactRequest, download_artifact_response,
+    GetDownloadUrlRequest, GetDownloadUrlResponse, UploadArtifactRequest, download_artifact_response,
 };
 use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
@@ -26,6 +26,7 @@ impl ArtifactService for Api {
         let project = caller(&request)?.project;
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
         let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
+        self.metrics().uploaded(false, row.size);
         Ok(Response::new(convert::artifact(row)))
     }
 
@@ -51,6 +52,16 @@ impl ArtifactService for Api {
         Ok(Response::new(stream::iter([Ok(first)]).chain(rest).boxed()))
     }
 
+    async fn get_download_url(
+        &self,
+        request: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        // Never a secret one: those are not even there.
+        let row = self.readable_artifact(&caller(&request)?, id).await?;
+        Ok(Response::new(self.signed(row).await?))
+    }
+
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
         let row = self.own_artifact(&caller(&request)?.project, id).await?;
@@ -73,6 +84,25 @@ impl ArtifactService for Api {
 }
 
 impl Api {
+    /// An address for an artifact, where the server is to give any and the store has some.
+    async fn signed(&self, row: ArtifactRow) -> Result<GetDownloadUrlResponse> {
+        let (mut url, mut expire_time) = (None, None);
+        if let Some(lifetime) = self.limits().signed_url {
+            let path = ArtifactPath::parse(&row.path)?;
+            // From before it is signed, so that it is not good for longer than is said.
+            let now = clock::now();
+            url = self.store().download_url(&path, lifetime).await?;
+            expire_time = url
+                .as_ref()
+                .map(|_| clock::timestamp(now.saturating_add(clock::micros(lifetime))));
+        }
+        Ok(GetDownloadUrlResponse {
+            artifact: Some(convert::artifact(row)),
+            url: url.unwrap_or_default(),
+            expire_time,
+        })
+    }
+
     async fn receive_upload(
         &self,
         project: String,
@@ -92,6 +122,7 @@ impl Api {
             sha256: metadata.sha256,
             origin: Origin::Upload { project },
             secret: false,
+            evidence: false,
             path: path.to_string(),
         };
         // The row comes before the file does, so that no file is ever without one.

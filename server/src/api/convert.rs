@@ -47,6 +47,9 @@ pub fn job(row: JobRow) -> Result<v1::Job> {
         start_time: row.start_time.map(timestamp),
         end_time: row.end_time.map(timestamp),
         retry_time: row.run_after.filter(|_| queued).map(timestamp),
+        priority: Some(row.priority),
+        // Whoever knows the workers adds it.
+        waiting_reason: String::new(),
     })
 }
 

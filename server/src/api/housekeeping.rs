@@ -1,13 +1,13 @@
 //! What has to be done without anybody asking: ending leases that have expired, and deleting what nobody can want.
 use std::time::Duration;
 
-use tokio::time::{Instant, interval};
+use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use super::status::chain;
 use super::{Api, clock};
 use crate::artifacts::ArtifactPath;
 use crate::error::Result;
-use crate::ledger::ArtifactRow;
+use crate::ledger::{ArtifactRow, JobId};
 
 /// How late an expired lease may be noticed.
 const REAP_EVERY: Duration = Duration::from_secs(1);
@@ -15,6 +15,10 @@ const REAP_EVERY: Duration = Duration::from_secs(1);
 const ABSENCE: Duration = Duration::from_secs(3);
 /// How often abandoned bytes are looked for, at most.
 const COLLECT_EVERY: Duration = Duration::from_secs(10);
+/// How often what is too old is looked for, at most.
+const EXPIRE_EVERY: Duration = Duration::from_secs(60);
+/// How often all that lies in the store is looked at, at least.
+const ORPHANS_EVERY: Duration = Duration::from_secs(6 * 60 * 60);
 /// Artifacts deleted at one go.
 const COLLECT_AT_ONCE: u32 = 100;
 
@@ -22,17 +26,21 @@ const COLLECT_AT_ONCE: u32 = 100;
 pub async fn housekeeping(api: Api) {
     let started = clock::now();
     let mut stopping = api.changes().listen();
+    // Beside each other: a store that is slow must not keep leases from being ended.
+    let work = async { tokio::join!(look_after_leases(&api), delete(&api, started)) };
+    tokio::select! {
+        () = stopping.stopped() => {}
+        _ = work => {}
+    }
+}
+
+async fn look_after_leases(api: &Api) {
     let mut ticks = interval(REAP_EVERY);
-    let collect_every = COLLECT_EVERY.min(api.limits().abandoned_after);
-    let mut collected: Option<Instant> = None;
     // When leases were last looked after; never, as far as this server knows.
     let mut looked: Option<Instant> = None;
     let absence = ABSENCE.max(api.limits().lease / 2);
     loop {
-        tokio::select! {
-            () = stopping.stopped() => return,
-            _ = ticks.tick() => {}
-        }
+        ticks.tick().await;
         match api
             .look_after_leases(looked.is_none_or(|at| at.elapsed() > absence))
             .await
@@ -40,10 +48,33 @@ pub async fn housekeeping(api: Api) {
             Ok(()) => looked = Some(Instant::now()),
             Err(error) => tracing::error!(error = %chain(&error), "expired leases could not be ended"),
         }
-        if collected.is_none_or(|at| at.elapsed() >= collect_every) {
-            collected = Some(Instant::now());
-            if let Err(error) = api.collect(started).await {
-                tracing::error!(error = %chain(&error), "abandoned artifacts could not be deleted");
+    }
+}
+
+async fn delete(api: &Api, started: i64) {
+    let abandoned_after = api.limits().abandoned_after;
+    let mut ticks = interval(COLLECT_EVERY.min(abandoned_after));
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let expire_every = EXPIRE_EVERY.min(abandoned_after);
+    let orphans_every = (abandoned_after / 4).clamp(COLLECT_EVERY, ORPHANS_EVERY);
+    let mut expired: Option<Instant> = None;
+    // Not at the start: listing all there is takes a store's time, and orphans can wait.
+    let mut searched = Instant::now();
+    loop {
+        ticks.tick().await;
+        if expired.is_none_or(|at| at.elapsed() >= expire_every) {
+            expired = Some(Instant::now());
+            if let Err(error) = api.expire().await {
+                tracing::error!(error = %chain(&error), "what is too old could not be deleted");
+            }
+        }
+        if let Err(error) = api.collect(started).await {
+            tracing::error!(error = %chain(&error), "abandoned artifacts could not be deleted");
+        }
+        if searched.elapsed() >= orphans_every {
+            searched = Instant::now();
+            if let Err(error) = api.collect_orphans().await {
+                tracing::error!(error = %chain(&error), "bytes that nothing points at could not be looked for");
             }
         }
     }
@@ -65,6 +96,7 @@ impl Api {
         for &job in &ended {
             tracing::warn!(%job, "the lease has expired: its worker is gone");
             self.reports().forget(job);
+            self.count_lost(job).await;
             self.changes().job(job);
         }
         if !ended.is_empty() {
@@ -72,6 +104,20 @@ impl Api {
             self.changes().queue_moved();
         }
         Ok(())
+    }
+
+    /// Counts an attempt whose worker was lost. Figures are not worth an error.
+    async fn count_lost(&self, id: JobId) {
+        let metrics = self.metrics();
+        let now = Instant::now().into_std();
+        self.stages().end(id, "lost", now, &metrics, self.traces());
+        match self.ledger().get_job(id).await {
+            Ok(Some(job)) => {
+                metrics.attempt_ended(&job, true);
+            }
+            Ok(None) => {}
+            Err(error) => tracing::warn!(job = %id, error = %chain(&error), "a lost attempt is not counted"),
+        }
     }
 
     /// Deletes what uploads and attempts left behind. What was begun before this server was `started` is nobody's any

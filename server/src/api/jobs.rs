@@ -2,8 +2,8 @@
 use futures::stream::BoxStream;
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::{
-    CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobsRequest, ListJobsResponse, WatchJobRequest,
-    WatchJobResponse,
+    CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobAttemptsRequest, ListJobAttemptsResponse,
+    ListJobsRequest, ListJobsResponse, RequeueJobRequest, WatchJobRequest, WatchJobResponse,
 };
 use prost::Message as _;
 use tonic::{Request, Response, Status};
@@ -13,7 +13,7 @@ use super::guard::{caller, payer};
 use super::meter::Class;
 use super::names::Kind;
 use super::submission::{self, Submission};
-use super::{Api, clock, convert, fingerprint, keys, message, own, page, watch};
+use super::{Api, clock, convert, fingerprint, keys, measured, message, operations, own, page, watch};
 use crate::access::Caller;
 use crate::error::{Error, Result};
 use crate::ledger::{JobKind, NewJob};
@@ -25,13 +25,15 @@ const MAX_PAGE_BYTES: usize = 2 << 20;
 impl JobService for Api {
     async fn create_job(&self, request: Request<CreateJobRequest>) -> Result<Response<Job>, Status> {
         let caller = caller(&request)?;
-        Ok(Response::new(self.submit(request.into_inner(), &caller).await?))
+        let trace_parent = measured::trace_parent(&request);
+        let job = self.submit(request.into_inner(), trace_parent, &caller).await?;
+        Ok(Response::new(job))
     }
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
         let row = self.own_job(&caller(&request)?.project, id).await?;
-        Ok(Response::new(convert::job(row)?))
+        Ok(Response::new(self.told(row).await?))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
@@ -45,6 +47,8 @@ impl JobService for Api {
         let job = self.own_job(&caller.project, id).await?;
         caller.must(own::scope_of(job.kind))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
+        // A running job ends when its worker has heard of it.
+        self.metrics().job_ended(&row);
         self.changes().job(id);
         self.changes().queue_moved();
         Ok(Response::new(convert::job(row)?))
@@ -58,13 +62,44 @@ impl JobService for Api {
         let watching = watch::watch(self.clone(), project, &name, &cursor);
         Ok(Response::new(watching.await?))
     }
+
+    async fn requeue_job(&self, request: Request<RequeueJobRequest>) -> Result<Response<Job>, Status> {
+        let project = caller(&request)?.project;
+        Ok(Response::new(self.requeue(&project, &request.get_ref().name).await?))
+    }
+
+    async fn list_job_attempts(
+        &self,
+        request: Request<ListJobAttemptsRequest>,
+    ) -> Result<Response<ListJobAttemptsResponse>, Status> {
+        let project = caller(&request)?.project;
+        let attempts = self.attempts(&project, &request.get_ref().name).await?;
+        Ok(Response::new(ListJobAttemptsResponse { attempts }))
+    }
+}
+
+/// Claims are answered while somebody waits; scenes are marked overnight.
+const PRIORITY_OF_VERIFY: i32 = 5;
+
+/// How urgent a job is: as it says, or by its kind; never above the highest that callers may have.
+fn urgency(submission: &Submission, highest: i32) -> Result<i32> {
+    match submission.priority {
+        Some(priority) if priority > highest => Err(Error::invalid(
+            "job.priority",
+            format!("is {priority}, the highest that this server takes is {highest}"),
+        )),
+        Some(priority) => Ok(priority),
+        None if submission.kind == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
+        None => Ok(highest.min(0)),
+    }
 }
 
 impl Api {
-    async fn submit(&self, request: CreateJobRequest, caller: &Caller) -> Result<Job> {
+    async fn submit(&self, request: CreateJobRequest, trace_parent: Option<String>, caller: &Caller) -> Result<Job> {
         let submission = submission::check(request)?;
         caller.must(own::scope_of(submission.kind))?;
         let project = caller.project.as_str();
+        let mut clip = None;
         if let Some(id) = submission.key {
             let key = self.own_key(project, id).await?;
             if let Some((field, text)) = &submission.message {
@@ -78,11 +113,14 @@ impl Api {
             if let Some(claim) = &submission.claim {
                 self.check_claim(project, claim, &key, &submission).await?;
             }
+            clip = Some(key.clip_sha256).filter(|hash| !hash.is_empty());
         }
         if submission.kind == JobKind::Verify {
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
-        self.admit(project, &submission).await?;
+        let priority = urgency(&submission, self.limits().max_priority)?;
+        let mut needs = self.admit(project, &submission).await?;
+        needs.clip = clip;
         let fingerprint = self.fingerprint(project, &submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
@@ -93,13 +131,22 @@ impl Api {
             inputs: submission.inputs,
             key: submission.key,
             request_id: submission.request_id.map(|id| own::request(project, id)),
+            asked_id: submission.request_id,
             fingerprint,
             max_attempts: self.limits().max_attempts,
+            priority,
+            needs,
+            trace_parent,
         };
+        let id = new.id;
         let row = self.ledger().create_job(new, clock::now()).await;
         let row = row.map_err(|error| own::as_asked(error, submission.request_id))?;
+        // A request that was sent again has made its job before.
+        if row.id == id {
+            self.metrics().created(row.kind);
+        }
         self.changes().queue_grew();
-        convert::job(row)
+        self.told(row).await
     }
 
     /// What a request is known by when it is sent again; needed only where it has a name.
@@ -117,16 +164,25 @@ impl Api {
         let size = page::size(request.page_size)?;
         let states = convert::states(&request.states)?;
         let numbers: Vec<u8> = states.iter().map(|&state| state as u8).collect();
-        let query: [&[u8]; 2] = [b"jobs", &numbers];
-        let before = page::position(&query, &request.page_token)?;
+        let reasons = operations::reasons(&request.reasons, &states)?;
+        let reasons_asked: Vec<u8> = reasons.iter().map(|&reason| reason as u8).collect();
+        // As it was before there were reasons to ask for, so that tokens of then are known.
+        let query: &[&[u8]] = match reasons.is_empty() {
+            true => &[b"jobs", &numbers],
+            false => &[b"failed", &reasons_asked],
+        };
+        let before = page::position(query, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = self.ledger().list_jobs(project, &states, before, size + 1).await?;
+        let rows = match reasons.is_empty() {
+            true => self.ledger().list_jobs(project, &states, before, size + 1).await?,
+            false => self.ledger().list_failed(project, &reasons, before, size + 1).await?,
+        };
         let (count, mut bytes) = (rows.len(), 0);
         let mut jobs = Vec::with_capacity(count.min(size as usize));
         let mut last = None;
         for row in rows.into_iter().take(size as usize) {
             let position = (row.create_time, row.id);
-            let job = convert::job(row)?;
+            let job = self.told(row).await?;
             bytes += job.encoded_len();
             if bytes > MAX_PAGE_BYTES && !jobs.is_empty() {
                 break;
@@ -137,7 +193,7 @@ impl Api {
         let more = last.filter(|_| count > jobs.len());
         Ok(ListJobsResponse {
             jobs,
-            next_page_token: more.map(|at| page::token(&query, at)).unwrap_or_default(),
+            next_page_token: more.map(|at| page::token(query, at)).unwrap_or_default(),
         })
     }
 }

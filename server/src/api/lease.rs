@@ -13,11 +13,13 @@ use tonic::Status;
 
 use super::changes::For;
 use super::names::Kind;
+use super::placement::described;
 use super::status::chain;
-use super::{Api, clock, convert, text};
+use super::{Api, clock, convert};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
-use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease};
+use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, Taker};
+use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// How late a job is found that became ready by time alone, after a failed attempt.
@@ -26,18 +28,25 @@ const LOOK_AGAIN: Duration = Duration::from_secs(1);
 impl Api {
     /// Leases a job, waiting for one if need be.
     pub(super) async fn lease(&self, request: LeaseJobRequest) -> Result<LeaseJobResponse> {
-        let LeaseJobRequest { worker, wait } = request;
-        if worker.is_empty() {
-            return Err(Error::invalid("worker", "is missing"));
-        }
-        text::display_name("worker", &worker)?;
+        let LeaseJobRequest {
+            worker,
+            wait,
+            device,
+            memory_bytes,
+            clip_sha256,
+        } = request;
+        let worker = described(worker, device, memory_bytes, clip_sha256)?;
         let wait = clock::duration(wait.unwrap_or_default()).filter(|&wait| wait <= MAX_WAIT);
         let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
         let end = Instant::now() + wait;
         let mut listener = self.changes().listen();
+        let alive = self.alive();
+        let _waiting = alive.wait();
         loop {
             listener.check_running()?;
-            if let Some(lease) = self.claim(&worker).await? {
+            self.worker_is_there(&worker).await?;
+            let taker = self.taker(&worker).await?;
+            if let Some(lease) = self.claim(taker).await? {
                 let job = match self.for_worker(&lease).await {
                     Ok(job) => job,
                     Err(error) => {
@@ -47,6 +56,7 @@ impl Api {
                 };
                 return Ok(LeaseJobResponse {
                     job: Some(job),
+                    trace_parent: lease.job.trace_parent.unwrap_or_default(),
                     lease_token: lease.token,
                     lease_duration: Some(clock::proto_duration(self.limits().lease)),
                 });
@@ -81,27 +91,37 @@ impl Api {
         let failed = self
             .ledger()
             .fail(id, &lease.token, Some(failure), true, false, clock::now());
-        failed.await?;
-        self.attempt_over(id);
+        self.attempt_over(&failed.await?);
         Ok(())
     }
 
     /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
     /// attempt would be lost, and the time of a lease with it.
-    async fn claim(&self, worker: &str) -> Result<Option<Lease>> {
+    async fn claim(&self, taker: Taker) -> Result<Option<Lease>> {
         let (send, receive) = oneshot::channel();
-        let (api, worker) = (self.clone(), worker.to_owned());
+        let api = self.clone();
         tokio::spawn(async move {
-            let claimed = api.ledger().claim(&worker, api.limits().lease, clock::now()).await;
-            if let Ok(Some(lease)) = &claimed {
-                tracing::info!(job = %lease.job.id, worker, attempt = lease.job.attempt, "job given to a worker");
+            let mut claimed = api.ledger().claim_for(&taker, api.limits().lease, clock::now()).await;
+            if let Ok(Some(lease)) = &mut claimed {
+                tracing::info!(job = %lease.job.id, worker = taker.worker, attempt = lease.job.attempt, "job given to a worker");
+                api.metrics().given(&lease.job);
+                let span = api.traces().attempt(&lease.job);
+                // The worker's spans go below the attempt's.
+                if let Some(span) = &span {
+                    lease.job.trace_parent = Some(traces::text(traces::context(span)));
+                }
+                let (id, kind, now) = (lease.job.id, lease.job.kind, Instant::now().into_std());
+                api.stages().begin(id, kind, span, now);
                 api.changes().job(lease.job.id);
                 api.changes().queue_moved();
             }
             if let Err(Ok(Some(lease))) = send.send(claimed) {
                 let id = lease.job.id;
                 match api.ledger().release(id, &lease.token, clock::now()).await {
-                    Ok(_) => api.changes().job(id),
+                    Ok(job) => {
+                        api.ended(&job);
+                        api.changes().job(id);
+                    }
                     Err(error) => {
                         tracing::warn!(job = %id, error = %chain(&error), "not taken back from a worker that left");
                     }
@@ -162,8 +182,13 @@ impl Api {
             .ledger()
             .fail(job.id, token, Some(failure), false, false, clock::now())
             .await;
-        self.attempt_over(job.id);
-        failed.map_or_else(Error::from, |_| refusal)
+        match failed {
+            Ok(job) => {
+                self.attempt_over(&job);
+                refusal
+            }
+            Err(error) => error.into(),
+        }
     }
 }
 

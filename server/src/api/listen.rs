@@ -9,6 +9,7 @@ use tonic::transport::{Server, ServerTlsConfig};
 use super::deadline::Deadlines;
 use super::explained::Explained;
 use super::guard::Guard;
+use super::measured::Measured;
 use crate::error::{Error, Result};
 
 /// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
@@ -24,6 +25,8 @@ pub struct Door {
     pub guard: Guard,
     /// TLS, if that is spoken; then nothing else is.
     pub tls: Option<ServerTlsConfig>,
+    /// What counts calls.
+    pub measured: Measured,
 }
 
 /// Answers calls that come through `door` until `shutdown`, then finishes those that have begun.
@@ -45,6 +48,7 @@ pub async fn serve(
         .concurrency_limit_per_connection(CALLS_AT_ONCE as usize)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
+        .layer(door.measured)
         .layer(Explained)
         .layer(Deadlines)
         .layer(door.guard)

@@ -54,9 +54,11 @@ impl Class {
             // Workers are the operator's, and their calls follow from jobs that were counted.
             ("guardsplat.v1.WorkerService", _) => None,
             (service, _) if service.starts_with("grpc.health.") => None,
-            (_, "CreateJob" | "UploadArtifact" | "CreateOwner" | "CreateAsset" | "CreateToken") => {
-                Some(Self::Submission)
-            }
+            (
+                _,
+                "CreateJob" | "UploadArtifact" | "CreateOwner" | "CreateAsset" | "CreateToken" | "CreateHook"
+                | "RedeliverDelivery",
+            ) => Some(Self::Submission),
             _ => Some(Self::Call),
         }
     }

@@ -1,8 +1,9 @@
-//! The API over gRPC: the six services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
+//! The API over gRPC: the seven services of `guardsplat.v1` over the ledger, the artifact store and the secrets.
 use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_server::ArtifactServiceServer;
+use guardsplat_proto::v1::hook_service_server::HookServiceServer;
 use guardsplat_proto::v1::job_service_server::JobServiceServer;
 use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
@@ -13,11 +14,16 @@ use tonic::service::Routes;
 
 use crate::artifacts::ArtifactStore;
 use crate::error::{Error, Result};
+use crate::hooks::Rules;
 use crate::ledger::Ledger;
+use crate::ledger::queue::PRIORITIES;
+use crate::metrics::Metrics;
 use crate::notary::Notary;
 use crate::secrets::MasterKey;
+use crate::traces::Traces;
 
 mod admission;
+mod alive;
 mod artifacts;
 mod changes;
 mod claims;
@@ -25,27 +31,36 @@ mod clock;
 mod completion;
 mod convert;
 mod deadline;
+mod deliveries;
 mod evidence;
+mod expiry;
 mod explained;
 mod fingerprint;
 mod guard;
+mod hooks;
 mod housekeeping;
 mod jobs;
 mod keys;
 mod lease;
 mod listen;
+mod measured;
 mod message;
 mod meter;
 mod names;
+mod operations;
+mod orphans;
 mod output;
 mod own;
 mod page;
+mod placement;
+mod positions;
 mod problems;
 mod progress;
 mod quota;
 mod refusals;
 mod registry;
 mod relay;
+mod stages;
 mod status;
 #[doc(hidden)]
 pub mod strangers;
@@ -59,10 +74,14 @@ mod upload;
 mod watch;
 mod worker;
 
+pub use alive::Alive;
 pub use clock::now;
+pub use deliveries::deliveries;
+pub use expiry::Keep;
 pub use guard::Guard;
 pub use housekeeping::housekeeping;
 pub use listen::{Door, serve};
+pub use measured::Measured;
 pub use meter::{Meter, Rates};
 pub use relay::relay;
 pub use text::display_name as check_display_name;
@@ -79,6 +98,8 @@ pub struct Limits {
     pub max_attempts: i32,
     /// Jobs that may wait; more are refused.
     pub max_queued: u64,
+    /// The highest priority that a caller may ask for.
+    pub max_priority: i32,
     /// Bytes of memory that a job may take; one whose scene takes more is refused. `None` leaves that to the workers.
     pub max_job_memory: Option<u64>,
     /// An upload of which nothing arrives for so long is broken off.
@@ -93,6 +114,12 @@ pub struct Limits {
     pub rates: Rates,
     /// What an upload or an attempt left behind is deleted after so long; so no upload may take longer.
     pub abandoned_after: Duration,
+    /// What hooks may be, and how long they are told.
+    pub hooks: Rules,
+    /// How long an address is good for at which the store gives out an artifact; none for no such addresses.
+    pub signed_url: Option<Duration>,
+    /// How long things are kept.
+    pub keep: Keep,
 }
 
 impl Default for Limits {
@@ -101,6 +128,7 @@ impl Default for Limits {
             lease: Duration::from_secs(30),
             max_attempts: 3,
             max_queued: 10_000,
+            max_priority: *PRIORITIES.end(),
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
             false_positive_rate: 1e-6,
@@ -108,11 +136,14 @@ impl Default for Limits {
             max_bytes_of_project: None,
             rates: Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),
+            hooks: Rules::default(),
+            signed_url: None,
+            keep: Keep::default(),
         }
     }
 }
 
-/// What the six services share. Cheap to clone.
+/// What the seven services share. Cheap to clone.
 #[derive(Clone)]
 pub struct Api {
     shared: Arc<Shared>,
@@ -125,8 +156,14 @@ struct Shared {
     notary: Notary,
     limits: Limits,
     meter: Arc<Meter>,
+    metrics: Arc<Metrics>,
+    alive: Arc<Alive>,
+    stages: stages::Stages,
+    traces: Traces,
     changes: changes::Changes,
     reports: progress::Reports,
+    placement: placement::Placement,
+    positions: positions::Positions,
 }
 
 impl Api {
@@ -146,15 +183,21 @@ impl Api {
             notary,
             meter: Arc::new(Meter::new(limits.rates)),
             limits,
+            metrics: Arc::default(),
+            alive: Arc::default(),
+            stages: stages::Stages::default(),
+            traces: Traces::default(),
             changes: changes::Changes::default(),
             reports: progress::Reports::default(),
+            placement: placement::Placement::default(),
+            positions: positions::Positions::default(),
         };
         Self {
             shared: Arc::new(shared),
         }
     }
 
-    /// The six services and reflection. Health, which knows more than the API, is added by the caller.
+    /// The seven services and reflection. Health, which knows more than the API, is added by the caller.
     pub fn routes(&self) -> Result<Routes> {
         let reflection = || {
             tonic_reflection::server::Builder::configure()
@@ -169,6 +212,7 @@ impl Api {
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(TokenServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(HookServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(WorkerServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(reflection().build_v1().map_err(failed)?)
                 .add_service(reflection().build_v1alpha().map_err(failed)?),
@@ -184,6 +228,41 @@ impl Api {
     /// What counts calls, for the guard.
     pub fn meter(&self) -> Arc<Meter> {
         self.shared.meter.clone()
+    }
+
+    /// What is measured.
+    pub fn metrics(&self) -> Arc<Metrics> {
+        self.shared.metrics.clone()
+    }
+
+    /// Whether any worker is there.
+    pub fn alive(&self) -> Arc<Alive> {
+        self.shared.alive.clone()
+    }
+
+    /// The same, with traces of what it does. For an API that nobody shares yet.
+    pub fn traced(mut self, traces: Traces) -> Self {
+        if let Some(shared) = Arc::get_mut(&mut self.shared) {
+            shared.traces = traces;
+        }
+        self
+    }
+
+    /// Where traces go.
+    pub fn traces(&self) -> &Traces {
+        &self.shared.traces
+    }
+
+    /// What counts and traces calls, for the listener.
+    pub fn measured(&self) -> Measured {
+        Measured {
+            metrics: self.metrics(),
+            traces: self.shared.traces.clone(),
+        }
+    }
+
+    fn stages(&self) -> &stages::Stages {
+        &self.shared.stages
     }
 
     fn ledger(&self) -> &dyn Ledger {
@@ -212,6 +291,10 @@ impl Api {
 
     fn reports(&self) -> &progress::Reports {
         &self.shared.reports
+    }
+
+    fn placement(&self) -> &placement::Placement {
+        &self.shared.placement
     }
 
     /// Breaks off an upload that takes so long that its bytes would count as abandoned.

@@ -20,11 +20,15 @@ pub enum Kind {
     Commitment,
     /// What callers show.
     Token,
+    /// A URL that is told of jobs that are over.
+    Hook,
+    /// One message for it.
+    Delivery,
 }
 
 impl Kind {
     /// Everything that has a name.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Job,
         Self::Artifact,
         Self::Key,
@@ -32,6 +36,8 @@ impl Kind {
         Self::Asset,
         Self::Commitment,
         Self::Token,
+        Self::Hook,
+        Self::Delivery,
     ];
 
     /// The collection, the first segment of the name.
@@ -44,6 +50,8 @@ impl Kind {
             Self::Asset => "assets",
             Self::Commitment => "commitments",
             Self::Token => "tokens",
+            Self::Hook => "hooks",
+            Self::Delivery => "deliveries",
         }
     }
 
@@ -57,6 +65,8 @@ impl Kind {
             Self::Asset => "asset",
             Self::Commitment => "commitment",
             Self::Token => "token",
+            Self::Hook => "hook",
+            Self::Delivery => "delivery",
         }
     }
 

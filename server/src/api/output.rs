@@ -44,6 +44,7 @@ impl Api {
                 token: token.clone(),
             },
             secret: metadata.secret,
+            evidence: false,
             path: path.to_string(),
         };
         if metadata.secret {

@@ -23,6 +23,9 @@ impl From<LedgerError> for Error {
             LedgerError::Finished { job, .. } => Self::Finished {
                 name: Kind::Job.name(job),
             },
+            LedgerError::NotFailed(job) => Self::NotFailed {
+                name: Kind::Job.name(job),
+            },
             LedgerError::LeaseLost(job) => Self::LeaseLost {
                 name: Kind::Job.name(job),
             },

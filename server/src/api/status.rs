@@ -32,6 +32,7 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::NotFound { .. } => (Code::NotFound, "NOT_FOUND"),
         Error::RequestIdReused { .. } => (Code::AlreadyExists, "REQUEST_ID_REUSED"),
         Error::Finished { .. } => (Code::FailedPrecondition, "JOB_FINISHED"),
+        Error::NotFailed { .. } => (Code::FailedPrecondition, "JOB_NOT_FAILED"),
         Error::NotCancelled { .. } => (Code::FailedPrecondition, "CANCEL_NOT_REQUESTED"),
         Error::InUse { .. } => (Code::FailedPrecondition, "ARTIFACT_IN_USE"),
         Error::SceneDoesNotFit { .. } => (Code::FailedPrecondition, "SCENE_DOES_NOT_FIT"),
@@ -63,7 +64,9 @@ fn kind(error: &Error) -> (Code, &'static str) {
 fn metadata(error: &Error) -> HashMap<String, String> {
     let entries = match error {
         Error::InUse { name, job } => vec![("name", name.clone()), ("job", job.clone())],
-        Error::Finished { name } | Error::LeaseLost { name } => vec![("name", name.clone())],
+        Error::Finished { name } | Error::NotFailed { name } | Error::LeaseLost { name } => {
+            vec![("name", name.clone())]
+        }
         Error::NotFound { name, .. } | Error::NotCancelled { name } => vec![("name", name.clone())],
         Error::KeyNotActive { name } => vec![("name", name.clone()), ("state", "retired".to_owned())],
         Error::KeyRevoked { name } => vec![("name", name.clone()), ("state", "revoked".to_owned())],
@@ -113,6 +116,7 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
             details.set_resource_info(format!("guardsplat.v1/{kind}"), name, "", error.to_string());
         }
         Error::Finished { name }
+        | Error::NotFailed { name }
         | Error::InUse { name, .. }
         | Error::NotCancelled { name }
         | Error::KeyNotActive { name }

@@ -14,6 +14,7 @@ use super::names::Kind;
 use super::problems::Problems;
 use super::text;
 use crate::error::{Error, Result};
+use crate::ledger::queue::PRIORITIES;
 use crate::ledger::{ArtifactId, JobKind, KeyId};
 
 /// Most suspects of one job.
@@ -38,6 +39,8 @@ pub struct Submission {
     pub message: Option<(&'static str, String)>,
     /// Whose mark it writes or looks for.
     pub claim: Option<Claim>,
+    /// How urgent it is, where that was said.
+    pub priority: Option<i32>,
     /// Names the request.
     pub request_id: Option<Uuid>,
     /// SHA-256 of what was asked for, but for the artifacts, which [`fingerprint::whole`] adds.
@@ -54,6 +57,11 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     let request_id = problems.take(self::request_id(&request_id))?.flatten();
     problems.take(text::display_name("job.display_name", &job.display_name))?;
     output_only(&job, &mut problems);
+    problems.check(
+        job.priority.is_none_or(|priority| PRIORITIES.contains(&priority)),
+        "job.priority",
+        "must be -10 to 10",
+    );
     let asked = fingerprint::asked(&job);
     let checked = match job.spec {
         Some(Spec::Embed(spec)) => embed(&spec, &mut problems)?.map(|w| (JobKind::Embed, spec.encode_to_vec(), w)),
@@ -86,6 +94,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
         key,
         message,
         claim,
+        priority: job.priority,
         request_id,
         asked,
     })
@@ -217,6 +226,7 @@ fn output_only(job: &Job, problems: &mut Problems) {
         ("start_time", job.start_time.is_none()),
         ("end_time", job.end_time.is_none()),
         ("retry_time", job.retry_time.is_none()),
+        ("waiting_reason", job.waiting_reason.is_empty()),
     ];
     for (field, _) in empty.iter().filter(|(_, empty)| !empty) {
         problems.add(format!("job.{field}"), "is set by the server and must be empty");

@@ -1,5 +1,5 @@
 //! `WatchJob`: a job as it stands, then again whenever it changes, until it is over.
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use futures::stream::{self, BoxStream, StreamExt};
 use guardsplat_proto::v1::WatchJobResponse;
@@ -7,14 +7,14 @@ use tonic::Status;
 
 use super::changes::{For, Heard, Listener};
 use super::names::Kind;
-use super::{Api, convert, token};
+use super::{Api, positions, token};
 use crate::error::{Error, Result};
 use crate::ledger::{JobId, JobRow, JobState};
 
 /// How late a change is heard of that was not announced here.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);
 /// A queue that moves fast is told of so often at most.
-const POSITION_EVERY: Duration = Duration::from_millis(500);
+const POSITION_EVERY: Duration = positions::FRESH;
 
 /// What of a job a watcher has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,16 +67,19 @@ pub async fn watch(
     let seen = Seen::parse(id, cursor)?;
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
+    let known = api.own_job(&project, id).await?;
     let watcher = Watcher {
         api,
         project,
         listener,
         id,
         seen,
+        waits: None,
+        // A job that is not there is told at once, not from within the stream.
+        known: Some(known),
+        read: Instant::now(),
         over: false,
     };
-    // A job that is not there is told at once, not from within the stream.
-    watcher.row().await?;
     Ok(stream::unfold(Some(watcher), |watcher| async {
         let mut watcher = watcher?;
         match watcher.next().await {
@@ -94,12 +97,37 @@ struct Watcher {
     listener: Listener,
     id: JobId,
     seen: Option<Seen>,
+    /// Whether nobody could have it, as was last told.
+    waits: Option<bool>,
+    /// The job, if it needs no other look.
+    known: Option<JobRow>,
+    /// When it was last looked at.
+    read: Instant,
     over: bool,
 }
 
 impl Watcher {
-    async fn row(&self) -> Result<JobRow> {
-        self.api.own_job(&self.project, self.id).await
+    async fn row(&mut self) -> Result<JobRow> {
+        if let Some(known) = self.known.take() {
+            return Ok(known);
+        }
+        let read = Instant::now();
+        let row = self.api.ledger().peek_job(self.id).await?;
+        let mut row = row
+            .filter(|row| row.project == self.project)
+            .ok_or_else(|| Kind::Job.not_found(self.id))?;
+        if row.state == JobState::Queued {
+            row = match self.api.positions().await?.get(&self.id) {
+                Some(&position) => JobRow {
+                    queue_position: Some(position),
+                    ..row
+                },
+                // It came, or came back, after they were counted.
+                None => self.api.own_job(&self.project, self.id).await?,
+            };
+        }
+        self.read = read;
+        Ok(row)
     }
 
     async fn next(&mut self) -> Result<Option<WatchJobResponse>> {
@@ -111,28 +139,36 @@ impl Watcher {
             let (seen, state) = (Seen::of(&row), row.state);
             let before = self.seen.replace(seen);
             self.over = state.is_over();
-            if before != Some(seen) {
+            let job = self.api.told(row.clone()).await?;
+            // No part of the cursor: whoever comes back is told of it once more.
+            let waits = self.waits.replace(!job.waiting_reason.is_empty());
+            if before != Some(seen) || waits.is_some_and(|waits| waits == job.waiting_reason.is_empty()) {
                 let cursor = seen.cursor(self.id);
-                return Ok(Some(WatchJobResponse {
-                    job: Some(convert::job(row)?),
-                    cursor,
-                }));
+                return Ok(Some(WatchJobResponse { job: Some(job), cursor }));
             }
             if !self.over {
-                self.wait(state).await?;
+                self.wait(row).await?;
             }
         }
     }
 
-    async fn wait(&mut self, state: JobState) -> Result<()> {
-        if state != JobState::Queued {
+    async fn wait(&mut self, row: JobRow) -> Result<()> {
+        if row.state != JobState::Queued {
             self.listener.wait(For::Job(self.id), LOOK_AGAIN).await?;
             return Ok(());
         }
         let heard = self.listener.wait(For::QueuedJob(self.id), LOOK_AGAIN).await?;
         if heard == Heard::Moved {
             // Others may leave the queue one upon the other; they are told of together.
-            self.listener.wait(For::Job(self.id), POSITION_EVERY).await?;
+            let heard = self.listener.wait(For::Job(self.id), POSITION_EVERY).await?;
+            if heard == Heard::Nothing && self.read.elapsed() < LOOK_AGAIN {
+                // Of the job itself nothing is new, unless it has left the queue.
+                let position = self.api.positions().await?.get(&self.id).copied();
+                self.known = position.map(|_| JobRow {
+                    queue_position: position,
+                    ..row
+                });
+            }
         }
         Ok(())
     }

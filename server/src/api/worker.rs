@@ -2,11 +2,12 @@
 use std::time::Instant;
 
 use futures::stream::BoxStream;
+use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::worker_service_server::WorkerService;
 use guardsplat_proto::v1::{
-    Artifact, CompleteJobRequest, CompleteJobResponse, DownloadKeyRequest, DownloadKeyResponse, FailJobRequest,
-    FailJobResponse, Failure, LeaseJobRequest, LeaseJobResponse, Progress, ReleaseJobRequest, ReleaseJobResponse,
-    ReportJobRequest, ReportJobResponse, UploadOutputRequest, failure, progress,
+    Artifact, CompleteJobRequest, CompleteJobResponse, DownloadKeyRequest, DownloadKeyResponse, EmbedResult,
+    FailJobRequest, FailJobResponse, Failure, LeaseJobRequest, LeaseJobResponse, Progress, ReleaseJobRequest,
+    ReleaseJobResponse, ReportJobRequest, ReportJobResponse, UploadOutputRequest, failure,
 };
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
@@ -17,7 +18,8 @@ use super::problems::Problems;
 use super::upload::Incoming;
 use super::{Api, clock, completion, convert, text};
 use crate::error::{Error, Result};
-use crate::ledger;
+use crate::ledger::{self, JobKind, JobRow};
+use crate::metrics;
 
 /// Most bytes of a failure's message; the rest is cut off.
 const MAX_FAILURE_BYTES: usize = 4 << 10;
@@ -39,6 +41,7 @@ impl WorkerService for Api {
     ) -> Result<Response<Artifact>, Status> {
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
         let row = self.within_upload_time(self.receive_output(incoming)).await?;
+        self.metrics().uploaded(true, row.size);
         Ok(Response::new(convert::artifact(row)))
     }
 
@@ -77,8 +80,12 @@ impl WorkerService for Api {
             }
         }
         let done = self.ledger().complete(id, &lease_token, completion, clock::now());
-        done.await.map_err(Error::from)?;
-        self.attempt_over(id);
+        let done = done.await.map_err(Error::from)?;
+        // What is said again was counted before.
+        if !job.state.is_over() {
+            self.count_mark(&done);
+            self.attempt_over(&done);
+        }
         Ok(Response::new(CompleteJobResponse {}))
     }
 
@@ -100,19 +107,15 @@ impl WorkerService for Api {
             .ledger()
             .fail(id, &lease_token, failure, retryable, cancelled, clock::now())
             .await;
-        failed.map_err(Error::from)?;
-        self.attempt_over(id);
+        self.attempt_over(&failed.map_err(Error::from)?);
         Ok(Response::new(FailJobResponse {}))
     }
 
     async fn release_job(&self, request: Request<ReleaseJobRequest>) -> Result<Response<ReleaseJobResponse>, Status> {
         let ReleaseJobRequest { name, lease_token } = request.into_inner();
         let id = Kind::Job.parse("name", &name)?;
-        self.ledger()
-            .release(id, &lease_token, clock::now())
-            .await
-            .map_err(Error::from)?;
-        self.attempt_over(id);
+        let released = self.ledger().release(id, &lease_token, clock::now()).await;
+        self.attempt_over(&released.map_err(Error::from)?);
         Ok(Response::new(ReleaseJobResponse {}))
     }
 }
@@ -126,14 +129,18 @@ impl Api {
             progress,
         } = request;
         let id = Kind::Job.parse("name", &name)?;
+        let stage = progress.as_ref().map(Progress::stage);
         let progress = progress.map(encoded_progress).transpose()?;
         let (lease, now) = (self.limits().lease, Instant::now());
         let Some(progress) = self.reports().due(id, &token, progress, lease, now) else {
-            return Ok(self.ledger().leased_job(id, &token).await?.cancel_requested);
+            let job = self.ledger().leased_job(id, &token).await?;
+            self.heard(id, stage);
+            return Ok(job.cancel_requested);
         };
         let changed = progress.is_some();
         let cancel_requested = self.ledger().report(id, &token, progress, lease, clock::now()).await?;
         self.reports().written(id, &token, now);
+        self.heard(id, stage);
         if changed {
             self.changes().job(id);
         }
@@ -141,7 +148,9 @@ impl Api {
     }
 
     /// Tells those who wait that an attempt has ended, however it did: the job may be queued again.
-    pub(super) fn attempt_over(&self, id: ledger::JobId) {
+    pub(super) fn attempt_over(&self, job: &JobRow) {
+        let id = job.id;
+        self.ended(job);
         self.reports().forget(id);
         self.changes().job(id);
         self.changes().queue_grew();
@@ -149,10 +158,39 @@ impl Api {
     }
 }
 
+impl Api {
+    /// A worker that has the lease of a job is at this stage of it, if it says so.
+    fn heard(&self, id: ledger::JobId, stage: Option<Stage>) {
+        self.alive().heard();
+        if let Some(stage) = stage {
+            self.stages()
+                .reached(id, stage, Instant::now(), &self.metrics(), self.traces());
+        }
+    }
+
+    /// Counts an attempt that has ended, and left the job like this.
+    pub(super) fn ended(&self, job: &JobRow) {
+        let metrics = self.metrics();
+        let outcome = metrics.attempt_ended(job, metrics::was_lost(job));
+        self.stages()
+            .end(job.id, outcome, Instant::now(), &metrics, self.traces());
+    }
+
+    /// Counts a marked scene that is handed out.
+    fn count_mark(&self, job: &JobRow) {
+        if job.kind == JobKind::Embed
+            && let Some(result) = &job.result
+            && let Ok(result) = convert::decode::<EmbedResult>(result)
+        {
+            self.metrics().marked(&result);
+        }
+    }
+}
+
 fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
     let mut problems = Problems::default();
-    let stage = progress::Stage::try_from(progress.stage).ok();
-    let known = stage.is_some_and(|stage| stage != progress::Stage::Unspecified);
+    let stage = Stage::try_from(progress.stage).ok();
+    let known = stage.is_some_and(|stage| stage != Stage::Unspecified);
     problems.check(known, "progress.stage", "is missing or not known");
     problems.check(progress.done >= 0, "progress.done", "is negative");
     problems.check(progress.total >= 0, "progress.total", "is negative");

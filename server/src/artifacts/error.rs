@@ -1,9 +1,14 @@
 //! What can go wrong with artifacts' bytes.
 use std::io::ErrorKind;
 use std::path::PathBuf;
+use std::time::Duration;
 
+use super::Place;
 use crate::error::Error;
 use crate::secrets::SecretError;
+
+/// What object_store calls a folder in its errors; whatever else it names is reached by a network.
+const FOLDER: &str = "LocalFileSystem";
 
 /// A result of the store.
 pub type StoreResult<T> = Result<T, StoreError>;
@@ -72,6 +77,44 @@ pub enum StoreError {
     /// The store failed.
     #[error("the artifact store failed")]
     Failed(#[source] object_store::Error),
+    /// The store can't be reached, or is not well.
+    #[error("the artifact store is not available")]
+    Away(#[source] object_store::Error),
+    /// The store says nothing.
+    #[error("the artifact store did not answer within {} s", .0.as_secs())]
+    Silent(Duration),
+    /// The store gave less than was asked for.
+    #[error("{wanted} bytes of {path} were asked for, and {read} came")]
+    Short {
+        /// Where the bytes are.
+        path: String,
+        /// Bytes asked for.
+        wanted: u64,
+        /// Bytes that came.
+        read: u64,
+    },
+    /// A server can't begin with this store.
+    #[error("artifacts: {place} can't be {what}")]
+    Unusable {
+        /// Where it is.
+        place: Place,
+        /// What was tried.
+        what: &'static str,
+        /// Why it can't be.
+        source: Box<StoreError>,
+    },
+    /// The store has no bucket of that name.
+    #[error("the bucket or container does not exist")]
+    NoContainer,
+    /// The store has the artifacts of another ledger.
+    #[error(
+        "artifacts: those in {place} are another ledger's, which the object `ledger` there says; name another bucket, prefix or \
+         folder"
+    )]
+    OfAnother {
+        /// Where it is.
+        place: Place,
+    },
     /// The folder can't be used.
     #[error("{}: {source}", path.display())]
     Folder {
@@ -85,11 +128,31 @@ pub enum StoreError {
     Sealed(#[from] SecretError),
 }
 
+impl StoreError {
+    pub(super) fn unusable(place: &Place, what: &'static str, source: impl Into<Self>) -> Self {
+        Self::Unusable {
+            place: place.clone(),
+            what,
+            source: Box::new(source.into()),
+        }
+    }
+
+    /// Whether it may be otherwise a little later.
+    pub(super) fn passes(&self) -> bool {
+        match self {
+            Self::Away(_) | Self::Silent(_) | Self::Short { .. } => true,
+            Self::Unusable { source, .. } => source.passes(),
+            _ => false,
+        }
+    }
+}
+
 impl From<object_store::Error> for StoreError {
     fn from(error: object_store::Error) -> Self {
         match error {
             object_store::Error::NotFound { path, .. } => Self::Gone { path },
             error if is_full(&error) => Self::NoSpace(error),
+            object_store::Error::Generic { store, .. } if store != FOLDER => Self::Away(error),
             error => Self::Failed(error),
         }
     }
@@ -116,8 +179,20 @@ impl From<StoreError> for Error {
             E::ChunkTooLarge { .. } | E::TooLong { .. } | E::TooShort { .. } => "chunk",
             E::BadOffset { .. } => "offset",
             E::NoSpace(_) => return Self::NoSpace,
+            E::Away(_) | E::Silent(_) | E::Short { .. } => {
+                return Self::Unavailable {
+                    what: "the artifact store",
+                    source: error.into(),
+                };
+            }
             E::Sealed(_) => return Self::internal("opening a sealed key", error),
-            E::BadPath(_) | E::Gone { .. } | E::Failed(_) | E::Folder { .. } => {
+            E::BadPath(_)
+            | E::Gone { .. }
+            | E::Failed(_)
+            | E::Folder { .. }
+            | E::Unusable { .. }
+            | E::NoContainer
+            | E::OfAnother { .. } => {
                 return Self::internal("the artifact store", error);
             }
         };

@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use object_store::local::LocalFileSystem;
 use object_store::path::Path as ObjectPath;
@@ -13,8 +14,8 @@ use super::{StoreError, StoreResult};
 #[derive(Clone, Debug)]
 pub(super) struct Folder(PathBuf);
 
-/// Opens the folder, made if need be.
-pub(super) fn open(folder: &Path) -> StoreResult<(Folder, LocalFileSystem)> {
+/// Opens the folder, made if need be. Staged files that nobody wrote to for `abandoned_after` are removed.
+pub(super) fn open(folder: &Path, abandoned_after: Duration) -> StoreResult<(Folder, LocalFileSystem)> {
     let failed = |source| StoreError::Folder {
         path: folder.to_owned(),
         source,
@@ -24,7 +25,7 @@ pub(super) fn open(folder: &Path) -> StoreResult<(Folder, LocalFileSystem)> {
     if let Some(parent) = folder.parent() {
         sync(parent)?;
     }
-    remove_staged(&folder)?;
+    remove_staged(&folder, abandoned_after)?;
     // Folders of attempts are not left behind empty.
     let store = LocalFileSystem::new_with_prefix(&folder)?
         .with_fsync(true)
@@ -33,6 +34,11 @@ pub(super) fn open(folder: &Path) -> StoreResult<(Folder, LocalFileSystem)> {
 }
 
 impl Folder {
+    /// Its path from the root on.
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+
     /// Makes a deletion durable, which object_store leaves to chance: a file that comes back after a power cut would
     /// belong to nobody.
     pub(super) async fn sync_after_delete(&self, path: &ObjectPath) -> StoreResult<()> {
@@ -61,7 +67,7 @@ fn sync(folder: &Path) -> StoreResult<()> {
 
 /// Removes files that were being written when a server was killed; object_store stages them as `NAME#NUMBER`, which is
 /// no path of an artifact.
-fn remove_staged(folder: &Path) -> StoreResult<()> {
+fn remove_staged(folder: &Path, abandoned_after: Duration) -> StoreResult<()> {
     let failed = |source| StoreError::Folder {
         path: folder.to_owned(),
         source,
@@ -70,13 +76,19 @@ fn remove_staged(folder: &Path) -> StoreResult<()> {
         let entry = entry.map_err(failed)?;
         let path = entry.path();
         if entry.file_type().map_err(failed)?.is_dir() {
-            remove_staged(&path)?;
-        } else if is_staged(&entry.file_name().to_string_lossy()) {
+            remove_staged(&path, abandoned_after)?;
+        } else if is_staged(&entry.file_name().to_string_lossy()) && is_older(&entry, abandoned_after) {
             tracing::info!(path = %path.display(), "removing an upload that was cut off");
             fs::remove_file(&path).map_err(|source| StoreError::Folder { path, source })?;
         }
     }
     Ok(())
+}
+
+/// Whether a file was last written to so long ago. Of one that is gone meanwhile nothing is left to do.
+fn is_older(entry: &fs::DirEntry, age: Duration) -> bool {
+    let written = entry.metadata().and_then(|metadata| metadata.modified());
+    written.is_ok_and(|written| age.is_zero() || SystemTime::now().duration_since(written).is_ok_and(|past| past > age))
 }
 
 fn is_staged(name: &str) -> bool {

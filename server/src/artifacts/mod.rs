@@ -1,67 +1,144 @@
 //! Where artifacts' bytes are: any number of writers and readers over an object store, by default a local folder.
 //!
-//! Nothing is visible under its path before all of it arrived and was found to be what was announced: bytes go to a
-//! staged file, which is synced and then renamed. A writer that fails or is dropped leaves nothing. Which artifacts
-//! there are is the ledger's business; the store only knows paths, and those are made of ids.
+//! Nothing is visible under its path before all of it arrived and was found to be what was announced: a folder has bytes
+//! in a staged file, which is synced and then renamed, a service takes few bytes at once and more in parts, which it
+//! keeps apart until they are said to be all. A writer that fails or is dropped leaves nothing. Which artifacts there
+//! are is the ledger's business; the store only knows paths, and those are made of ids.
 mod check;
 mod error;
+mod list;
 mod local;
 mod path;
+mod place;
 mod reader;
+mod remote;
 mod sealed;
+mod sign;
+mod start;
 mod writer;
 
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
+use object_store::path::Path as ObjectPath;
+use object_store::signer::Signer;
 use object_store::{ObjectStore, ObjectStoreExt};
 use prost::bytes::Bytes;
+use tokio::time::timeout;
 
 pub use check::{Announced, Check};
 pub use error::{StoreError, StoreResult};
+pub use list::Listed;
 pub use path::ArtifactPath;
+pub use place::Place;
 pub use reader::Reader;
+pub use remote::is_of_stores;
 pub use sealed::MAX_SECRET_BYTES;
 pub use writer::Writer;
 
 /// Most bytes that one chunk has, in and out.
 pub const CHUNK_BYTES: usize = 1 << 20;
 
-/// The bytes of all artifacts.
-#[derive(Clone, Debug)]
+/// Least bytes of a part, but for the last; S3 asks for so many.
+const PART_BYTES: u64 = 5 << 20;
+/// Most parts of an artifact; S3 and GCS take no more.
+const PARTS: u64 = 10_000;
+/// Bytes that one request to a service asks for: answers take long to begin.
+const WINDOW_BYTES: usize = 4 << 20;
+/// How long a service may take to answer, all repetitions included; to take bytes, longer.
+const ANSWER: Duration = Duration::from_secs(15);
+const WRITE: Duration = Duration::from_secs(60);
+
+/// The bytes of all artifacts. Cheap to clone.
+#[derive(Clone)]
 pub struct ArtifactStore {
-    store: Arc<dyn ObjectStore>,
-    folder: local::Folder,
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    place: Place,
+    objects: Arc<dyn ObjectStore>,
+    /// Where it is a folder.
+    folder: Option<local::Folder>,
+    /// Where it can sign.
+    signer: Option<Arc<dyn Signer>>,
     max_bytes: u64,
 }
 
 impl ArtifactStore {
-    /// Opens the folder, which is made if it is missing, and removes what writers of a server that was killed left
-    /// behind; so no other server may use it. No artifact may be longer than `max_bytes`.
+    /// Opens a folder, which is made if it is missing, and removes what writers of a server that was killed left behind;
+    /// so no other server may use it. No artifact may be longer than `max_bytes`.
     pub fn open(folder: &Path, max_bytes: u64) -> StoreResult<Self> {
-        let (folder, store) = local::open(folder)?;
-        Ok(Self {
-            store: Arc::new(store),
-            folder,
+        Self::in_folder(folder, Duration::ZERO, max_bytes)
+    }
+
+    /// Opens a store. Of a folder, which other servers may use too, only what writers left behind is removed that is
+    /// older than `abandoned_after`. `environment` says how a service is reached, and as whom; nothing is sent yet.
+    pub fn open_at(
+        place: &Place,
+        environment: impl IntoIterator<Item = (String, String)>,
+        abandoned_after: Duration,
+        max_bytes: u64,
+    ) -> StoreResult<Self> {
+        let (service, name, prefix) = match place {
+            Place::Folder(folder) => return Self::in_folder(folder, abandoned_after, max_bytes),
+            Place::Container { service, name, prefix } => (*service, name, prefix),
+        };
+        let remote = remote::open(service, name, prefix, environment)
+            .map_err(|source| StoreError::unusable(place, "opened", source))?;
+        Ok(Self::new(
+            place.clone(),
+            remote.store,
+            None,
+            Some(remote.signer),
             max_bytes,
-        })
+        ))
+    }
+
+    fn in_folder(folder: &Path, abandoned_after: Duration, max_bytes: u64) -> StoreResult<Self> {
+        let (folder, store) = local::open(folder, abandoned_after)?;
+        let place = Place::Folder(folder.path().to_owned());
+        Ok(Self::new(place, Arc::new(store), Some(folder), None, max_bytes))
+    }
+
+    fn new(
+        place: Place,
+        objects: Arc<dyn ObjectStore>,
+        folder: Option<local::Folder>,
+        signer: Option<Arc<dyn Signer>>,
+        max_bytes: u64,
+    ) -> Self {
+        let inner = Inner {
+            place,
+            objects,
+            folder,
+            signer,
+            max_bytes,
+        };
+        Self { inner: Arc::new(inner) }
+    }
+
+    /// Where it is.
+    pub fn place(&self) -> &Place {
+        &self.inner.place
     }
 
     /// Most bytes that an artifact may have.
     pub fn max_bytes(&self) -> u64 {
-        self.max_bytes
+        self.inner.max_bytes
     }
 
     /// Begins to write an artifact. An announced size over the limit is refused here, before any byte is sent.
     pub async fn write(&self, path: &ArtifactPath, announced: Announced) -> StoreResult<Writer> {
-        let check = Check::new(announced, self.max_bytes)?;
-        let upload = self.store.put_multipart(path.as_object_path()).await?;
-        Ok(Writer::new(upload, check))
+        let check = Check::new(announced, self.max_bytes())?;
+        Writer::begin(self.clone(), path.as_object_path().clone(), announced, check).await
     }
 
     /// Begins to read an artifact from byte `offset`, which may be its end.
     pub async fn read(&self, path: &ArtifactPath, offset: u64) -> StoreResult<Reader> {
-        Reader::open(self.store.clone(), path.as_object_path().clone(), offset).await
+        Reader::open(self.clone(), path.as_object_path().clone(), offset).await
     }
 
     /// The first bytes of an artifact, at most `most`, and its length.
@@ -73,13 +150,73 @@ impl ArtifactStore {
 
     /// Deletes an artifact. One that is not there is none the less deleted.
     pub async fn delete(&self, path: &ArtifactPath) -> StoreResult<()> {
-        match self.store.delete(path.as_object_path()).await {
-            Ok(()) => self.folder.sync_after_delete(path.as_object_path()).await,
-            Err(object_store::Error::NotFound { .. }) => Ok(()),
-            Err(error) => Err(error.into()),
+        let path = path.as_object_path();
+        match self.answered(self.objects().delete(path)).await {
+            Ok(()) => match &self.inner.folder {
+                Some(folder) => folder.sync_after_delete(path).await,
+                None => Ok(()),
+            },
+            Err(StoreError::Gone { .. }) => Ok(()),
+            Err(error) => Err(error),
         }
+    }
+
+    fn objects(&self) -> &dyn ObjectStore {
+        self.inner.objects.as_ref()
+    }
+
+    fn is_remote(&self) -> bool {
+        self.inner.folder.is_none()
+    }
+
+    async fn size_of(&self, path: &ObjectPath) -> StoreResult<u64> {
+        Ok(self.answered(self.objects().head(path)).await?.size)
+    }
+
+    /// Bytes of the parts that an artifact of this size is written in; none where it goes at once.
+    fn part_bytes(&self, size: u64) -> Option<usize> {
+        if !self.is_remote() {
+            return Some(CHUNK_BYTES);
+        }
+        let part = PART_BYTES.max(size.div_ceil(PARTS).next_multiple_of(1 << 20));
+        (size > part).then(|| usize::try_from(part).unwrap_or(usize::MAX))
+    }
+
+    /// Bytes that one request asks for.
+    fn window(&self) -> usize {
+        match self.is_remote() {
+            true => WINDOW_BYTES,
+            false => CHUNK_BYTES,
+        }
+    }
+
+    /// What a store says within the time that it has; a disk has all the time it needs.
+    async fn answered<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
+        self.within(ANSWER, call).await
+    }
+
+    /// As [`Self::answered`], for calls that bring bytes.
+    async fn written<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
+        self.within(WRITE, call).await
+    }
+
+    async fn within<T>(&self, limit: Duration, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
+        if !self.is_remote() {
+            return Ok(call.await?);
+        }
+        timeout(limit, call)
+            .await
+            .map_err(|_| StoreError::Silent(limit))?
+            .map_err(Into::into)
+    }
+}
+
+/// Without what the store was opened with.
+impl fmt::Debug for ArtifactStore {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ArtifactStore({})", self.inner.place)
     }
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

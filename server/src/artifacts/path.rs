@@ -35,6 +35,16 @@ impl ArtifactPath {
         ]))
     }
 
+    /// What paths begin with.
+    pub(super) fn roots() -> [Path; 2] {
+        [Path::from(UPLOADS), Path::from(OUTPUTS)]
+    }
+
+    /// The id of the artifact, with which its path ends.
+    pub fn id(&self) -> Option<Uuid> {
+        self.0.filename().and_then(|id| Uuid::try_parse(id).ok())
+    }
+
     /// Reads a path as the ledger keeps it. Anything that was not made by one of the functions above is refused.
     pub fn parse(text: &str) -> StoreResult<Self> {
         let is_id = |part: &str| Uuid::try_parse(part).is_ok_and(|id| id.to_string() == part);

@@ -9,7 +9,8 @@ use super::{LedgerError, Result};
 /// The job that was made under the request id, if this is the same request. `fingerprint` is that of the first.
 pub(super) fn job(request: Uuid, there: JobRow, fingerprint: &[u8], new: &NewJob) -> Result<JobRow> {
     // Word for word the same, also when an artifact is gone by now whose content could be compared.
-    let said_again = (there.kind, &there.spec, &there.display_name) == (new.kind, &new.spec, &new.display_name);
+    let said_again = (there.kind, &there.spec, &there.display_name, there.priority)
+        == (new.kind, &new.spec, &new.display_name, new.priority);
     let same_project = there.project == new.project;
     same(
         request,

@@ -31,6 +31,9 @@ pub enum LedgerError {
         /// How it ended.
         state: JobState,
     },
+    /// Only a job that failed is queued once more.
+    #[error("job {0} has not failed")]
+    NotFailed(JobId),
     /// The token is not the job's current lease.
     #[error("the lease of job {0} is lost: another attempt has it, or it is over")]
     LeaseLost(JobId),

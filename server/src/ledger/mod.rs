@@ -1,10 +1,10 @@
 //! The job ledger: jobs, leases, artifacts and keys as rows of a database. The ledger is the whole queue. Beside it
 //! the registry: owners, assets, and the chain of commitments, which only grows.
 //!
-//! A job is given to a worker by [`Ledger::claim`], which counts the attempt and hands out a fresh lease token. From
-//! then on every write for that attempt carries the token and is checked against the job's in the transaction that
-//! writes; a worker that was given up can never overwrite its successor. What an attempt makes stays invisible until
-//! [`Ledger::complete`] publishes it together with the result.
+//! A job is given to a worker by [`QueueLedger::claim_for`], which counts the attempt and hands out a fresh lease token;
+//! [`queue`] says in which order. From then on every write for that attempt carries the token and is checked against the
+//! job's in the transaction that writes; a worker that was given up can never overwrite its successor. What an attempt
+//! makes stays invisible until [`Ledger::complete`] publishes it together with the result.
 //!
 //! Times are microseconds since 1970, UTC, and are passed in, so that tests can move the clock.
 pub mod access;
@@ -15,9 +15,13 @@ mod chain;
 pub mod conformance;
 mod elsewhere;
 mod error;
+pub mod hooks;
 mod numbers;
+mod operations;
 pub mod postgres;
+pub mod queue;
 mod registry;
+pub mod retention;
 pub mod retry;
 pub mod sqlite;
 mod token;
@@ -34,11 +38,17 @@ use uuid::Uuid;
 pub use access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
 pub use elsewhere::Elsewhere;
 pub use error::{LedgerError, Result};
+pub use hooks::{
+    DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
+};
+pub use operations::{AttemptRow, OperationsLedger, Outcome, Tally, Waiting};
 pub use postgres::PostgresLedger;
+pub use queue::{Needs, QueueLedger, SeenWorker, Taker};
 pub use registry::{
     AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
     SealedSigningKey,
 };
+pub use retention::{Before, Expired, RetentionLedger};
 pub use sqlite::SqliteLedger;
 pub use types::{
     ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow,
@@ -49,7 +59,7 @@ pub use types::{
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
 #[tonic::async_trait]
-pub trait Ledger: AccessLedger {
+pub trait Ledger: AccessLedger + HookLedger + OperationsLedger + QueueLedger + RetentionLedger {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
     /// then their artifacts may have other names, but hold the same.
@@ -81,9 +91,10 @@ pub trait Ledger: AccessLedger {
     /// `NotFound`; `Finished` when there is nothing left to end.
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow>;
 
-    /// Gives the next job to a worker, counting the attempt. A job whose attempts are used up is never given out; it
-    /// fails here.
-    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>>;
+    /// Gives the next job to a worker that takes any, as [`QueueLedger::claim_for`] does.
+    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
+        self.claim_for(&Taker::of_anything(worker), lease, now).await
+    }
 
     /// The job, if `token` is its current lease.
     ///

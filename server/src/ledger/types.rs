@@ -3,6 +3,7 @@ use std::fmt;
 
 use uuid::Uuid;
 
+use super::queue::Needs;
 use super::registry::KeyState;
 
 /// Name of a job; a version 7 UUID.
@@ -44,7 +45,7 @@ pub enum JobState {
 }
 
 impl JobState {
-    /// Whether nothing of the job changes any more.
+    /// Whether nothing of the job changes any more, but that a failed one may be queued once more.
     pub fn is_over(self) -> bool {
         matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
     }
@@ -72,6 +73,10 @@ pub struct JobRow {
     pub kind: JobKind,
     /// The encoded `guardsplat.v1` message of its kind.
     pub spec: Vec<u8>,
+    /// How urgent it is.
+    pub priority: i32,
+    /// What its worker must have.
+    pub needs: Needs,
     /// What became of it.
     pub state: JobState,
     /// Somebody asked for the end of it while it was running.
@@ -98,7 +103,9 @@ pub struct JobRow {
     pub run_after: Option<i64>,
     /// One more with every change.
     pub revision: i64,
-    /// Queued jobs ahead of it; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
+    /// What it is a part of, as W3C Trace Context has it; none where nobody traces.
+    pub trace_parent: Option<String>,
+    /// Queued jobs ahead of it as things stand; set while it is queued, by `create_job`, `get_job` and `list_jobs`.
     pub queue_position: Option<i64>,
 }
 
@@ -121,10 +128,18 @@ pub struct NewJob {
     pub key: Option<KeyId>,
     /// Names the request, so that it can be repeated.
     pub request_id: Option<Uuid>,
+    /// What the caller called the request, whose name in `request_id` is that of all projects.
+    pub asked_id: Option<Uuid>,
     /// SHA-256 of the request, with what its artifacts hold in place of their names.
     pub fingerprint: [u8; 32],
     /// How many attempts there may be.
     pub max_attempts: i32,
+    /// How urgent it is: one of [`PRIORITIES`](super::queue::PRIORITIES).
+    pub priority: i32,
+    /// What its worker must have.
+    pub needs: Needs,
+    /// What the request is a part of, as W3C Trace Context has it.
+    pub trace_parent: Option<String>,
 }
 
 /// The right to one attempt of a job.
@@ -183,6 +198,8 @@ pub struct NewArtifact {
     pub origin: Origin,
     /// A key file: never visible.
     pub secret: bool,
+    /// A signed report: it stays, and so does its job, however long things are kept.
+    pub evidence: bool,
     /// Where the store has the bytes.
     pub path: String,
 }

@@ -33,6 +33,9 @@ pub struct Flags {
     /// Address and port to listen on; port 0 takes any that is free [default: 127.0.0.1:50051]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
+    /// Address and port of /metrics, /livez and /readyz, over plain HTTP [default: none]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub metrics_listen: Option<SocketAddr>,
     /// Who may call: anybody, or whoever shows a token [default: open]
     #[arg(long, value_name = "WHO")]
     pub access: Option<Access>,
@@ -55,6 +58,14 @@ pub struct Flags {
     /// here: give a password in the variable, the file, or libpq's PGPASSFILE [default: ledger.sqlite in the folder]
     #[arg(long, value_name = "URL")]
     pub database: Option<DatabaseUrl>,
+    /// Where artifacts are: s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX or file:///FOLDER; credentials
+    /// are taken from the environment [default: artifacts in the data folder]
+    #[arg(long, value_name = "URL")]
+    pub artifacts: Option<String>,
+    /// Seconds that an address is good for at which clients fetch an artifact from the store itself; 0 for none
+    /// [default: 0]
+    #[arg(long, value_name = "SECONDS")]
+    pub signed_url_seconds: Option<u64>,
     /// Most bytes of an artifact [default: 4294967296]
     #[arg(long, value_name = "BYTES")]
     pub max_artifact_bytes: Option<u64>,
@@ -76,6 +87,9 @@ pub struct Flags {
     /// Most other calls of one caller in a minute; 0 is no limit [default: 60000]
     #[arg(long, value_name = "CALLS")]
     pub max_calls_per_minute: Option<u32>,
+    /// The highest priority that a job may be submitted with, -10 to 10 [default: 10]
+    #[arg(long, value_name = "PRIORITY", allow_negative_numbers = true)]
+    pub max_priority: Option<i32>,
     /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
     #[arg(long, value_name = "MEBIBYTES")]
     pub max_job_memory_mebibytes: Option<u64>,
@@ -91,6 +105,27 @@ pub struct Flags {
     /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
+    /// Whether hooks may be called without TLS [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub hook_allow_http: Option<bool>,
+    /// Whether hooks may be called at addresses that are not public [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub hook_allow_private: Option<bool>,
+    /// File of the certificates (PEM) that hooks' are checked with [default: none, those of public authorities]
+    #[arg(long, value_name = "FILE")]
+    pub hook_ca: Option<PathBuf>,
+    /// Seconds after which a message that a hook did not acknowledge is given up [default: 259200]
+    #[arg(long, value_name = "SECONDS")]
+    pub hook_give_up_seconds: Option<u64>,
+    /// Days that an upload is kept after it was last used; 0 for ever [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_uploads_days: Option<u64>,
+    /// Days that what a job made is kept after its end; 0 for as long as the job [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_outputs_days: Option<u64>,
+    /// Days that a job is kept after its end; 0 for ever [default: 0]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_jobs_days: Option<u64>,
     /// Whether to run a worker of its own [default: true]
     #[arg(long, value_name = "true|false")]
     pub embedded_worker: Option<bool>,
@@ -124,6 +159,7 @@ impl Flags {
         let Self {
             config: _,
             listen,
+            metrics_listen,
             access,
             allow_open_network,
             tls_certificate,
@@ -131,6 +167,8 @@ impl Flags {
             tls_client_ca,
             data_dir,
             database,
+            artifacts,
+            signed_url_seconds,
             max_artifact_bytes,
             max_queued_jobs,
             max_queued_jobs_per_project,
@@ -138,11 +176,19 @@ impl Flags {
             max_submissions_per_minute,
             max_claims_per_minute,
             max_calls_per_minute,
+            max_priority,
             max_job_memory_mebibytes,
             lease_seconds,
             max_attempts,
             upload_timeout_seconds,
             abandoned_after_seconds,
+            hook_allow_http,
+            hook_allow_private,
+            hook_ca,
+            hook_give_up_seconds,
+            keep_uploads_days,
+            keep_outputs_days,
+            keep_jobs_days,
             embedded_worker,
             worker_binary,
             worker_device,
@@ -153,6 +199,7 @@ impl Flags {
             log_filter,
         } = self;
         set(&mut settings.listen, listen);
+        set(&mut settings.metrics_listen, metrics_listen.map(Some));
         set(&mut settings.access, access);
         set(&mut settings.allow_open_network, allow_open_network);
         set(&mut settings.tls_certificate, tls_certificate.map(Some));
@@ -160,6 +207,8 @@ impl Flags {
         set(&mut settings.tls_client_ca, tls_client_ca.map(Some));
         set(&mut settings.data_dir, data_dir);
         set(&mut settings.database, database.map(Some));
+        set(&mut settings.artifacts, artifacts.map(Some));
+        set(&mut settings.signed_url_seconds, signed_url_seconds);
         set(&mut settings.max_artifact_bytes, max_artifact_bytes);
         set(&mut settings.max_queued_jobs, max_queued_jobs);
         set(&mut settings.max_queued_jobs_per_project, max_queued_jobs_per_project);
@@ -170,11 +219,19 @@ impl Flags {
         set(&mut settings.max_submissions_per_minute, max_submissions_per_minute);
         set(&mut settings.max_claims_per_minute, max_claims_per_minute);
         set(&mut settings.max_calls_per_minute, max_calls_per_minute);
+        set(&mut settings.max_priority, max_priority);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
         set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
+        set(&mut settings.hook_allow_http, hook_allow_http);
+        set(&mut settings.hook_allow_private, hook_allow_private);
+        set(&mut settings.hook_ca, hook_ca.map(Some));
+        set(&mut settings.hook_give_up_seconds, hook_give_up_seconds);
+        set(&mut settings.keep_uploads_days, keep_uploads_days);
+        set(&mut settings.keep_outputs_days, keep_outputs_days);
+        set(&mut settings.keep_jobs_days, keep_jobs_days);
         set(&mut settings.embedded_worker, embedded_worker);
         set(&mut settings.worker_binary, worker_binary.map(Some));
         set(&mut settings.worker_device, worker_device);

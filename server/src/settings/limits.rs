@@ -4,9 +4,13 @@ use std::path::Path;
 use tracing_subscriber::EnvFilter;
 
 use super::{Access, Settings, SettingsError};
+use crate::artifacts::Place;
 use crate::ledger::postgres;
+use crate::ledger::queue::PRIORITIES;
 
 const DAY: u64 = 24 * 60 * 60;
+/// A hundred years.
+const MOST_DAYS: u64 = 36_500;
 
 impl Settings {
     /// Refuses values that could not work, and names the limits.
@@ -39,6 +43,12 @@ impl Settings {
             ("max_attempts", self.max_attempts.into(), 1, 100),
             ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),
             ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
+            ("hook_give_up_seconds", self.hook_give_up_seconds, 1, 365 * DAY),
+            // A week is the longest that S3 signs for.
+            ("signed_url_seconds", self.signed_url_seconds, 0, 7 * DAY),
+            ("keep_uploads_days", self.keep_uploads_days, 0, MOST_DAYS),
+            ("keep_outputs_days", self.keep_outputs_days, 0, MOST_DAYS),
+            ("keep_jobs_days", self.keep_jobs_days, 0, MOST_DAYS),
             ("stop_seconds", self.stop_seconds, 1, 60 * 60),
         ];
         for (field, value, least, most) in numbers {
@@ -50,6 +60,13 @@ impl Settings {
                     most,
                 });
             }
+        }
+        let [least, most] = [*PRIORITIES.start(), *PRIORITIES.end()];
+        if !PRIORITIES.contains(&self.max_priority) {
+            return Err(SettingsError::Invalid {
+                field: "max_priority",
+                reason: format!("{} is not between {least} and {most}", self.max_priority),
+            });
         }
         // NaN is outside of every range.
         if !(1e-30..=0.1).contains(&self.false_positive_rate) {
@@ -65,6 +82,7 @@ impl Settings {
             ("tls_certificate", &self.tls_certificate),
             ("tls_key", &self.tls_key),
             ("tls_client_ca", &self.tls_client_ca),
+            ("hook_ca", &self.hook_ca),
             ("worker_binary", &self.worker_binary),
             ("master_key_file", &self.master_key_file),
         ] {
@@ -78,6 +96,7 @@ impl Settings {
                 reason,
             })?;
         }
+        self.place()?;
         // Filters on fields of spans are regular expressions that the library compiles without limits: 70 bytes of one
         // took gigabytes.
         if self.log_filter.contains(['[', '{']) {
@@ -91,6 +110,15 @@ impl Settings {
             reason: error.to_string(),
         })?;
         Ok(())
+    }
+
+    /// Where artifacts are, if not in the data folder.
+    pub fn place(&self) -> Result<Option<Place>, SettingsError> {
+        let place = self.artifacts.as_deref().map(Place::parse).transpose();
+        place.map_err(|reason| SettingsError::Invalid {
+            field: "artifacts",
+            reason,
+        })
     }
 
     /// Refuses to be open to a network by oversight.

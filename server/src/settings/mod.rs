@@ -23,6 +23,8 @@ pub use layers::{load, parse};
 pub struct Settings {
     /// Where the server listens.
     pub listen: SocketAddr,
+    /// Where metrics and readiness are told, over plain HTTP; nowhere where none is named.
+    pub metrics_listen: Option<SocketAddr>,
     /// Who may call.
     pub access: Access,
     /// Whether other machines may reach a server that asks nobody for a token.
@@ -37,6 +39,10 @@ pub struct Settings {
     pub data_dir: PathBuf,
     /// The database of the ledger, for several servers; a file in the folder where none is named.
     pub database: Option<DatabaseUrl>,
+    /// URL of the store of artifacts; a folder in the data folder where none is named.
+    pub artifacts: Option<String>,
+    /// Seconds that an address is good for at which the store itself gives out an artifact; 0 for no such addresses.
+    pub signed_url_seconds: u64,
     /// Most bytes of an artifact.
     pub max_artifact_bytes: u64,
     /// Most jobs that may wait.
@@ -51,6 +57,8 @@ pub struct Settings {
     pub max_claims_per_minute: u32,
     /// Most other calls of one caller in a minute; 0 for no limit.
     pub max_calls_per_minute: u32,
+    /// The highest priority that a job may be submitted with.
+    pub max_priority: i32,
     /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
     pub max_job_memory_mebibytes: u64,
     /// Seconds until a worker that says nothing is given up.
@@ -61,6 +69,20 @@ pub struct Settings {
     pub upload_timeout_seconds: u64,
     /// Seconds after which bytes that nobody published are removed.
     pub abandoned_after_seconds: u64,
+    /// Whether hooks may be called without TLS.
+    pub hook_allow_http: bool,
+    /// Whether hooks may be called at addresses that are not public.
+    pub hook_allow_private: bool,
+    /// File of the certificates that hooks' are checked with; those of public authorities where none is named.
+    pub hook_ca: Option<PathBuf>,
+    /// Seconds after which a message that a hook did not acknowledge is given up.
+    pub hook_give_up_seconds: u64,
+    /// Days that an upload is kept after it was last used; 0 for ever.
+    pub keep_uploads_days: u64,
+    /// Days that what a job made is kept after its end; 0 for as long as the job.
+    pub keep_outputs_days: u64,
+    /// Days that a job is kept after its end; 0 for ever.
+    pub keep_jobs_days: u64,
     /// Whether the server runs a worker of its own.
     pub embedded_worker: bool,
     /// Program of that worker.
@@ -129,6 +151,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
+            metrics_listen: None,
             access: Access::Open,
             allow_open_network: false,
             tls_certificate: None,
@@ -136,6 +159,8 @@ impl Default for Settings {
             tls_client_ca: None,
             data_dir: "guardsplat-data".into(),
             database: None,
+            artifacts: None,
+            signed_url_seconds: 0,
             max_artifact_bytes: 4 << 30,
             max_queued_jobs: 10_000,
             max_queued_jobs_per_project: 0,
@@ -143,11 +168,19 @@ impl Default for Settings {
             max_submissions_per_minute: 6_000,
             max_claims_per_minute: 6_000,
             max_calls_per_minute: 60_000,
+            max_priority: 10,
             max_job_memory_mebibytes: 0,
             lease_seconds: 30,
             max_attempts: 3,
             upload_timeout_seconds: 60,
             abandoned_after_seconds: 24 * 60 * 60,
+            hook_allow_http: false,
+            hook_allow_private: false,
+            hook_ca: None,
+            hook_give_up_seconds: 3 * 24 * 60 * 60,
+            keep_uploads_days: 0,
+            keep_outputs_days: 0,
+            keep_jobs_days: 0,
             embedded_worker: true,
             worker_binary: None,
             worker_device: WorkerDevice::Auto,

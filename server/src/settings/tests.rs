@@ -64,6 +64,7 @@ fn each_layer_overrides_the_one_before() {
 fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
+        ("metrics_listen", "127.0.0.1:9464"),
         ("access", "tokens"),
         ("allow_open_network", "true"),
         ("tls_certificate", "/c.pem"),
@@ -74,6 +75,8 @@ fn every_setting_can_be_set_everywhere() {
             "database",
             "postgres://somebody:5ec2e7@db.example/ledger?sslmode=verify-full",
         ),
+        ("artifacts", "s3://bucket/prefix"),
+        ("signed_url_seconds", "16"),
         ("max_artifact_bytes", "1000"),
         ("max_queued_jobs", "5"),
         ("max_queued_jobs_per_project", "11"),
@@ -81,11 +84,19 @@ fn every_setting_can_be_set_everywhere() {
         ("max_submissions_per_minute", "13"),
         ("max_claims_per_minute", "14"),
         ("max_calls_per_minute", "15"),
+        ("max_priority", "5"),
         ("max_job_memory_mebibytes", "2000"),
         ("lease_seconds", "6"),
         ("max_attempts", "7"),
         ("upload_timeout_seconds", "8"),
         ("abandoned_after_seconds", "9"),
+        ("hook_allow_http", "true"),
+        ("hook_allow_private", "true"),
+        ("hook_ca", "/hooks.pem"),
+        ("hook_give_up_seconds", "16"),
+        ("keep_uploads_days", "17"),
+        ("keep_outputs_days", "18"),
+        ("keep_jobs_days", "19"),
         ("embedded_worker", "false"),
         ("worker_binary", "/bin/worker"),
         ("worker_device", "wgpu"),
@@ -321,6 +332,23 @@ fn the_password_of_the_database_is_not_shown() {
     ] {
         let text = error(broken, &[], &[]);
         assert!(!text.contains("5ec2e7"), "{text}");
+    }
+}
+
+/// A URL of a store takes no credentials; one that has some is refused, and they are not repeated.
+#[test]
+fn credentials_in_the_url_of_the_store_are_not_shown() {
+    for url in ["s3://id:5ec2e7@bucket", "https://5ec2e7.example", "az://c?sig=5ec2e7"] {
+        for text in [
+            error(&format!("artifacts = \"{url}\""), &[], &[]),
+            error("", &[("GUARDSPLAT_ARTIFACTS", url)], &[]),
+            error("", &[], &["--artifacts", url]),
+        ] {
+            assert!(
+                text.starts_with("setting artifacts: ") && !text.contains("5ec2e7"),
+                "{text}"
+            );
+        }
     }
 }
 

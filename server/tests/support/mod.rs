@@ -1,5 +1,6 @@
 //! Starts the server's program on folders and ports of its own.
 pub mod postgres;
+pub mod s3;
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -106,7 +107,8 @@ impl Bench {
         }
     }
 
-    async fn start_as(&self, arguments: &[&str]) -> Server {
+    /// Starts a server with these arguments, which go before those that all have.
+    pub async fn start_as(&self, arguments: &[&str]) -> Server {
         let Server { mut child, .. } = self.begin(arguments);
         let mut line = String::new();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
@@ -188,6 +190,11 @@ pub struct Server {
 impl Server {
     pub fn address(&self) -> &str {
         &self.address
+    }
+
+    #[allow(dead_code)] // the tests of faults look at its memory
+    pub fn pid(&self) -> u32 {
+        self.child.id().unwrap()
     }
 
     pub async fn channel(&self) -> Channel {

@@ -144,6 +144,7 @@ async fn the_server_s_own_worker_is_let_in() {
     let mut request = Request::new(guardsplat_proto::v1::LeaseJobRequest {
         worker: "w".into(),
         wait: None,
+        ..guardsplat_proto::v1::LeaseJobRequest::default()
     });
     let header = format!("Bearer {token}").parse().unwrap();
     request.metadata_mut().insert("authorization", header);

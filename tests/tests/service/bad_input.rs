@@ -96,6 +96,7 @@ async fn wrong_calls_are_told_what_is_wrong() {
             page_size: 1,
             page_token,
             states,
+            ..ListJobsRequest::default()
         })
         .await
         .unwrap_err();
@@ -108,6 +109,7 @@ async fn wrong_calls_are_told_what_is_wrong() {
     let mut request = Request::new(LeaseJobRequest {
         worker: "hasty".into(),
         wait: Duration::from_secs(30).try_into().ok(),
+        ..LeaseJobRequest::default()
     });
     request.set_timeout(Duration::from_millis(200));
     let status = WorkerServiceClient::new(channel).lease_job(request).await.unwrap_err();

@@ -29,6 +29,8 @@ pub struct Lease {
     pub token: String,
     /// It ends when nothing was heard from the worker for so long.
     pub duration: Duration,
+    /// What the work is a part of, as `traceparent` has it; empty where nobody traces.
+    pub trace_parent: String,
 }
 
 /// Why an attempt ends that is not done.
@@ -79,6 +81,7 @@ impl Lease {
             job: job.name.clone(),
             token: answer.lease_token,
             duration,
+            trace_parent: answer.trace_parent,
         };
         Ok(Some((lease, job)))
     }

@@ -30,7 +30,11 @@ impl Offer {
         let shipped = Clip::shipped_hash().ok();
         Self {
             name,
-            device: device.chars().take(DEVICE_CHARACTERS).collect(),
+            device: device
+                .chars()
+                .filter(|c| !c.is_control())
+                .take(DEVICE_CHARACTERS)
+                .collect(),
             memory: Limits::of_machine(budget).memory,
             shipped,
         }

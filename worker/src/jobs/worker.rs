@@ -93,7 +93,12 @@ impl Worker {
     /// # Errors
     /// Only what the worker can't go on after.
     async fn attempt(&mut self, lease: &Lease, job: &Job) -> Result<()> {
-        tracing::info!(job = lease.job, attempt = job.attempt, "job begins");
+        tracing::info!(
+            job = lease.job,
+            attempt = job.attempt,
+            trace = lease.trace_parent,
+            "job begins"
+        );
         let folder = match self.folder.of_job() {
             Ok(folder) => folder,
             Err(error) => return self.fail(lease, error).await,

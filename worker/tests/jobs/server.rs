@@ -232,6 +232,13 @@ impl ArtifactService for Service {
         Err(Status::unimplemented("not for workers"))
     }
 
+    async fn get_download_url(
+        &self,
+        _: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        Err(Status::unimplemented("not for workers"))
+    }
+
     async fn get_artifact(&self, _: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         Err(Status::unimplemented("not for workers"))
     }
@@ -255,6 +262,7 @@ impl WorkerService for Service {
                     lease_token: token_of(&job.name),
                     lease_duration: Some(Duration::from_secs(2).try_into().unwrap()),
                     job: Some(job),
+                    ..LeaseJobResponse::default()
                 }));
             }
             if tokio::time::timeout_at(deadline, self.0.grew.notified()).await.is_err() {

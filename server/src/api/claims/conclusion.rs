@@ -54,9 +54,9 @@ impl Api {
         };
         let signed = guardsplat_evidence::sign(&report, self.notary().report_key())
             .map_err(|error| Error::internal("writing evidence", error))?;
-        let html = self.keep_output(job.id, token, "evidence.html", signed.html.into_bytes());
+        let html = self.keep_evidence(job.id, token, "evidence.html", signed.html.into_bytes());
         let html = html.await?;
-        let json = self.keep_output(job.id, token, "evidence.json", signed.json.into_bytes());
+        let json = self.keep_evidence(job.id, token, "evidence.json", signed.json.into_bytes());
         let json = json.await?;
         completion.outputs.extend([html, json]);
         let [evidence_html, evidence_json] = [html, json].map(|id| Kind::Artifact.name(id));

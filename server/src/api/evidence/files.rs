@@ -53,8 +53,8 @@ async fn input(api: &Api, field: &str, name: &str, role: Role) -> Result<Input> 
 }
 
 impl Api {
-    /// Stores what the server itself adds to the outputs of an attempt, under its lease.
-    pub(in crate::api) async fn keep_output(
+    /// Stores evidence, which the server itself adds to the outputs of an attempt, under its lease.
+    pub(in crate::api) async fn keep_evidence(
         &self,
         job: JobId,
         token: &str,
@@ -77,6 +77,7 @@ impl Api {
                 token: token.to_owned(),
             },
             secret: false,
+            evidence: true,
             path: path.to_string(),
         };
         self.ledger().create_artifact(new, clock::now()).await?;

@@ -18,7 +18,7 @@ fn up_to(mebibytes: u64) -> Limits {
 }
 
 /// A PLY of degree 0 whose Gaussians are all zero.
-fn ply(promised: usize, there: usize) -> Vec<u8> {
+pub fn ply(promised: usize, there: usize) -> Vec<u8> {
     let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
     let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {promised}\n");
     for name in names.split(' ') {
@@ -29,7 +29,7 @@ fn ply(promised: usize, there: usize) -> Vec<u8> {
     bytes
 }
 
-fn embed(scene: &str, key: &str) -> Job {
+pub fn embed(scene: &str, key: &str) -> Job {
     let spec = EmbedSpec {
         scene: scene.into(),
         key: key.into(),

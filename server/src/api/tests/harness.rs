@@ -32,6 +32,7 @@ use crate::artifacts::ArtifactStore;
 use crate::ledger::{Ledger, NewToken, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
+use crate::traces::Traces;
 
 pub const MAX_ARTIFACT_BYTES: u64 = 8 << 20;
 
@@ -77,10 +78,43 @@ impl Server {
 
     /// A server over a ledger that others may use too. The folder has the master key, and its artifacts.
     pub async fn over(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits, tokens: bool) -> Self {
+        Self::made_of(ledger, folder, limits, tokens, Traces::default()).await
+    }
+
+    /// One that sends traces.
+    pub async fn traced(limits: Limits, traces: Traces) -> Self {
+        let folder = TempDir::new().unwrap();
+        let ledger = SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap();
+        Self::made_of(Arc::new(ledger), folder, limits, false, traces).await
+    }
+
+    async fn made_of(ledger: Arc<dyn Ledger>, folder: TempDir, limits: Limits, tokens: bool, traces: Traces) -> Self {
         let store = ArtifactStore::open(&folder.path().join("artifacts"), MAX_ARTIFACT_BYTES).unwrap();
+        Self::begun(ledger, store, folder, limits, tokens, traces).await
+    }
+
+    /// A server over a store that others may use too.
+    pub async fn with_store(
+        ledger: Arc<dyn Ledger>,
+        store: ArtifactStore,
+        folder: TempDir,
+        limits: Limits,
+        tokens: bool,
+    ) -> Self {
+        Self::begun(ledger, store, folder, limits, tokens, Traces::default()).await
+    }
+
+    async fn begun(
+        ledger: Arc<dyn Ledger>,
+        store: ArtifactStore,
+        folder: TempDir,
+        limits: Limits,
+        tokens: bool,
+        traces: Traces,
+    ) -> Self {
         let master = secrets::load(KeySource::DataFolder, folder.path()).unwrap();
         let notary = Notary::open(ledger.as_ref(), &master, 0).await.unwrap();
-        let api = Api::new(ledger.clone(), store, master, notary, limits);
+        let api = Api::new(ledger.clone(), store, master, notary, limits).traced(traces);
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = format!("http://{}", listener.local_addr().unwrap());
         let (end, ended) = oneshot::channel();
@@ -91,7 +125,12 @@ impl Server {
         };
         let (_, health) = tonic_health::server::health_reporter();
         let routes = api.routes().unwrap().add_service(health);
-        let served = tokio::spawn(serve(routes, Door { guard, tls: None }, listener, shutdown));
+        let door = Door {
+            guard,
+            tls: None,
+            measured: api.measured(),
+        };
+        let served = tokio::spawn(serve(routes, door, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
         tokio::spawn(relay(api.clone()));
         let channel = Channel::from_shared(address).unwrap().connect_lazy();
@@ -114,9 +153,15 @@ impl Server {
 
     /// Another server with the same master key, and a folder of its own.
     pub async fn twin(&self, ledger: Arc<dyn Ledger>) -> Self {
+        let folder = self.folder_of_a_twin();
+        Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
+    }
+
+    /// A new folder with the same master key.
+    pub fn folder_of_a_twin(&self) -> TempDir {
         let folder = TempDir::new().unwrap();
         std::fs::copy(self.folder.path().join("master.key"), folder.path().join("master.key")).unwrap();
-        Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
+        folder
     }
 
     /// Stops in good order, and starts another server over the same folder.
@@ -205,6 +250,7 @@ impl Server {
         let request = LeaseJobRequest {
             worker: "test".into(),
             wait,
+            ..LeaseJobRequest::default()
         };
         self.worker.clone().lease_job(request).await.unwrap().into_inner()
     }

@@ -79,6 +79,7 @@ async fn what_a_killed_server_left_is_collected_by_the_next() {
             project: "default".into(),
         },
         secret: false,
+        evidence: false,
         path: path.to_string(),
     };
     ledger.create_artifact(new, clock::now()).await.unwrap();

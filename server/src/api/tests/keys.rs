@@ -5,7 +5,8 @@ use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::job::{Result as JobResult, Spec, State};
 use guardsplat_proto::v1::key::State as KeyState;
 use guardsplat_proto::v1::{
-    DownloadArtifactRequest, DownloadKeyRequest, GetArtifactRequest, GetKeyRequest, Job, Key, KeySpec, ListKeysRequest,
+    DownloadArtifactRequest, DownloadKeyRequest, GetArtifactRequest, GetDownloadUrlRequest, GetKeyRequest, Job, Key,
+    KeySpec, ListKeysRequest,
 };
 use tonic::{Code, Status};
 use uuid::Uuid;
@@ -104,6 +105,8 @@ async fn a_job_makes_a_key_that_later_jobs_read() {
         offset: 0,
     };
     assert_eq!(not_found(artifacts.download_artifact(request).await), name);
+    let request = GetDownloadUrlRequest { name: name.clone() };
+    assert_eq!(not_found(artifacts.get_download_url(request).await), name);
     let files = server.files();
     assert_eq!(files.len(), 1);
     for file in files {

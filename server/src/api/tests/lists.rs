@@ -11,6 +11,7 @@ async fn list(server: &Server, size: i32, token: &str, states: &[State]) -> Resu
         page_size: size,
         page_token: token.into(),
         states,
+        ..Default::default()
     };
     server
         .jobs

@@ -2,6 +2,7 @@
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::complete_job_request::Result as Output;
+use guardsplat_proto::v1::hook_service_client::HookServiceClient;
 use guardsplat_proto::v1::job::{Spec, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::registry_service_client::RegistryServiceClient;
@@ -29,6 +30,8 @@ struct Project {
     commitment: String,
     job: String,
     token_name: String,
+    hook: String,
+    delivery: String,
 }
 
 const SCENE: &[u8] = b"a scene";
@@ -39,6 +42,18 @@ impl Project {
         let channel = server.channel.clone();
         let mut jobs = JobServiceClient::new(channel.clone());
         let mut registry = RegistryServiceClient::new(channel.clone());
+        let mut hooks = HookServiceClient::new(channel.clone());
+        let hook = Hook {
+            url: "https://shop.example/hook".into(),
+            ..Hook::default()
+        };
+        let request = CreateHookRequest { hook: Some(hook) };
+        let hook = hooks
+            .create_hook(asking(&token, request))
+            .await
+            .unwrap()
+            .into_inner()
+            .hook;
         let upload = asking(
             &token,
             tokio_stream::iter(upload_messages(metadata("a.ply", SCENE), SCENE)),
@@ -53,6 +68,10 @@ impl Project {
             .unwrap()
             .into_inner();
         let key = server.finish_key(&made.name, 64, worker).await;
+        let told = hooks
+            .list_deliveries(asking(&token, ListDeliveriesRequest::default()))
+            .await;
+        let delivery = told.unwrap().into_inner().deliveries.remove(0).name;
         let owner = CreateOwnerRequest {
             owner: Some(Owner {
                 display_name: name.into(),
@@ -82,6 +101,8 @@ impl Project {
             commitment: asset.commitment,
             job,
             token_name: format!("tokens/{id}"),
+            hook: hook.unwrap().name,
+            delivery,
             token,
         }
     }
@@ -200,9 +221,12 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         }
         "GetJob" => named!(GetJobRequest, job),
         "CancelJob" => named!(CancelJobRequest, job),
+        "RequeueJob" => named!(RequeueJobRequest, job),
+        "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
         "DownloadArtifact" => named!(DownloadArtifactRequest, artifact, offset: 0),
+        "GetDownloadUrl" => named!(GetDownloadUrlRequest, artifact),
         "GetArtifact" => named!(GetArtifactRequest, artifact),
         "DeleteArtifact" => named!(DeleteArtifactRequest, artifact),
         "GetKey" => named!(GetKeyRequest, key),
@@ -238,7 +262,12 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListCommitments" | "GetHead" => Own(Vec::new(), own.commitment.clone()),
         "RevokeToken" => named!(RevokeTokenRequest, token_name),
         "ListTokens" => Own(Vec::new(), own.token_name.clone()),
-        "UploadArtifact" | "CreateOwner" | "CreateToken" | "GetPublicKey" => NamesNothing,
+        "GetHook" => named!(GetHookRequest, hook),
+        "DeleteHook" => named!(DeleteHookRequest, hook),
+        "ListHooks" => Own(Vec::new(), own.hook.clone()),
+        "ListDeliveries" => Own(Vec::new(), own.delivery.clone()),
+        "RedeliverDelivery" => named!(RedeliverDeliveryRequest, delivery),
+        "UploadArtifact" | "CreateOwner" | "CreateToken" | "CreateHook" | "GetPublicKey" => NamesNothing,
         _ => panic!("say what {path} does with what is another project's"),
     }
 }
@@ -275,6 +304,8 @@ async fn what_is_another_project_s_does_not_exist() {
                         &foreign_one.asset,
                         &foreign_one.commitment,
                         &foreign_one.token_name,
+                        &foreign_one.hook,
+                        &foreign_one.delivery,
                     ] {
                         assert!(!holds(&answer, theirs), "{path} tells of {theirs}");
                     }
@@ -307,7 +338,14 @@ async fn workers_read_what_running_jobs_need_and_nothing_else() {
             offset: 0,
         };
         let path = "/guardsplat.v1.ArtifactService/DownloadArtifact";
-        call(&server.channel, path, Some(&worker), request.encode_to_vec()).await
+        let bytes = call(&server.channel, path, Some(&worker), request.encode_to_vec()).await;
+        let request = GetDownloadUrlRequest {
+            name: studio.artifact.clone(),
+        };
+        let path = "/guardsplat.v1.ArtifactService/GetDownloadUrl";
+        let url = call(&server.channel, path, Some(&worker), request.encode_to_vec()).await;
+        assert_eq!(url.is_ok(), bytes.is_ok());
+        bytes
     };
     assert_eq!(not_found(download().await), studio.artifact);
     let (job, token) = server.take_as(&worker).await;
@@ -403,6 +441,7 @@ impl Server {
         let request = LeaseJobRequest {
             worker: "w".into(),
             wait: None,
+            ..LeaseJobRequest::default()
         };
         let lease = self
             .worker

@@ -95,6 +95,7 @@ async fn a_job_goes_its_way_through_two_servers() {
     let request = LeaseJobRequest {
         worker: "test".into(),
         wait: Some(prost_types::Duration { seconds: 30, nanos: 0 }),
+        ..LeaseJobRequest::default()
     };
     let mut worker = two.worker.clone();
     let waiting = tokio::spawn(async move { worker.lease_job(request).await });

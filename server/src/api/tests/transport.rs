@@ -59,6 +59,7 @@ async fn a_deadline_that_has_passed_leaves_the_server_well() {
     let mut request = tonic::Request::new(guardsplat_proto::v1::LeaseJobRequest {
         worker: "w".into(),
         wait,
+        ..guardsplat_proto::v1::LeaseJobRequest::default()
     });
     request.set_timeout(Duration::from_millis(100));
     let began = Instant::now();

@@ -224,6 +224,7 @@ async fn leasing_is_checked() {
             .lease_job(LeaseJobRequest {
                 worker: worker.into(),
                 wait,
+                ..LeaseJobRequest::default()
             })
             .await
     };
@@ -366,6 +367,7 @@ async fn a_stopping_server_gives_out_nothing_and_takes_everything() {
     let request = LeaseJobRequest {
         worker: "w".into(),
         wait: Some(prost_types::Duration { seconds: 30, nanos: 0 }),
+        ..LeaseJobRequest::default()
     };
     let waiting = tokio::spawn(async move { worker.lease_job(request).await });
     tokio::time::sleep(Duration::from_millis(100)).await;

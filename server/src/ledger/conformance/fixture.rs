@@ -4,8 +4,8 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use super::super::{
-    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, NewArtifact,
-    NewJob, Origin,
+    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, Needs,
+    NewArtifact, NewJob, Origin,
 };
 
 /// How long the leases of the tests are.
@@ -34,13 +34,27 @@ pub fn new_job() -> NewJob {
         inputs: Vec::new(),
         key: None,
         request_id: None,
+        asked_id: None,
         fingerprint: [7; 32],
         max_attempts: 3,
+        priority: 0,
+        needs: Needs::default(),
+        trace_parent: None,
     }
 }
 
 pub async fn queue(ledger: &dyn Ledger, now: i64) -> JobId {
     ledger.create_job(new_job(), now).await.expect("a job is queued").id
+}
+
+/// Queues a job of a project, with a priority.
+pub async fn queue_of(ledger: &dyn Ledger, project: &str, priority: i32, now: i64) -> JobId {
+    let new = NewJob {
+        project: project.into(),
+        priority,
+        ..new_job()
+    };
+    ledger.create_job(new, now).await.expect("a job is queued").id
 }
 
 pub async fn job(ledger: &dyn Ledger, id: JobId) -> JobRow {
@@ -82,6 +96,7 @@ pub fn new_artifact(origin: Origin, secret: bool) -> NewArtifact {
         sha256: "ab".repeat(32),
         origin,
         secret,
+        evidence: false,
         path,
     }
 }

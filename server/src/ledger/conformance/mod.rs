@@ -8,10 +8,14 @@ mod attempts;
 mod cancelling;
 mod fencing;
 pub(crate) mod fixture;
+mod hooks;
 pub mod model;
+mod operations;
 mod outputs;
 mod queue;
 mod registry;
+mod retention;
+pub mod speed;
 mod submission;
 
 use std::sync::Arc;
@@ -23,9 +27,12 @@ pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
+pub(crate) use hooks::*;
+pub(crate) use operations::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
 pub(crate) use registry::*;
+pub(crate) use retention::*;
 pub(crate) use submission::*;
 
 /// A place for one ledger, empty at first.
@@ -56,6 +63,13 @@ macro_rules! conformance_suite {
             states_select_jobs
             first_in_first_out
             positions_count_the_jobs_ahead
+            the_most_urgent_job_goes_first
+            projects_take_turns
+            nobody_waits_for_ever
+            positions_foresee_the_order
+            a_repeated_job_keeps_its_priority
+            a_job_goes_to_a_worker_that_can_hold_it
+            workers_are_seen_for_a_while
             many_claims_never_share_a_job
             the_fourth_claim_gets_nothing
             a_job_without_attempts_is_never_given_out
@@ -107,6 +121,26 @@ macro_rules! conformance_suite {
             a_request_is_of_a_project
             what_a_running_job_reads_is_known
             what_a_project_takes_is_counted
+            every_attempt_is_kept_with_its_end
+            the_newest_twenty_attempts_are_kept
+            a_failed_job_is_queued_once_more
+            what_is_queued_once_more_needs_its_inputs
+            jobs_are_counted_by_kind_state_and_reason
+            a_job_keeps_the_trace_it_is_a_part_of
+            a_hook_is_kept_listed_and_deleted
+            every_end_of_a_job_makes_one_delivery
+            a_hook_is_told_of_what_it_wants_only
+            a_delivery_is_sent_until_it_is_acknowledged
+            a_delivery_is_given_up_and_sent_again
+            a_delivery_that_was_lost_is_given_to_another
+            servers_never_share_a_delivery
+            deliveries_come_in_pages_and_are_forgotten
+            a_hook_may_go_while_its_jobs_end
+            nothing_goes_by_itself
+            uploads_go_when_they_were_not_used_for_long
+            jobs_go_with_what_they_made
+            paths_are_known_while_there_are_rows
+            nothing_referenced_goes_by_age
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(

@@ -1,19 +1,21 @@
 //! Random work against a ledger and a model of it that is simple enough to be seen right.
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use proptest::prelude::*;
 use uuid::Uuid;
 
-use super::super::{JobId, JobState, Ledger, NewJob, Result, retry::backoff};
+use super::super::queue::PATIENCE;
+use super::super::{JobId, JobState, Ledger, Needs, NewJob, Result, Taker, retry::backoff};
 use super::fixture::*;
 
 /// One thing that somebody does. Numbers choose among the jobs, requests and leases that there are.
 #[derive(Clone, Debug)]
 pub enum Step {
-    /// Queues a job, perhaps under a request id of a few, with one of two bodies.
-    Create(Option<u8>, bool),
-    /// Takes the next job.
-    Claim,
+    /// Queues a job, perhaps under a request id of a few, with one of two bodies, in a lane; it takes so much memory.
+    Create(Option<u8>, bool, Lane, Option<i64>),
+    /// Takes the next job that takes no more memory.
+    Claim(Option<i64>),
     /// Reports under any lease ever given out, with progress or without.
     Report(usize, Option<u8>),
     /// Completes under any lease, with one of two results.
@@ -25,23 +27,32 @@ pub enum Step {
     /// Cancels any job.
     Cancel(usize),
     /// Lets seconds pass.
-    Wait(u8),
+    Wait(u16),
     /// Ends leases that expired.
     Reap,
 }
 
+/// A project and a priority.
+type Lane = (&'static str, i32);
+
+const PROJECTS: [&str; 3] = [OURS, "other", "third"];
+
 /// Any sequence of steps.
 pub fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let lane = (proptest::sample::select(&PROJECTS[..]), -1..2_i32);
+    let memory = || proptest::option::of(0..3_i64);
     let step = prop_oneof![
-        4 => (proptest::option::of(0..4_u8), any::<bool>()).prop_map(|(request, body)| Step::Create(request, body)),
-        6 => Just(Step::Claim),
+        6 => (proptest::option::weighted(0.3, 0..4_u8), any::<bool>(), lane, memory())
+            .prop_map(|(request, body, lane, memory)| Step::Create(request, body, lane, memory)),
+        6 => memory().prop_map(Step::Claim),
         2 => (any::<usize>(), proptest::option::of(0..3_u8)).prop_map(|(lease, news)| Step::Report(lease, news)),
         2 => (any::<usize>(), 0..2_u8).prop_map(|(lease, said)| Step::Complete(lease, said)),
         3 => (any::<usize>(), prop::bool::weighted(0.8), prop::bool::weighted(0.2))
             .prop_map(|(lease, retryable, cancelled)| Step::Fail(lease, retryable, cancelled)),
         1 => any::<usize>().prop_map(Step::Release),
         2 => any::<usize>().prop_map(Step::Cancel),
-        4 => (0..40_u8).prop_map(Step::Wait),
+        4 => (0..40_u16).prop_map(Step::Wait),
+        1 => (500..700_u16).prop_map(Step::Wait),
         3 => Just(Step::Reap),
     ];
     proptest::collection::vec(step, 1..80)
@@ -51,13 +62,16 @@ pub fn steps() -> impl Strategy<Value = Vec<Step>> {
 #[derive(Clone, Debug, PartialEq)]
 struct Job {
     id: JobId,
-    request: Option<(u8, bool)>,
+    request: Option<(u8, bool, Lane)>,
+    lane: Lane,
+    memory: Option<i64>,
     state: JobState,
     cancel: bool,
     attempt: i32,
     progress: Option<u8>,
     run_after: Option<i64>,
     create_time: i64,
+    start_time: Option<i64>,
     revision: i64,
     /// Which lease completed it, and with what.
     completed: Option<(usize, u8)>,
@@ -117,8 +131,8 @@ impl Pair {
     async fn step(&mut self, step: &Step) {
         let now = self.now;
         match *step {
-            Step::Create(request, body) => self.create(request, body).await,
-            Step::Claim => self.claim().await,
+            Step::Create(request, body, lane, memory) => self.create(request, body, lane, memory).await,
+            Step::Claim(memory) => self.claim(memory).await,
             Step::Wait(seconds) => self.now += i64::from(seconds) * 1_000_000,
             Step::Reap => self.reap().await,
             Step::Cancel(choice) => self.cancel(choice).await,
@@ -206,12 +220,20 @@ impl Pair {
         }
     }
 
-    async fn create(&mut self, request: Option<u8>, body: bool) {
+    async fn create(&mut self, request: Option<u8>, body: bool, lane: Lane, memory: Option<i64>) {
+        let (project, priority) = lane;
         let request_id = request.map(|r| Uuid::from_u128(u128::from(r) + 1));
+        let asked = request.map(|r| (r, body, lane));
         let new = NewJob {
+            project: project.into(),
+            priority,
             request_id,
             spec: vec![u8::from(body)],
-            fingerprint: [u8::from(body); 32],
+            fingerprint: [u8::from(body) + 2 * (priority + 1) as u8; 32],
+            needs: Needs {
+                memory,
+                ..Needs::default()
+            },
             ..new_job()
         };
         let id = new.id;
@@ -219,21 +241,24 @@ impl Pair {
         let known = self
             .jobs
             .iter()
-            .find(|job| job.request.is_some_and(|(r, _)| Some(r) == request));
+            .find(|job| job.request.is_some_and(|(r, ..)| Some(r) == request));
         match known {
-            Some(job) if job.request == request.map(|r| (r, body)) => assert_eq!(made.unwrap().id, job.id),
+            Some(job) if job.request == asked => assert_eq!(made.unwrap().id, job.id),
             Some(_) => assert!(made.is_err()),
             None => {
                 assert_eq!(made.unwrap().id, id);
                 self.jobs.push(Job {
                     id,
-                    request: request.map(|r| (r, body)),
+                    request: asked,
+                    lane,
+                    memory,
                     state: JobState::Queued,
                     cancel: false,
                     attempt: 0,
                     progress: None,
                     run_after: None,
                     create_time: self.now,
+                    start_time: None,
                     revision: 1,
                     completed: None,
                     lease: None,
@@ -242,27 +267,71 @@ impl Pair {
         }
     }
 
-    async fn claim(&mut self) {
+    async fn claim(&mut self, memory: Option<i64>) {
         let (now, holder) = (self.now, self.leases.len());
-        let given = claim(&*self.ledger, now).await;
-        let ready =
-            |job: &&(usize, &mut Job)| job.1.state == JobState::Queued && job.1.run_after.is_none_or(|t| t <= now);
-        let next = self
-            .jobs
-            .iter_mut()
-            .enumerate()
-            .filter(|job| ready(&job))
-            .min_by_key(|(_, job)| job.place());
+        let taker = Taker {
+            memory,
+            ..Taker::of_anything("worker-1")
+        };
+        let given = self.ledger.claim_for(&taker, LEASE, now).await.unwrap();
+        let next = self.next(memory);
         assert_eq!(
             given.as_ref().map(|lease| lease.job.id),
-            next.as_ref().map(|(_, job)| job.id)
+            next.map(|place| self.jobs[place].id)
         );
-        if let (Some((place, job)), Some(lease)) = (next, given) {
+        if let (Some(place), Some(lease)) = (next, given) {
+            let job = &mut self.jobs[place];
             job.leave(JobState::Running, None);
-            (job.attempt, job.progress) = (job.attempt + 1, None);
+            (job.attempt, job.progress, job.start_time) = (job.attempt + 1, None, Some(now));
             job.lease = Some((holder, now + LEASE.as_micros() as i64));
             self.leases.push((place, lease.token));
         }
+    }
+
+    /// The place of the job that is next for a worker with so much memory: of each lane the first that can be given, of
+    /// the lanes those that are out of patience, then by priority, by what the project has running, by age.
+    fn next(&self, memory: Option<i64>) -> Option<usize> {
+        let late = self.now - PATIENCE.as_micros() as i64;
+        let fits = |job: &Job| memory.is_none() || job.memory.is_none() || job.memory <= memory;
+        let ready =
+            |job: &Job| job.state == JobState::Queued && job.run_after.is_none_or(|t| t <= self.now) && fits(job);
+        let mut heads: HashMap<Lane, usize> = HashMap::new();
+        for (place, job) in self.jobs.iter().enumerate().filter(|(_, job)| ready(job)) {
+            let head = heads.entry(job.lane).or_insert(place);
+            if job.place() < self.jobs[*head].place() {
+                *head = place;
+            }
+        }
+        heads.into_values().min_by_key(|&head| {
+            let job = &self.jobs[head];
+            let served = |other: &Job| other.lane == job.lane && other.start_time.is_some_and(|t| t > late);
+            let starved = job.place().0 <= late && !self.jobs.iter().any(served);
+            let rank = (-job.lane.1, self.running(job.lane.0));
+            (!starved, if starved { (0, 0) } else { rank }, job.place())
+        })
+    }
+
+    fn running(&self, project: &str) -> usize {
+        let running = |job: &&Job| job.state == JobState::Running && job.lane.0 == project;
+        self.jobs.iter().filter(running).count()
+    }
+
+    /// The queue as it would be given out, were nothing to come back or to be added: one after the other by the rule.
+    fn foreseen(&self) -> Vec<JobId> {
+        let mut waiting: Vec<&Job> = self.jobs.iter().filter(|job| job.state == JobState::Queued).collect();
+        let mut running: HashMap<_, _> = PROJECTS.map(|project| (project, self.running(project))).into();
+        let mut order = Vec::new();
+        while let Some((at, job)) = waiting
+            .iter()
+            .copied()
+            .enumerate()
+            .min_by_key(|(_, job)| (-job.lane.1, running[job.lane.0], job.place()))
+        {
+            *running.get_mut(job.lane.0).unwrap() += 1;
+            order.push(job.id);
+            waiting.remove(at);
+        }
+        order
     }
 
     async fn reap(&mut self) {
@@ -295,17 +364,24 @@ impl Pair {
 
     /// Everything that can be seen, in the model and in the ledger.
     async fn compare(&self, step: &Step) {
-        let mut rows = self.ledger.list_jobs(OURS, &[], None, 1000).await.unwrap();
+        let mut rows = Vec::new();
+        for project in PROJECTS {
+            rows.extend(self.ledger.list_jobs(project, &[], None, 1000).await.unwrap());
+        }
+        let queue = self.foreseen();
+        assert_eq!(self.ledger.queue().await.unwrap(), queue, "after {step:?}");
+        // One job alone is counted in another way.
+        let middle = queue.len() / 2;
+        if let Some(id) = queue.get(middle) {
+            let alone = job(&*self.ledger, *id).await.queue_position;
+            assert_eq!(alone, Some(middle as i64), "after {step:?}");
+        }
         let mut jobs = self.jobs.clone();
         rows.sort_by_key(|row| row.id);
         jobs.sort_by_key(|job| job.id);
         assert_eq!(rows.len(), jobs.len(), "after {step:?}");
         for (row, job) in rows.iter().zip(&jobs) {
-            let ahead = jobs
-                .iter()
-                .filter(|other| other.state == JobState::Queued && other.place() < job.place())
-                .count();
-            let position = (job.state == JobState::Queued).then_some(ahead as i64);
+            let position = queue.iter().position(|id| *id == job.id).map(|ahead| ahead as i64);
             assert_eq!(
                 (
                     row.id,
@@ -328,6 +404,7 @@ impl Pair {
                 "after {step:?}"
             );
             assert_eq!(row.queue_position, position, "after {step:?}");
+            assert_eq!((row.project.as_str(), row.priority), job.lane, "after {step:?}");
             assert_eq!(row.end_time.is_some(), job.state.is_over(), "after {step:?}");
         }
     }

@@ -26,7 +26,7 @@ fn new_owner() -> NewOwner {
     }
 }
 
-fn new_asset(owner: OwnerId, key: KeyId) -> NewAsset {
+pub(super) fn new_asset(owner: OwnerId, key: KeyId) -> NewAsset {
     let id = Uuid::now_v7();
     NewAsset {
         project: OURS.into(),
@@ -43,7 +43,7 @@ fn new_asset(owner: OwnerId, key: KeyId) -> NewAsset {
     }
 }
 
-async fn register(ledger: &dyn Ledger, new: NewAsset, now: i64) -> AssetRow {
+pub(super) async fn register(ledger: &dyn Ledger, new: NewAsset, now: i64) -> AssetRow {
     ledger
         .create_asset(new, signer(), now)
         .await
@@ -51,7 +51,7 @@ async fn register(ledger: &dyn Ledger, new: NewAsset, now: i64) -> AssetRow {
 }
 
 /// An owner and a key.
-async fn owner_and_key(ledger: &dyn Ledger) -> (OwnerId, KeyId) {
+pub(super) async fn owner_and_key(ledger: &dyn Ledger) -> (OwnerId, KeyId) {
     let owner = ledger.create_owner(new_owner(), at(0)).await.unwrap().id;
     (owner, make_key(ledger, at(0)).await.1.id)
 }

@@ -3,7 +3,7 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use super::super::{JobKind, JobRow, JobState, LedgerError, NewJob};
+use super::super::{JobKind, JobRow, JobState, LedgerError, Needs, NewJob};
 use super::Factory;
 use super::fixture::*;
 
@@ -15,6 +15,12 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         kind: JobKind::Verify,
         spec: vec![0, 255, 128],
         inputs: vec![input, input],
+        priority: -10,
+        needs: Needs {
+            memory: Some(1),
+            likely_memory: Some(i64::MAX),
+            clip: Some("ab".repeat(32)),
+        },
         ..new_job()
     };
     let made = ledger.create_job(new.clone(), at(1)).await.unwrap();
@@ -24,6 +30,8 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         display_name: new.display_name,
         kind: JobKind::Verify,
         spec: new.spec,
+        priority: -10,
+        needs: new.needs,
         state: JobState::Queued,
         cancel_requested: false,
         attempt: 0,
@@ -37,6 +45,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         end_time: None,
         run_after: None,
         revision: 1,
+        trace_parent: None,
         queue_position: Some(0),
     };
     assert_eq!(made, expected);

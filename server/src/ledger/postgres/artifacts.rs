@@ -18,7 +18,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -
     };
     let row = sqlx::query(
         "INSERT INTO artifacts (id, display_name, size, sha256, job_id, lease_token, secret, path, state, create_time, \
-         update_time, project) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, 1, $9, $9, $10) RETURNING *",
+         update_time, project, evidence) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, 1, $9, $9, $10, $11) RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -30,6 +30,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -
     .bind(&new.path)
     .bind(now)
     .bind(project)
+    .bind(new.evidence)
     .fetch_one(db)
     .await?;
     rows::artifact(&row)

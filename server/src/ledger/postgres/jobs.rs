@@ -1,7 +1,6 @@
 //! Jobs as their owners see them: made, looked at, listed, cancelled.
 use std::collections::{HashMap, HashSet};
 
-use futures::TryStreamExt;
 use sqlx::postgres::PgRow;
 use sqlx::{Connection, PgConnection, Row};
 use uuid::Uuid;
@@ -9,13 +8,25 @@ use uuid::Uuid;
 use super::super::transition::{self, Cancel, Next};
 use super::super::types::{ArtifactId, JobId, JobRow, JobState, NewJob};
 use super::super::{LedgerError, Result, again};
-use super::rows;
 use super::transition::leave;
+use super::{queue, rows};
 
-/// A job and the queued jobs before it.
-pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
-    SELECT count(*) FROM jobs q WHERE q.state = 1 AND (q.queue_time, q.id) < (j.queue_time, j.id)\
-    ) END AS queue_position FROM jobs j WHERE j.id = $1";
+/// A job and the queued jobs before it. Of each project there are `urgent` jobs in lanes of higher priorities, `same` in
+/// the lane of the job's own, and `older` in front of the job's place among these. A job's `turn` is how many jobs its
+/// project has running, or will have by then: of one priority jobs of lower turns go first, and of one turn the oldest.
+pub(super) const GET: &str = "WITH \
+    job AS (SELECT * FROM jobs WHERE id = $1), \
+    side AS MATERIALIZED (SELECT q.project, count(*) FILTER (WHERE q.priority > j.priority) AS urgent, \
+        count(*) FILTER (WHERE q.priority = j.priority) AS same, \
+        count(*) FILTER (WHERE q.priority = j.priority AND (q.queue_time, q.id) < (j.queue_time, j.id)) AS older \
+        FROM job j CROSS JOIN jobs q WHERE j.state = 1 AND q.state = 1 AND q.priority >= j.priority GROUP BY q.project), \
+    running AS MATERIALIZED (SELECT project, count(*) AS jobs FROM jobs WHERE state = 2 GROUP BY project), \
+    turns AS MATERIALIZED (SELECT side.*, urgent + coalesce(running.jobs, 0) AS first \
+        FROM side LEFT JOIN running USING (project)) \
+    SELECT j.*, (SELECT sum(urgent + greatest(0, least(same, own.turn - first)) \
+        + CASE WHEN own.turn >= first AND own.turn - first < older THEN 1 ELSE 0 END)::bigint \
+        FROM turns, (SELECT first + older AS turn FROM turns WHERE project = (SELECT project FROM job)) AS own \
+        ) AS queue_position FROM job j";
 
 /// A page of a project's jobs.
 pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = $4 AND (create_time, id) < ($1, $2) \
@@ -25,9 +36,6 @@ pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = $4 AND (create
 pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs \
     WHERE project = $4 AND state = $5 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
-
-/// The whole queue in its order.
-pub(super) const QUEUE: &str = "SELECT id FROM jobs WHERE state = 1 ORDER BY queue_time, id";
 
 pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Result<JobRow> {
     if let Some(there) = made_before(db, new).await? {
@@ -45,8 +53,8 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10) ON CONFLICT (request_id) DO NOTHING RETURNING *",
+         create_time, update_time, queue_time, project, priority, memory, likely_memory, clip, trace_parent, asked_id) \
+         VALUES ($1, $2, $3, $4, $5, $6, $7, 1, $8, $9, $9, $9, $10, $11, $12, $13, $14, $15, $16) ON CONFLICT (request_id) DO NOTHING RETURNING *",
     )
     .bind(new.id)
     .bind(&new.display_name)
@@ -58,6 +66,12 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewJob, now: i64) -> Res
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(new.priority)
+    .bind(new.needs.memory)
+    .bind(new.needs.likely_memory)
+    .bind(&new.needs.clip)
+    .bind(&new.trace_parent)
+    .bind(new.asked_id)
     .fetch_optional(&mut *db)
     .await?;
     let Some(row) = row else {
@@ -84,7 +98,7 @@ async fn made_before(db: &mut PgConnection, new: &NewJob) -> Result<Option<JobRo
 }
 
 /// Sees that all inputs are visible and the project's, and holds them: they can't be deleted before this job is there to need them.
-async fn inputs_are_there(db: &mut PgConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
+pub(super) async fn inputs_are_there(db: &mut PgConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
     let held = sqlx::query_scalar(
         "SELECT id FROM artifacts WHERE id = ANY($1) AND project = $2 AND state = 3 AND NOT secret \
          ORDER BY id FOR SHARE",
@@ -158,13 +172,8 @@ pub(super) async fn list(
 
 /// The whole queue, walked once: counting for each job of a page would walk it for each.
 async fn positions(db: &mut PgConnection) -> Result<HashMap<JobId, i64>> {
-    let mut queue = sqlx::query(QUEUE).fetch(db);
-    let mut positions = HashMap::new();
-    while let Some(row) = queue.try_next().await? {
-        let ahead = positions.len() as i64;
-        positions.insert(row.try_get("id")?, ahead);
-    }
-    Ok(positions)
+    let queue = queue::all(db).await?;
+    Ok((0..).zip(queue).map(|(ahead, id)| (id, ahead)).collect())
 }
 
 pub(super) async fn cancel(db: &mut PgConnection, id: JobId, now: i64) -> Result<JobRow> {
@@ -181,6 +190,11 @@ pub(super) async fn cancel(db: &mut PgConnection, id: JobId, now: i64) -> Result
             rows::job(&asked.bind(id).bind(now).fetch_one(db).await?)
         }
     }
+}
+
+pub(super) async fn peek(db: &mut PgConnection, id: JobId) -> Result<Option<JobRow>> {
+    let row = sqlx::query("SELECT * FROM jobs WHERE id = $1").bind(id);
+    row.fetch_optional(db).await?.as_ref().map(rows::job).transpose()
 }
 
 /// A job that nobody else changes until the transaction ends.

@@ -6,49 +6,10 @@ use sqlx::postgres::PgRow;
 use sqlx::{PgConnection, Row};
 
 use super::super::transition::{Next, after_attempt, after_release, end_of};
-use super::super::types::{Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
-use super::super::{LedgerError, Result, token};
+use super::super::types::{Completion, Failure, JobId, JobRow};
+use super::super::{LedgerError, Result};
 use super::transition::leave;
 use super::{artifacts, jobs, keys, rows};
-
-/// One statement takes the first job of the queue that nobody else is taking, and either counts an attempt and leases
-/// it, or fails it because no attempt is left. So a job that kills its worker is bounded even if nobody lives to tell.
-pub(super) const CLAIM: &str = "WITH next AS MATERIALIZED (\
-        SELECT id AS next_id, attempt < max_attempts AS may FROM jobs \
-        WHERE state = 1 AND (run_after IS NULL OR run_after <= $4) \
-        ORDER BY queue_time, id LIMIT 1 FOR UPDATE SKIP LOCKED) \
-    UPDATE jobs SET \
-    state = CASE WHEN may THEN 2 ELSE 4 END, \
-    worker = CASE WHEN may THEN $1 END, \
-    lease_token = CASE WHEN may THEN $2 END, \
-    lease_expires = CASE WHEN may THEN $3 END, \
-    start_time = CASE WHEN may THEN $4 ELSE start_time END, \
-    end_time = CASE WHEN may THEN NULL ELSE $4 END, \
-    progress = CASE WHEN may THEN NULL ELSE progress END, \
-    failure_reason = CASE WHEN may THEN NULL ELSE $5 END, \
-    failure_message = CASE WHEN may THEN NULL ELSE 'no attempt is left' || coalesce('; ' || failure_message, '') END, \
-    attempt = attempt + CASE WHEN may THEN 1 ELSE 0 END, \
-    run_after = NULL, update_time = $4, revision = revision + 1 \
-    FROM next WHERE id = next_id RETURNING *";
-
-pub(super) async fn claim(db: &mut PgConnection, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
-    let token = token::fresh();
-    loop {
-        let row = sqlx::query(CLAIM)
-            .bind(worker)
-            .bind(token::hash(&token))
-            .bind(end_of(lease, now))
-            .bind(now)
-            .bind(REASON_ATTEMPTS_EXHAUSTED)
-            .fetch_optional(&mut *db)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = rows::job(&row)?;
-        if job.state == JobState::Running {
-            return Ok(Some(Lease { job, token }));
-        }
-    }
-}
 
 /// The job, if the token with this hash is its lease.
 pub(super) async fn leased(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {

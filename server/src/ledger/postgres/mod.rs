@@ -6,13 +6,17 @@ mod access;
 mod artifacts;
 mod commitments;
 mod database;
+mod hooks;
 mod jobs;
 mod keys;
 mod leases;
 mod notices;
 mod open;
+mod operations;
 mod presence;
+mod queue;
 mod registry;
+mod retention;
 mod rows;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -33,7 +37,7 @@ use super::registry::{
     SealedSigningKey,
 };
 use super::types::{
-    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
+    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, NewArtifact, NewJob,
 };
 use super::{Elsewhere, Ledger, Result, token};
 use database::Database;
@@ -122,13 +126,6 @@ impl Ledger for PostgresLedger {
 
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
         self.database.change(with!([] db => jobs::cancel(db, id, now))).await
-    }
-
-    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
-        let worker = worker.to_owned();
-        self.database
-            .change(with!([worker] db => leases::claim(db, &worker, lease, now)))
-            .await
     }
 
     async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {

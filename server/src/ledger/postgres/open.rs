@@ -181,5 +181,17 @@ pub(super) fn steps() -> Vec<Migration> {
             "projects",
             include_str!("../../../migrations/postgres/0003_projects.sql"),
         ),
+        step(
+            4,
+            "retention",
+            include_str!("../../../migrations/postgres/0004_retention.sql"),
+        ),
+        step(5, "hooks", include_str!("../../../migrations/postgres/0005_hooks.sql")),
+        step(
+            6,
+            "operations",
+            include_str!("../../../migrations/postgres/0006_operations.sql"),
+        ),
+        step(7, "queue", include_str!("../../../migrations/postgres/0007_queue.sql")),
     ]
 }

@@ -130,6 +130,11 @@ pub(super) async fn create_asset(
         .fetch_optional(&mut *db)
         .await?;
     let asset = chain::numbered(new, &key, last.unwrap_or(0), now)?;
+    // The original does not go by age before the asset is there to name it; it may be gone all the same.
+    sqlx::query("SELECT 1 FROM artifacts WHERE id = $1 FOR SHARE")
+        .bind(asset.artifact)
+        .fetch_optional(&mut *db)
+        .await?;
     insert(db, &asset, &new.sealed_nonce, new.request_id).await?;
     commitments::append(db, &asset, new.nonce_hash, signer).await?;
     Ok(asset)

@@ -1,10 +1,11 @@
-//! Moves a job that leaves the queue or its worker: the one place where a row ends or is queued again.
+//! Moves a job that leaves the queue or its worker: the one place where a row ends or is queued again, but
+//! for jobs that a claim finds without attempts. Hooks that want to know hear of the end in the same transaction.
 use sqlx::PgConnection;
 
 use super::super::Result;
 use super::super::transition::{Left, Next};
 use super::super::types::{JobId, JobRow};
-use super::rows;
+use super::{hooks, rows};
 
 /// Moves a job, ending its lease. The caller has locked the row and checked that it may.
 pub(super) async fn leave(db: &mut PgConnection, id: JobId, next: Next, now: i64) -> Result<JobRow> {
@@ -32,7 +33,11 @@ pub(super) async fn leave(db: &mut PgConnection, id: JobId, next: Next, now: i64
     .bind(uncounted)
     .bind(end_time)
     .bind(now)
-    .fetch_one(db)
+    .fetch_one(&mut *db)
     .await?;
-    rows::job(&row)
+    let job = rows::job(&row)?;
+    if job.state.is_over() {
+        hooks::announce(db, &job, now).await?;
+    }
+    Ok(job)
 }

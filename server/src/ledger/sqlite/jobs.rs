@@ -1,7 +1,6 @@
 //! Jobs as their owners see them: made, looked at, listed, cancelled.
 use std::collections::HashMap;
 
-use futures::TryStreamExt;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
@@ -9,13 +8,24 @@ use uuid::Uuid;
 use super::super::transition::{self, Cancel, Next};
 use super::super::types::{ArtifactId, JobId, JobRow, JobState, NewJob};
 use super::super::{LedgerError, Result, again};
-use super::rows;
 use super::transition::leave;
+use super::{queue, rows};
 
-/// A job and the queued jobs before it.
-pub(super) const GET: &str = "SELECT j.*, CASE j.state WHEN 1 THEN (\
-    SELECT count(*) FROM jobs q INDEXED BY jobs_queue WHERE q.state = 1 AND (q.queue_time, q.id) < (j.queue_time, j.id)\
-    ) END AS queue_position FROM jobs j WHERE j.id = ?1";
+/// Queued jobs before the one with a project, a priority, a time and an id. Of each project there are `urgent` jobs in
+/// lanes of higher priorities, `same` in the lane of the job's priority, and `older` in front of the job's place among
+/// these. A job's `turn` is how many jobs its project has running, or will have by then: of one priority jobs of lower
+/// turns go first, and of one turn the oldest.
+pub(super) const POSITION: &str = "WITH \
+    side AS (SELECT project, sum(priority > ?2) AS urgent, sum(priority = ?2) AS same, \
+        sum(priority = ?2 AND (queue_time, id) < (?3, ?4)) AS older \
+        FROM jobs INDEXED BY jobs_queue WHERE state = 1 AND priority >= ?2 GROUP BY project), \
+    running AS MATERIALIZED (SELECT project, count(*) AS jobs FROM jobs INDEXED BY jobs_leases WHERE state = 2 \
+        GROUP BY project), \
+    turns AS MATERIALIZED (SELECT side.*, urgent + coalesce(running.jobs, 0) AS first \
+        FROM side LEFT JOIN running ON running.project = side.project), \
+    own AS MATERIALIZED (SELECT first + older AS turn FROM turns WHERE project = ?1) \
+    SELECT sum(urgent + max(0, min(same, own.turn - first)) + (own.turn >= first AND own.turn - first < older)) \
+    FROM own CROSS JOIN turns";
 
 /// A page of a project's jobs.
 pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = ?4 AND (create_time, id) < (?1, ?2) ORDER BY create_time DESC, id DESC LIMIT ?3";
@@ -24,9 +34,6 @@ pub(super) const PAGE: &str = "SELECT * FROM jobs WHERE project = ?4 AND (create
 pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs WHERE project = ?4 AND state = ?5 AND (create_time, id) < (?1, ?2) \
     ORDER BY create_time DESC, id DESC LIMIT ?3";
 
-/// The whole queue in its order.
-pub(super) const QUEUE: &str = "SELECT id FROM jobs INDEXED BY jobs_queue WHERE state = 1 ORDER BY queue_time, id";
-
 pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> Result<JobRow> {
     if let Some(request) = new.request_id
         && let Some(row) = by_request(db, request).await?
@@ -34,16 +41,7 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
         let fingerprint: Vec<u8> = row.try_get("fingerprint")?;
         return again::job(request, rows::job(&row)?, &fingerprint, &new);
     }
-    for input in &new.inputs {
-        let visible =
-            sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0 AND project = ?2")
-                .bind(input.as_bytes().as_slice())
-                .bind(&new.project);
-        visible
-            .fetch_optional(&mut *db)
-            .await?
-            .ok_or_else(|| LedgerError::no_artifact(*input))?;
-    }
+    inputs_are_there(db, &new.project, &new.inputs).await?;
     if let Some(key) = new.key {
         let there = sqlx::query("SELECT 1 FROM keys WHERE id = ?1 AND project = ?2")
             .bind(key.as_bytes().as_slice())
@@ -55,8 +53,8 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     }
     let row = sqlx::query(
         "INSERT INTO jobs (id, display_name, kind, spec, key_id, request_id, fingerprint, state, max_attempts, \
-         create_time, update_time, queue_time, project) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10) RETURNING *",
+         create_time, update_time, queue_time, project, priority, memory, likely_memory, clip, trace_parent, asked_id) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 1, ?8, ?9, ?9, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16) RETURNING *",
     )
     .bind(new.id.as_bytes().as_slice())
     .bind(&new.display_name)
@@ -68,6 +66,12 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     .bind(new.max_attempts)
     .bind(now)
     .bind(&new.project)
+    .bind(new.priority)
+    .bind(new.needs.memory)
+    .bind(new.needs.likely_memory)
+    .bind(&new.needs.clip)
+    .bind(&new.trace_parent)
+    .bind(new.asked_id.as_ref().map(|id| id.as_bytes().as_slice()))
     .fetch_one(&mut *db)
     .await?;
     for input in &new.inputs {
@@ -81,6 +85,21 @@ pub(super) async fn create(db: &mut SqliteConnection, new: NewJob, now: i64) -> 
     rows::job(&row)
 }
 
+/// Sees that all inputs are visible and the project's.
+pub(super) async fn inputs_are_there(db: &mut SqliteConnection, project: &str, inputs: &[ArtifactId]) -> Result<()> {
+    for input in inputs {
+        let visible =
+            sqlx::query("SELECT 1 FROM artifacts WHERE id = ?1 AND state = 3 AND secret = 0 AND project = ?2")
+                .bind(input.as_bytes().as_slice())
+                .bind(project);
+        visible
+            .fetch_optional(&mut *db)
+            .await?
+            .ok_or_else(|| LedgerError::no_artifact(*input))?;
+    }
+    Ok(())
+}
+
 pub(super) async fn find_request(db: &mut SqliteConnection, request: Uuid) -> Result<Option<JobRow>> {
     by_request(db, request).await?.as_ref().map(rows::job).transpose()
 }
@@ -91,17 +110,21 @@ async fn by_request(db: &mut SqliteConnection, request: Uuid) -> Result<Option<S
 }
 
 pub(super) async fn get(db: &mut SqliteConnection, id: JobId) -> Result<Option<JobRow>> {
-    let row = sqlx::query(GET)
-        .bind(id.as_bytes().as_slice())
-        .fetch_optional(db)
-        .await?;
-    row.map(|row| {
-        Ok(JobRow {
-            queue_position: row.try_get("queue_position")?,
-            ..rows::job(&row)?
-        })
-    })
-    .transpose()
+    let Some(row) = by_id(db, id).await? else {
+        return Ok(None);
+    };
+    let mut job = rows::job(&row)?;
+    if job.state == JobState::Queued {
+        // One that leaves the queue in between has none any more.
+        job.queue_position = sqlx::query_scalar(POSITION)
+            .bind(&job.project)
+            .bind(job.priority)
+            .bind(row.try_get::<i64, _>("queue_time")?)
+            .bind(id.as_bytes().as_slice())
+            .fetch_one(db)
+            .await?;
+    }
+    Ok(Some(job))
 }
 
 /// Must run in a transaction, so that pages of several states fit together.
@@ -156,13 +179,8 @@ pub(super) async fn list(
 
 /// The whole queue, walked once: counting for each job of a page would walk it for each.
 async fn positions(db: &mut SqliteConnection) -> Result<HashMap<JobId, i64>> {
-    let mut queue = sqlx::query(QUEUE).fetch(db);
-    let mut positions = HashMap::new();
-    while let Some(row) = queue.try_next().await? {
-        let ahead = positions.len() as i64;
-        positions.insert(rows::id(&row, "id")?, ahead);
-    }
-    Ok(positions)
+    let queue = queue::all(db).await?;
+    Ok((0..).zip(queue).map(|(ahead, id)| (id, ahead)).collect())
 }
 
 pub(super) async fn cancel(db: &mut SqliteConnection, id: JobId, now: i64) -> Result<JobRow> {

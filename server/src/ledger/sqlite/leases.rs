@@ -4,53 +4,10 @@ use std::time::Duration;
 use sqlx::{Row, SqliteConnection};
 
 use super::super::transition::{Next, after_attempt, after_loss, after_release, end_of};
-use super::super::types::{Completion, Failure, JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
-use super::super::{LedgerError, Result, token};
+use super::super::types::{Completion, Failure, JobId, JobRow};
+use super::super::{LedgerError, Result};
 use super::transition::leave;
 use super::{artifacts, jobs, keys, rows};
-
-/// One statement takes the first job of the queue, and either counts an attempt and leases it, or fails it because no
-/// attempt is left. So a job that kills its worker is bounded even if nobody lives to tell. Left alone,
-/// the planner would read all queued jobs by another index and sort them; hence `INDEXED BY`.
-pub(super) const CLAIM: &str = "UPDATE jobs SET \
-    state = iif(attempt < max_attempts, 2, 4), \
-    worker = iif(attempt < max_attempts, ?1, NULL), \
-    lease_token = iif(attempt < max_attempts, ?2, NULL), \
-    lease_expires = iif(attempt < max_attempts, ?3, NULL), \
-    start_time = iif(attempt < max_attempts, ?4, start_time), \
-    end_time = iif(attempt < max_attempts, NULL, ?4), \
-    progress = iif(attempt < max_attempts, NULL, progress), \
-    failure_reason = iif(attempt < max_attempts, NULL, ?5), \
-    failure_message = iif(attempt < max_attempts, NULL, 'no attempt is left' || coalesce('; ' || failure_message, '')), \
-    attempt = attempt + iif(attempt < max_attempts, 1, 0), \
-    run_after = NULL, update_time = ?4, revision = revision + 1 \
-    WHERE id = (SELECT id FROM jobs INDEXED BY jobs_queue WHERE state = 1 AND (run_after IS NULL OR run_after <= ?4) \
-        ORDER BY queue_time, id LIMIT 1) \
-    RETURNING *";
-
-pub(super) async fn claim(
-    db: &mut SqliteConnection,
-    worker: String,
-    lease: Duration,
-    now: i64,
-) -> Result<Option<Lease>> {
-    let token = token::fresh();
-    loop {
-        let row = sqlx::query(CLAIM)
-            .bind(&worker)
-            .bind(token::hash(&token))
-            .bind(end_of(lease, now))
-            .bind(now)
-            .bind(REASON_ATTEMPTS_EXHAUSTED)
-            .fetch_optional(&mut *db)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let job = rows::job(&row)?;
-        if job.state == JobState::Running {
-            return Ok(Some(Lease { job, token }));
-        }
-    }
-}
 
 /// The job, if the token with this hash is its lease.
 pub(super) async fn leased(db: &mut SqliteConnection, id: JobId, token: &[u8]) -> Result<JobRow> {

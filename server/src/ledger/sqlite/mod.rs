@@ -2,11 +2,16 @@
 mod access;
 mod artifacts;
 mod commitments;
+pub mod copy;
+mod hooks;
 mod jobs;
 mod keys;
 mod leases;
 mod open;
+mod operations;
+mod queue;
 mod registry;
+mod retention;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -27,7 +32,7 @@ use super::registry::{
     SealedSigningKey,
 };
 use super::types::{
-    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, Lease, NewArtifact, NewJob,
+    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, NewArtifact, NewJob,
 };
 use super::{Elsewhere, Ledger, LedgerError, Result, token};
 use writer::Writer;
@@ -86,13 +91,6 @@ impl Ledger for SqliteLedger {
 
     async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
         self.writer.run(move |db| Box::pin(jobs::cancel(db, id, now))).await
-    }
-
-    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
-        let worker = worker.to_owned();
-        self.writer
-            .run(move |db| Box::pin(leases::claim(db, worker, lease, now)))
-            .await
     }
 
     async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {

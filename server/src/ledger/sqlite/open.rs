@@ -9,7 +9,7 @@ use sqlx::{Connection, SqlSafeStr, SqliteConnection, SqlitePool};
 use super::super::Result;
 
 /// How long a connection waits for another process (a backup, a person with a shell) to let go of the file.
-const BUSY: Duration = Duration::from_secs(10);
+pub(super) const BUSY: Duration = Duration::from_secs(10);
 
 /// Connections that only read.
 const READERS: u32 = 4;
@@ -72,5 +72,17 @@ fn migrator() -> Migrator {
             "projects",
             include_str!("../../../migrations/sqlite/0005_projects.sql"),
         ),
+        step(
+            6,
+            "retention",
+            include_str!("../../../migrations/sqlite/0006_retention.sql"),
+        ),
+        step(7, "hooks", include_str!("../../../migrations/sqlite/0007_hooks.sql")),
+        step(
+            8,
+            "operations",
+            include_str!("../../../migrations/sqlite/0008_operations.sql"),
+        ),
+        step(9, "queue", include_str!("../../../migrations/sqlite/0009_queue.sql")),
     ])
 }

@@ -3,6 +3,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use uuid::Uuid;
 
+use super::super::queue::{Needs, SeenWorker};
 use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
 use super::super::{Result, numbers};
 
@@ -15,6 +16,12 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
         display_name: row.try_get("display_name")?,
         kind: numbers::job_kind(row.try_get("kind")?)?,
         spec: row.try_get("spec")?,
+        priority: row.try_get("priority")?,
+        needs: Needs {
+            memory: row.try_get("memory")?,
+            likely_memory: row.try_get("likely_memory")?,
+            clip: row.try_get("clip")?,
+        },
         state: numbers::job_state(row.try_get("state")?)?,
         cancel_requested: row.try_get("cancel_requested")?,
         attempt: row.try_get("attempt")?,
@@ -28,7 +35,18 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
         end_time: row.try_get("end_time")?,
         run_after: row.try_get("run_after")?,
         revision: row.try_get("revision")?,
+        trace_parent: row.try_get("trace_parent")?,
         queue_position: None,
+    })
+}
+
+pub(super) fn worker(row: &SqliteRow) -> Result<SeenWorker> {
+    let clips: String = row.try_get("clips")?;
+    Ok(SeenWorker {
+        name: row.try_get("name")?,
+        device: row.try_get("device")?,
+        memory: row.try_get("memory")?,
+        clips: clips.split_ascii_whitespace().map(ToOwned::to_owned).collect(),
     })
 }
 

@@ -14,7 +14,7 @@ use secrecy::SecretString;
 use sqlx::{Connection, PgConnection};
 use tokio::sync::{Mutex, OnceCell};
 
-use super::super::conformance::{Factory, conformance_suite, model};
+use super::super::conformance::{Factory, conformance_suite, model, speed};
 use super::super::{Ledger, PostgresLedger};
 use super::open;
 use cluster::Cluster;
@@ -116,6 +116,17 @@ impl Factory for Place {
 }
 
 conformance_suite!(Place::fresh().await);
+
+/// Run with `-- --ignored --nocapture`; the figures depend on the disk.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "a measurement"]
+async fn claims_of_a_long_queue() {
+    for projects in speed::PROJECTS {
+        if let Some(place) = Place::fresh().await {
+            speed::claims_of_a_long_queue("postgresql", &place, projects).await;
+        }
+    }
+}
 
 #[test]
 fn random_work_agrees_with_the_model() {

@@ -4,9 +4,9 @@ use sqlx::migrate::Migrator;
 
 use super::super::super::conformance::fixture::*;
 use super::super::super::{AccessLedger, Ledger, LedgerError, PostgresLedger, Usage};
-use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
-use super::super::leases::CLAIM;
-use super::super::{access, commitments, keys, open, registry};
+use super::super::jobs::{GET, PAGE, PAGE_OF_STATE};
+use super::super::queue::{CLAIM, QUEUE};
+use super::super::{access, commitments, hooks, keys, open, registry};
 use super::Place;
 
 #[tokio::test]
@@ -108,7 +108,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
     }
     let (page, assets) = ("bigint, uuid, bigint, text", "bigint, uuid, bigint, uuid, uuid, text");
     let by_index = [
-        (CLAIM, "jobs_queue", "text, bytea, bigint, bigint, int"),
+        (
+            CLAIM,
+            "jobs_queue",
+            "text, bytea, bigint, bigint, int, bigint, bigint, bigint, text[]",
+        ),
         (GET, "jobs_queue", "uuid"),
         (PAGE, "jobs_by_time", page),
         (PAGE_OF_STATE, "jobs_by_state", "bigint, uuid, bigint, text, int"),
@@ -118,6 +122,14 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (access::OF_PROJECT, "tokens_by_project", page),
         (access::USAGE, "artifacts_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
+        (hooks::HOOKS, "hooks_by_project", page),
+        (hooks::CLAIM, "deliveries_due", "bigint, uuid[], bytea, bigint"),
+        (
+            hooks::OF_PROJECT,
+            "deliveries_by_project",
+            "bigint, uuid, bigint, text, int",
+        ),
+        (hooks::OF_HOOK, "deliveries_by_hook", "bigint, uuid, bigint, uuid, int"),
         (registry::ASSETS, "assets_by_time", assets),
         (registry::OF_OWNER, "assets_by_owner", assets),
         (registry::OF_KEY, "assets_by_key", assets),
@@ -146,9 +158,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             .unwrap();
         let explain = sqlx::AssertSqlSafe(format!("EXPLAIN EXECUTE s{i}{values}"));
         let plan = sqlx::raw_sql(explain).fetch_all(&mut db).await.unwrap();
+        // Lanes, which are few; and the whole queue, of which there is no index.
+        let sorts = [CLAIM, QUEUE].contains(&statement);
         let plan: String = plan.iter().map(|row| row.get::<String, _>(0) + "\n").collect();
         assert!(
-            plan.contains(index) && !plan.contains("Sort") && !plan.contains("Seq Scan on"),
+            plan.contains(index) && (!plan.contains("Sort") || sorts) && !plan.contains("Seq Scan on"),
             "{statement}:\n{plan}"
         );
     }

@@ -5,9 +5,9 @@ use sqlx::Row;
 
 use super::super::super::conformance::fixture::*;
 use super::super::super::{Ledger, NewJob};
-use super::super::jobs::{GET, PAGE, PAGE_OF_STATE, QUEUE};
-use super::super::leases::CLAIM;
-use super::super::{access, commitments, keys, registry};
+use super::super::jobs::{PAGE, PAGE_OF_STATE, POSITION};
+use super::super::queue::{CLAIM, QUEUE};
+use super::super::{access, commitments, hooks, keys, registry};
 use super::Folder;
 use super::file::raw;
 
@@ -23,8 +23,6 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
     let folder = Folder::new();
     folder.ledger().await.close().await;
     let by_index = [
-        (CLAIM, "INDEX jobs_queue"),
-        (GET, "INDEX jobs_queue ((queue_time,id)<"),
         (PAGE, "INDEX jobs_by_time (project=? AND (create_time,id)<"),
         (
             PAGE_OF_STATE,
@@ -35,7 +33,6 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             registry::OWNERS,
             "INDEX owners_by_time (project=? AND (create_time,id)<",
         ),
-        (QUEUE, "INDEX jobs_queue"),
         (
             registry::ASSETS,
             "INDEX assets_by_time (project=? AND (create_time,id)<",
@@ -57,6 +54,16 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             access::USAGE,
             "COVERING INDEX artifacts_by_project (project=? AND state=?)",
         ),
+        (hooks::HOOKS, "INDEX hooks_by_project (project=? AND (create_time,id)<"),
+        (hooks::DUE, "INDEX deliveries_due (next_time<?)"),
+        (
+            hooks::OF_PROJECT,
+            "INDEX deliveries_by_project (project=? AND (create_time,id)<",
+        ),
+        (
+            hooks::OF_HOOK,
+            "INDEX deliveries_by_hook (hook_id=? AND (create_time,id)<",
+        ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];
     for (statement, index) in by_index {
@@ -66,6 +73,32 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             "{statement}: {plan}"
         );
     }
+}
+
+/// The queue has its order from lanes, which are few, and only these are sorted when a job is given out.
+#[tokio::test]
+async fn the_queue_is_found_lane_by_lane() {
+    let folder = Folder::new();
+    folder.ledger().await.close().await;
+    let claim = plan(&folder, CLAIM).await;
+    for step in [
+        "COVERING INDEX jobs_queue (project=? AND priority>?)",
+        "COVERING INDEX jobs_queue (project>?)",
+        "COVERING INDEX jobs_queue (project=? AND priority=?)",
+        "INDEX jobs_by_start (project=? AND priority=?",
+        "INDEX jobs_leases",
+    ] {
+        assert!(claim.contains(step), "{step}: {claim}");
+    }
+    // The first lane is where the index begins; no table is read from end to end.
+    assert!(!claim.contains("SCAN jobs;") && !claim.contains("SCAN j;"), "{claim}");
+    let position = plan(&folder, POSITION).await;
+    assert!(
+        position.contains("SCAN jobs USING COVERING INDEX jobs_queue"),
+        "{position}"
+    );
+    let queue = plan(&folder, QUEUE).await;
+    assert!(queue.contains("SCAN q USING COVERING INDEX jobs_queue"), "{queue}");
 }
 
 /// Median, 99th percentile and worst of so many milliseconds.
@@ -124,5 +157,15 @@ async fn a_thousand_submissions() {
         }
         let [p50, p99, worst] = quantiles(ms);
         println!("claim, 1000 queued: p50 {p50:.1} ms, p99 {p99:.1} ms, worst {worst:.1} ms");
+    }
+}
+
+/// As above.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "a measurement"]
+async fn claims_of_a_long_queue() {
+    use crate::ledger::conformance::speed::{PROJECTS, claims_of_a_long_queue};
+    for projects in PROJECTS {
+        claims_of_a_long_queue("sqlite", &Folder::new(), projects).await;
     }
 }

@@ -1,0 +1,105 @@
+//! What is a service's own: parts, who may use it, addresses that it signs.
+use super::*;
+
+fn s3(bench: &Bench) -> &Endpoint {
+    match &bench.place {
+        Laid::S3(endpoint) => endpoint,
+        Laid::Folder(_) => panic!("not on S3"),
+    }
+}
+
+#[test]
+fn parts_are_large_enough_and_few_enough() {
+    let place = Place::parse("s3://bucket").unwrap();
+    let environment = [("AWS_SKIP_SIGNATURE".into(), "true".into())];
+    let store = ArtifactStore::open_at(&place, environment, Duration::ZERO, 1 << 40).unwrap();
+    for size in [0, 1, PART_BYTES] {
+        assert_eq!(store.part_bytes(size), None, "{size}");
+    }
+    for size in [
+        PART_BYTES + 1,
+        4 << 30,
+        PART_BYTES * PARTS,
+        PART_BYTES * PARTS + 1,
+        1 << 40,
+    ] {
+        let part = store.part_bytes(size).unwrap() as u64;
+        assert!(part >= PART_BYTES && size.div_ceil(part) <= PARTS, "{size}: {part}");
+    }
+}
+
+#[tokio::test]
+async fn what_keeps_a_server_from_beginning_is_told() {
+    let bench = Bench::s3().await;
+    let endpoint = s3(&bench);
+    let told = async |url: &str, id: &str| {
+        let place = Place::parse(url).unwrap();
+        let store = ArtifactStore::open_at(&place, endpoint.environment_of(id), Duration::ZERO, LIMIT).unwrap();
+        let error = store.check().await.unwrap_err();
+        crate::run::startup(error).to_string()
+    };
+    let missing = told("s3://missing/x", "tester").await;
+    assert_eq!(
+        missing,
+        "artifacts: s3://missing/x can't be written to: the bucket or container does not exist"
+    );
+    let stranger = told("s3://guardsplat", "stranger").await;
+    assert!(
+        stranger.starts_with("artifacts: s3://guardsplat can't be written to: "),
+        "{stranger}"
+    );
+    assert!(!stranger.contains("5ec2e7"), "{stranger}");
+    assert!(endpoint.objects().is_empty());
+}
+
+/// Nothing of what opens it is shown.
+#[tokio::test]
+async fn credentials_are_not_shown() {
+    let bench = Bench::s3().await;
+    let shown = format!("{:?} {}", bench.store, bench.store.place());
+    let place = "s3://guardsplat/some/where";
+    assert_eq!(shown, format!("ArtifactStore({place}) {place}"));
+}
+
+/// Sent as any other program would: without a word of ours.
+async fn fetch(url: &str) -> (u16, Vec<u8>) {
+    let answer = reqwest::get(url).await.unwrap();
+    (answer.status().as_u16(), answer.bytes().await.unwrap().to_vec())
+}
+
+#[tokio::test]
+async fn a_signed_address_gives_one_artifact_for_a_time() {
+    let bench = Bench::s3().await;
+    let store = &bench.store;
+    let (data, path, other) = (bytes(3000), upload(), upload());
+    put(store, &path, Announced::of(&data), &[&data]).await.unwrap();
+    put(store, &other, Announced::of(b"other"), &[b"other"]).await.unwrap();
+    let url = store
+        .download_url(&path, Duration::from_secs(60))
+        .await
+        .unwrap()
+        .unwrap();
+    assert!(!url.contains("5ec2e7"), "{url}");
+    assert_eq!(fetch(&url).await, (200, data));
+    let [path, other] = [path, other].map(|path| path.to_string());
+    assert!(url.contains(&path));
+    assert_eq!(fetch(&url.replace(&path, &other)).await.0, 403);
+    let gone = store
+        .download_url(&upload(), Duration::from_secs(60))
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(fetch(&gone).await.0, 404);
+    let short = store
+        .download_url(&ArtifactPath::parse(&path).unwrap(), Duration::from_secs(1))
+        .await;
+    tokio::time::sleep(Duration::from_millis(2500)).await;
+    assert_eq!(fetch(&short.unwrap().unwrap()).await.0, 403);
+    let folder = Bench::folder().await;
+    let none = folder
+        .store
+        .download_url(&upload(), Duration::from_secs(60))
+        .await
+        .unwrap();
+    assert_eq!(none, None);
+}

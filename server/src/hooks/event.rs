@@ -1,0 +1,379 @@
+//! What a hook is sent: a CloudEvents 1.0 message in structured JSON that says what became of a job. It has figures and
+//! names, and never a message, a payload or a key.
+use guardsplat_proto::v1::failure::Reason;
+use guardsplat_proto::v1::{EmbedResult, Failure, KeyResult, VerifyResult};
+use prost::{DecodeError, Message};
+use serde::Serialize;
+use uuid::Uuid;
+
+use crate::ledger::{ArtifactId, ArtifactRow, DeliveryRow, JobKind, JobRow, JobState};
+
+/// What such a message is, for the header.
+pub const CONTENT_TYPE: &str = "application/cloudevents+json; charset=utf-8";
+
+#[derive(Serialize)]
+struct Event<'a> {
+    specversion: &'static str,
+    id: String,
+    source: String,
+    r#type: String,
+    subject: String,
+    time: String,
+    datacontenttype: &'static str,
+    data: Data<'a>,
+}
+
+#[derive(Serialize)]
+struct Data<'a> {
+    job: String,
+    display_name: &'a str,
+    kind: &'static str,
+    state: &'static str,
+    request_id: Option<String>,
+    attempt: i32,
+    create_time: String,
+    end_time: String,
+    artifacts: Vec<Artifact>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    figures: Option<Figures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure_reason: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Artifact {
+    role: &'static str,
+    name: String,
+    display_name: String,
+    sha256: String,
+    size_bytes: i64,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Figures {
+    Embed {
+        bit_accuracy: f64,
+        bit_accuracy_worst_view: f64,
+        message_recovered: bool,
+        psnr_db: Option<f64>,
+        ssim: f64,
+        lpips: Option<f64>,
+        steps: u32,
+        gaussians: u64,
+        changed_gaussians: u64,
+        target_missed: Vec<String>,
+    },
+    Verify {
+        verdict: String,
+        p_value: Option<f64>,
+        threshold: Option<f64>,
+        matched_bits: Option<u32>,
+        needed_bits: Option<u32>,
+        bits: u32,
+        views: u32,
+        bit_accuracy: Option<f64>,
+        asset: Option<String>,
+        owner: Option<String>,
+    },
+    CreateKey {
+        /// Its name.
+        key: String,
+        bit_accuracy_unseen: Option<f64>,
+        bit_accuracy_unseen_noisy: Option<f64>,
+    },
+}
+
+/// The type of the event that tells of such an end.
+pub fn event_type(state: JobState) -> String {
+    format!("guardsplat.job.{}.v1", word_of(state))
+}
+
+/// Artifacts that came out of a job, and what each is.
+///
+/// # Errors
+/// That the ledger's row can't be read.
+pub fn outputs(job: &JobRow) -> Result<Vec<(&'static str, ArtifactId)>, DecodeError> {
+    let Some(result) = job.result.as_deref() else {
+        return Ok(Vec::new());
+    };
+    let named = match job.kind {
+        JobKind::Embed => {
+            let result = EmbedResult::decode(result)?;
+            vec![
+                ("scene", result.scene),
+                ("comparison", result.comparison),
+                ("evidence_html", result.evidence_html),
+                ("evidence_json", result.evidence_json),
+            ]
+        }
+        JobKind::Verify => {
+            let result = VerifyResult::decode(result)?;
+            vec![
+                ("evidence_html", result.evidence_html),
+                ("evidence_json", result.evidence_json),
+            ]
+        }
+        JobKind::CreateKey => Vec::new(),
+    };
+    let id = |name: &str| Uuid::try_parse(name.strip_prefix("artifacts/")?).ok();
+    let found = named.iter().filter_map(|(role, name)| Some((*role, id(name)?)));
+    Ok(found.collect())
+}
+
+/// The message for a delivery; the same however often it is sent.
+///
+/// # Errors
+/// That the ledger's row can't be read.
+pub fn body(
+    delivery: &DeliveryRow,
+    job: &JobRow,
+    asked_id: Option<Uuid>,
+    artifacts: Vec<(&'static str, ArtifactRow)>,
+) -> Result<Vec<u8>, DecodeError> {
+    let failure = job.failure.as_ref().filter(|_| job.state == JobState::Failed);
+    let event = Event {
+        specversion: "1.0",
+        id: delivery.id.to_string(),
+        source: format!("/guardsplat/projects/{}", delivery.project),
+        r#type: event_type(delivery.job_state),
+        subject: format!("jobs/{}", job.id),
+        time: time(delivery.create_time),
+        datacontenttype: "application/json",
+        data: Data {
+            job: format!("jobs/{}", job.id),
+            display_name: &job.display_name,
+            kind: match job.kind {
+                JobKind::Embed => "embed",
+                JobKind::Verify => "verify",
+                JobKind::CreateKey => "create_key",
+            },
+            state: word_of(delivery.job_state),
+            request_id: asked_id.map(|id| id.to_string()),
+            attempt: job.attempt,
+            create_time: time(job.create_time),
+            end_time: time(delivery.create_time),
+            artifacts: artifacts.into_iter().map(artifact).collect(),
+            figures: figures(job)?,
+            failure_reason: failure.map(|failure| reason(failure.reason)),
+        },
+    };
+    // Structs with text for keys always have a JSON form.
+    Ok(serde_json::to_vec(&event).unwrap_or_default())
+}
+
+fn figures(job: &JobRow) -> Result<Option<Figures>, DecodeError> {
+    let Some(result) = job.result.as_deref() else {
+        return Ok(None);
+    };
+    let some = |text: String| Some(text).filter(|text| !text.is_empty());
+    Ok(Some(match job.kind {
+        JobKind::Embed => {
+            let result = EmbedResult::decode(result)?;
+            Figures::Embed {
+                bit_accuracy: result.bit_accuracy,
+                bit_accuracy_worst_view: result.bit_accuracy_worst_view,
+                message_recovered: result.message_recovered,
+                psnr_db: result.psnr_db,
+                ssim: result.ssim,
+                lpips: result.lpips,
+                steps: result.steps,
+                gaussians: result.gaussians,
+                changed_gaussians: result.changed_gaussians,
+                target_missed: result.target_missed,
+            }
+        }
+        JobKind::Verify => {
+            let result = VerifyResult::decode(result)?;
+            Figures::Verify {
+                verdict: word(result.verdict().as_str_name(), "VERDICT_"),
+                p_value: result.p_value,
+                threshold: result.threshold,
+                matched_bits: result.matched_bits,
+                needed_bits: result.needed_bits,
+                bits: result.bits,
+                views: result.views,
+                bit_accuracy: result.bit_accuracy,
+                asset: some(result.asset),
+                owner: some(result.owner),
+            }
+        }
+        JobKind::CreateKey => {
+            let result = KeyResult::decode(result)?;
+            Figures::CreateKey {
+                key: result.key,
+                bit_accuracy_unseen: result.bit_accuracy_unseen,
+                bit_accuracy_unseen_noisy: result.bit_accuracy_unseen_noisy,
+            }
+        }
+    }))
+}
+
+fn artifact((role, row): (&'static str, ArtifactRow)) -> Artifact {
+    Artifact {
+        role,
+        name: format!("artifacts/{}", row.id),
+        display_name: row.display_name,
+        sha256: row.sha256,
+        size_bytes: row.size,
+    }
+}
+
+fn reason(number: i32) -> String {
+    let failure = Failure {
+        reason: number,
+        message: String::new(),
+    };
+    let known: Reason = failure.reason();
+    word(known.as_str_name(), "REASON_")
+}
+
+fn word(name: &str, prefix: &str) -> String {
+    name.strip_prefix(prefix).unwrap_or(name).to_ascii_lowercase()
+}
+
+fn word_of(state: JobState) -> &'static str {
+    match state {
+        JobState::Queued => "queued",
+        JobState::Running => "running",
+        JobState::Succeeded => "succeeded",
+        JobState::Failed => "failed",
+        JobState::Cancelled => "cancelled",
+    }
+}
+
+/// Microseconds since 1970 as RFC 3339.
+fn time(micros: i64) -> String {
+    let since = std::time::Duration::from_micros(u64::try_from(micros).unwrap_or_default());
+    humantime::format_rfc3339_micros(std::time::UNIX_EPOCH + since).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use guardsplat_proto::v1::verify_result::Verdict;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::ledger::{DeliveryState, Failure as Failed, Needs};
+
+    const SECRET: &str = "5ec2e75ec2e75ec2";
+
+    fn row(kind: JobKind, state: JobState, result: Option<Vec<u8>>) -> JobRow {
+        JobRow {
+            id: Uuid::from_u128(7),
+            project: "studio".into(),
+            display_name: "a \"scene\"".into(),
+            kind,
+            spec: SECRET.into(),
+            state,
+            cancel_requested: false,
+            attempt: 2,
+            max_attempts: 3,
+            progress: Some(SECRET.into()),
+            result,
+            failure: None,
+            create_time: 1_000_000,
+            update_time: 2_000_001,
+            start_time: Some(1_500_000),
+            end_time: Some(2_000_001),
+            run_after: None,
+            revision: 5,
+            trace_parent: None,
+            priority: 0,
+            needs: Needs::default(),
+            queue_position: None,
+        }
+    }
+
+    fn event(job: &JobRow) -> Value {
+        let delivery = DeliveryRow {
+            id: Uuid::from_u128(9),
+            hook: Uuid::from_u128(1),
+            project: job.project.clone(),
+            job: job.id,
+            job_state: job.state,
+            state: DeliveryState::Pending,
+            attempts: 1,
+            last_error: String::new(),
+            create_time: 2_000_001,
+            since: 2_000_001,
+            next_time: 3_000_000,
+            last_time: None,
+            end_time: None,
+        };
+        let body = body(&delivery, job, None, Vec::new()).unwrap();
+        let text = String::from_utf8(body.clone()).unwrap();
+        assert!(!text.contains(SECRET) && !text.contains("4711"), "{text}");
+        serde_json::from_slice(&body).unwrap()
+    }
+
+    #[test]
+    fn what_a_suspect_says_is_left_out() {
+        let result = VerifyResult {
+            verdict: Verdict::NoMatch.into(),
+            p_value: Some(0.25),
+            message: SECRET.into(),
+            payload_number: Some(4711),
+            evidence_json: format!("artifacts/{}", Uuid::from_u128(3)),
+            evidence_html: "nonsense".into(),
+            asset: "assets/7".into(),
+            ..VerifyResult::default()
+        };
+        let job = row(JobKind::Verify, JobState::Succeeded, Some(result.encode_to_vec()));
+        assert_eq!(outputs(&job).unwrap(), [("evidence_json", Uuid::from_u128(3))]);
+        let event = event(&job);
+        assert_eq!(event["type"], "guardsplat.job.succeeded.v1");
+        assert_eq!(
+            (&event["time"], &event["data"]["attempt"]),
+            (&"1970-01-01T00:00:02.000001Z".into(), &2.into())
+        );
+        let figures = &event["data"]["figures"];
+        assert_eq!(
+            (&figures["verdict"], &figures["p_value"]),
+            (&"no_match".into(), &0.25.into())
+        );
+        assert_eq!(
+            (&figures["asset"], &figures["owner"]),
+            (&"assets/7".into(), &Value::Null)
+        );
+    }
+
+    #[test]
+    fn a_key_is_named_and_a_failure_has_its_reason() {
+        let result = KeyResult {
+            key: "keys/7".into(),
+            bit_accuracy_unseen: Some(f64::NAN),
+            ..KeyResult::default()
+        };
+        let made = event(&row(
+            JobKind::CreateKey,
+            JobState::Succeeded,
+            Some(result.encode_to_vec()),
+        ));
+        assert_eq!(made["data"]["figures"]["key"], "keys/7");
+        // What is no number has no form in JSON.
+        assert_eq!(made["data"]["figures"]["bit_accuracy_unseen"], Value::Null);
+        let failed = JobRow {
+            failure: Some(Failed {
+                reason: Reason::TargetMissed.into(),
+                message: format!("read {SECRET}"),
+            }),
+            ..row(JobKind::Embed, JobState::Failed, None)
+        };
+        let told = event(&failed);
+        assert_eq!(
+            (&told["data"]["failure_reason"], &told["data"]["state"]),
+            (&"target_missed".into(), &"failed".into())
+        );
+        assert_eq!(
+            (&told["data"]["figures"], &told["data"]["display_name"]),
+            (&Value::Null, &"a \"scene\"".into())
+        );
+        // A job that was cancelled between attempts has a failure, and did not end by it.
+        let cancelled = JobRow {
+            state: JobState::Cancelled,
+            ..failed
+        };
+        assert_eq!(event(&cancelled)["data"]["failure_reason"], Value::Null);
+    }
+}

@@ -1,0 +1,160 @@
+//! That figures are what happened, and that their number is bounded.
+use guardsplat_proto::v1::EmbedResult;
+
+use super::*;
+use crate::ledger::{Failure, JobKind, JobRow, JobState, Needs, REASON_WORKER_LOST, Waiting};
+
+fn job(state: JobState, attempt: i32) -> JobRow {
+    JobRow {
+        id: uuid::Uuid::now_v7(),
+        project: "default".into(),
+        display_name: String::new(),
+        kind: JobKind::Embed,
+        spec: Vec::new(),
+        state,
+        cancel_requested: false,
+        attempt,
+        max_attempts: 3,
+        progress: None,
+        result: None,
+        failure: None,
+        create_time: 1_000_000,
+        update_time: 0,
+        start_time: Some(3_500_000),
+        end_time: state.is_over().then_some(9_500_000),
+        run_after: None,
+        revision: 2,
+        trace_parent: None,
+        priority: 0,
+        needs: Needs::default(),
+        queue_position: None,
+    }
+}
+
+fn has(metrics: &Metrics, lines: &[&str]) {
+    let text = metrics.text().unwrap();
+    for line in lines {
+        assert!(text.lines().any(|there| there == *line), "{line} is not in\n{text}");
+    }
+}
+
+#[test]
+fn attempts_end_in_each_of_their_ways() {
+    let metrics = Metrics::default();
+    metrics.given(&job(JobState::Running, 1));
+    metrics.given(&JobRow {
+        revision: 4,
+        ..job(JobState::Running, 2)
+    });
+    let failed = |state, reason| JobRow {
+        failure: Some(Failure {
+            reason,
+            message: String::new(),
+        }),
+        ..job(state, 1)
+    };
+    let lost = failed(JobState::Queued, REASON_WORKER_LOST);
+    assert!(was_lost(&lost) && !was_lost(&failed(JobState::Failed, 4)));
+    metrics.attempt_ended(&lost, true);
+    metrics.attempt_ended(&failed(JobState::Queued, 4), false);
+    metrics.attempt_ended(&failed(JobState::Failed, 5), false);
+    metrics.attempt_ended(&job(JobState::Queued, 0), false);
+    metrics.attempt_ended(&job(JobState::Succeeded, 1), false);
+    has(
+        &metrics,
+        &[
+            r#"guardsplat_job_attempts_total{kind="embed"} 2"#,
+            r#"guardsplat_job_attempts_ended_total{kind="embed",outcome="lost"} 1"#,
+            r#"guardsplat_job_attempts_ended_total{kind="embed",outcome="failed"} 2"#,
+            r#"guardsplat_job_attempts_ended_total{kind="embed",outcome="released"} 1"#,
+            r#"guardsplat_job_attempts_ended_total{kind="embed",outcome="succeeded"} 1"#,
+            r#"guardsplat_job_attempts_ended_total{kind="verify",outcome="lost"} 0"#,
+            r#"guardsplat_job_retries_total{kind="embed"} 2"#,
+            r#"guardsplat_jobs_ended_total{kind="embed",state="failed"} 1"#,
+            r#"guardsplat_jobs_ended_total{kind="embed",state="succeeded"} 1"#,
+            // The second attempt waited for other reasons.
+            r#"guardsplat_job_wait_seconds_sum{kind="embed"} 2.5"#,
+            r#"guardsplat_job_wait_seconds_count{kind="embed"} 1"#,
+            r#"guardsplat_job_run_seconds_sum{kind="embed",state="failed"} 6.0"#,
+        ],
+    );
+}
+
+#[test]
+fn the_queue_is_as_the_ledger_has_it_or_not_told() {
+    let metrics = Metrics::default();
+    let tally = Tally {
+        queued: vec![Waiting {
+            kind: JobKind::Verify,
+            count: 7,
+            since: 1_000_000,
+        }],
+        running: vec![(JobKind::Embed, 2)],
+        failed: vec![(JobKind::Embed, 5, 3), (JobKind::Embed, 99, 1)],
+    };
+    metrics.tally(Some(tally), 2_500_000);
+    has(
+        &metrics,
+        &[
+            r#"guardsplat_queued_jobs{kind="verify"} 7"#,
+            r#"guardsplat_queued_jobs{kind="embed"} 0"#,
+            r#"guardsplat_oldest_queued_job_age_seconds{kind="verify"} 1.5"#,
+            r#"guardsplat_oldest_queued_job_age_seconds{kind="embed"} 0.0"#,
+            r#"guardsplat_running_jobs{kind="embed"} 2"#,
+            r#"guardsplat_dead_letters{kind="embed",reason="attempts_exhausted"} 3"#,
+            r#"guardsplat_dead_letters{kind="embed",reason="unspecified"} 1"#,
+            r#"guardsplat_dead_letters{kind="verify",reason="invalid_input"} 0"#,
+        ],
+    );
+    metrics.tally(None, 0);
+    let text = metrics.text().unwrap();
+    assert!(!text.contains("guardsplat_queued_jobs{"), "{text}");
+}
+
+#[test]
+fn marks_are_counted_by_what_is_read_from_them() {
+    let metrics = Metrics::default();
+    let mark = EmbedResult {
+        bit_accuracy: 0.985,
+        message_recovered: true,
+        psnr_db: Some(36.5),
+        ..EmbedResult::default()
+    };
+    metrics.marked(&mark);
+    metrics.marked(&EmbedResult {
+        bit_accuracy: f64::NAN,
+        message_recovered: false,
+        psnr_db: None,
+        ..mark
+    });
+    has(
+        &metrics,
+        &[
+            r#"guardsplat_marks_total{recovered="true"} 1"#,
+            r#"guardsplat_marks_total{recovered="false"} 1"#,
+            r#"guardsplat_mark_bit_accuracy_bucket{le="0.98"} 0"#,
+            r#"guardsplat_mark_bit_accuracy_bucket{le="0.99"} 1"#,
+            "guardsplat_mark_bit_accuracy_count 1",
+            "guardsplat_mark_psnr_db_sum 36.5",
+        ],
+    );
+}
+
+/// Whatever is sent, there are only so many series.
+#[test]
+fn what_strangers_send_makes_no_series() {
+    let metrics = Metrics::default();
+    let series = || metrics.text().unwrap().lines().count();
+    let before = series();
+    for i in 0..1000 {
+        let name = method(&format!("/guardsplat.v1.JobService/Call{i}"));
+        metrics.call(name, Code::Unimplemented);
+        metrics.refused(&format!("REASON_{i}"));
+    }
+    assert_eq!(series(), before + 1);
+    has(
+        &metrics,
+        &[r#"guardsplat_calls_total{method="other",code="UNIMPLEMENTED"} 1000"#],
+    );
+    assert!(before < 2000, "{before} series");
+}

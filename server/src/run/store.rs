@@ -1,0 +1,44 @@
+//! Which store the settings name: a folder in the data folder, or one that several servers may share.
+use std::path::Path;
+
+use crate::artifacts::{ArtifactStore, StoreResult};
+use crate::error::Result;
+use crate::notary::Notary;
+use crate::settings::Settings;
+
+use super::startup;
+
+/// Opens the store and sees that it can be used. `folder` is the data folder.
+pub(super) async fn open(settings: &Settings, folder: &Path) -> Result<ArtifactStore> {
+    let store = named(settings, folder)?;
+    tracing::info!(artifacts = %store.place(), "artifacts are there");
+    store.check().await.map_err(startup)?;
+    Ok(store)
+}
+
+fn named(settings: &Settings, folder: &Path) -> Result<ArtifactStore> {
+    let most = settings.max_artifact_bytes;
+    let opened: StoreResult<_> = match settings.place().map_err(startup)? {
+        None => ArtifactStore::open(&folder.join("artifacts"), most),
+        Some(place) => ArtifactStore::open_at(
+            &place,
+            std::env::vars_os().filter_map(text),
+            settings.abandoned_after(),
+            most,
+        ),
+    };
+    opened.map_err(startup)
+}
+
+/// Sees that the store is this ledger's, which is known by the key that only it has.
+pub(super) async fn claim(store: &ArtifactStore, notary: &Notary) -> Result<()> {
+    store
+        .claim(&hex::encode(notary.public_key().to_bytes()))
+        .await
+        .map_err(startup)
+}
+
+/// A variable that is not text is none of a store's.
+fn text((name, value): (std::ffi::OsString, std::ffi::OsString)) -> Option<(String, String)> {
+    Some((name.into_string().ok()?, value.into_string().ok()?))
+}
