@@ -59,7 +59,7 @@ async fn durability_is_switched_on() {
 async fn a_full_disk_loses_nothing_and_is_told() {
     let folder = Folder::new();
     folder.ledger().await.close().await;
-    let options = open::options(&folder.path()).pragma("max_page_count", "60");
+    let options = open::options(&folder.path()).pragma("max_page_count", "120");
     let ledger = SqliteLedger::open_with(options).await.unwrap();
     let mut kept = Vec::new();
     let error = loop {
