@@ -24,10 +24,9 @@ const COLLECT_AT_ONCE: u32 = 100;
 
 /// Keeps house until the API is stopped. A failure is logged, and tried again the next time.
 pub async fn housekeeping(api: Api) {
-    let started = clock::now();
     let mut stopping = api.changes().listen();
     // Beside each other: a store that is slow must not keep leases from being ended.
-    let work = async { tokio::join!(look_after_leases(&api), delete(&api, started)) };
+    let work = async { tokio::join!(look_after_leases(&api), delete(&api)) };
     tokio::select! {
         () = stopping.stopped() => {}
         _ = work => {}
@@ -51,7 +50,7 @@ async fn look_after_leases(api: &Api) {
     }
 }
 
-async fn delete(api: &Api, started: i64) {
+async fn delete(api: &Api) {
     let abandoned_after = api.limits().abandoned_after;
     let mut ticks = interval(COLLECT_EVERY.min(abandoned_after));
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -68,7 +67,8 @@ async fn delete(api: &Api, started: i64) {
                 tracing::error!(error = %chain(&error), "what is too old could not be deleted");
             }
         }
-        if let Err(error) = api.collect(started).await {
+        // Not since this task began: calls may have been taken before it, and their bytes may still be arriving.
+        if let Err(error) = api.collect(api.opened()).await {
             tracing::error!(error = %chain(&error), "abandoned artifacts could not be deleted");
         }
         if searched.elapsed() >= orphans_every {

@@ -150,6 +150,8 @@ pub struct Api {
 }
 
 struct Shared {
+    /// When this server began, before it took any call.
+    opened: i64,
     ledger: Arc<dyn Ledger>,
     store: ArtifactStore,
     master: MasterKey,
@@ -177,6 +179,7 @@ impl Api {
         limits: Limits,
     ) -> Self {
         let shared = Shared {
+            opened: clock::now(),
             ledger,
             store,
             master,
@@ -279,6 +282,10 @@ impl Api {
 
     fn notary(&self) -> &Notary {
         &self.shared.notary
+    }
+
+    fn opened(&self) -> i64 {
+        self.shared.opened
     }
 
     fn limits(&self) -> &Limits {
