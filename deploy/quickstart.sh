@@ -13,7 +13,7 @@ usage() {
     sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
 }
 
-preset=draft
+preset=standard
 device=auto
 out=
 while [ $# -gt 0 ]; do
