@@ -54,6 +54,13 @@ pub struct Train {
     /// Sample scenes whose natural variation is measured
     #[arg(long, default_value_t = TrainOptions::default().scenes)]
     scenes: usize,
+    /// Other sample scenes, whose gradients are measured: what a mark can do in all views at once
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().steered)]
+    steered: usize,
+    /// How rough the scenes are: 0 as they are; at 1 as much as captured scenes or more, in view-dependent colours, grain and
+    /// opacity
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().roughness)]
+    roughness: f32,
     /// Steps of contrastive training
     #[arg(long, default_value_t = TrainOptions::default().steps)]
     steps: usize,
@@ -96,6 +103,11 @@ struct Trained<'a> {
     scenes: usize,
     steps: usize,
     batch: usize,
+    filters: usize,
+    norm: [f32; 2],
+    luma: f32,
+    steered: usize,
+    roughness: f32,
     steering: Vec<f64>,
     retrieval: Retrieval,
     sha256: String,
@@ -109,6 +121,8 @@ fn train(arguments: &Train) -> Result<Exit> {
     let options = TrainOptions {
         seed: arguments.seed,
         scenes: arguments.scenes,
+        steered: arguments.steered,
+        roughness: arguments.roughness,
         steps: arguments.steps,
         batch: arguments.batch,
         filters: arguments.filters,
@@ -149,6 +163,11 @@ fn train(arguments: &Train) -> Result<Exit> {
         scenes: options.scenes,
         steps: options.steps,
         batch: options.batch,
+        filters: options.filters,
+        norm: options.norm,
+        luma: options.luma,
+        steered: options.steered,
+        roughness: options.roughness,
         steering: trained.steering,
         retrieval: trained.retrieval,
         sha256: TensorFile::open(weights)?.sha256()?,

@@ -53,6 +53,9 @@ pub struct Arguments {
     /// Prints JSON on standard output
     #[arg(long)]
     json: bool,
+    /// With the logits of every view or picture, a number a bit, positive for 1
+    #[arg(long, requires = "json")]
+    logits: bool,
 }
 
 #[derive(Serialize)]
@@ -62,6 +65,8 @@ struct Report<'a> {
     seconds: f64,
     device: &'a str,
     clip: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    logits: Option<&'a [Vec<f32>]>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
@@ -94,6 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,
         clip: &key.clip.name,
+        logits: arguments.logits.then_some(&compared.reading.views[..]),
     };
     if arguments.json {
         print_json(&report)?;

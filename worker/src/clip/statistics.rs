@@ -17,6 +17,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
+use std::ops::Range;
 
 /// Image tower of the statistics kind.
 #[derive(Module, Debug)]
@@ -67,6 +68,19 @@ impl StatisticsTower {
         Tensor::cat(self.scales.iter().map(of_scale).collect(), 1)
     }
 
+    /// Average responses `[batch, filters.len()]` of some filters of one scale.
+    pub fn statistics_of(&self, scale: usize, filters: Range<usize>, pictures: &Tensor<4>) -> Tensor<2> {
+        let scale = &self.scales[scale];
+        let weight = scale.weight.val().slice([filters.clone()]);
+        let phases = scale.bias.val().slice([filters]);
+        scale.of(weight, phases, pictures.clone())
+    }
+
+    /// Numbers of filters of each scale.
+    pub fn counts(&self) -> impl Iterator<Item = usize> {
+        self.scales.iter().map(|scale| scale.bias.shape().num_elements())
+    }
+
     /// Features `[batch, embed_dim]` of normalised pictures.
     pub fn forward(&self, pictures: &Tensor<4>) -> Tensor<2> {
         self.proj.forward(self.statistics(pictures))
@@ -97,6 +111,10 @@ impl StatisticsTower {
 
 impl Scale {
     fn statistics(&self, pictures: Tensor<4>) -> Tensor<2> {
+        self.of(self.weight.val(), self.bias.val(), pictures)
+    }
+
+    fn of(&self, weight: Tensor<4>, phases: Tensor<1>, pictures: Tensor<4>) -> Tensor<2> {
         let x = match self.size {
             1 => pictures,
             n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
@@ -111,8 +129,8 @@ impl Scale {
                 x.clone() - avg_pool2d(x, inside)
             }
         };
-        let filters = self.weight.val().reshape([-1, 3]); // the kernel is one pixel
-        mean_sines(x, filters, self.bias.val())
+        let filters = weight.reshape([-1, 3]); // the kernel is one pixel
+        mean_sines(x, filters, phases)
     }
 }
 

@@ -21,8 +21,7 @@ use std::ops::Range;
 
 /// Grounds that scenes are seen over, one a view; a feature that follows the ground is of no use.
 const GROUNDS: [f32; 6] = [1.0, 1.0, 0.0, 1.0, 0.5, 0.0];
-/// Scenes whose gradients are measured, and views of each.
-const STEERED: usize = 3;
+/// Views of a scene whose gradients are measured.
 const STEERED_VIEWS: usize = 5;
 /// Weight of the squared means of scenes beside the variation between views of one.
 const BETWEEN: f64 = 0.3;
@@ -31,8 +30,9 @@ const BETWEEN: f64 = 0.3;
 const SHRUNK: f64 = 0.5;
 /// Noise on constant coefficients of the scenes whose gradients are measured, where filters see contrasts.
 const GRAIN: f32 = 0.15;
-/// Scenes on which the head is measured, not those it is fitted to.
+/// Scenes on which the head is measured, not those it is fitted to, and those of their gradients.
 const MEASURED: u64 = 160;
+const STEERED_MEASURED: u64 = 8;
 /// Smallest natural variance that is believed, against the largest.
 const FLOOR: f64 = 1e-6;
 
@@ -57,10 +57,15 @@ pub(super) fn fit(
 ) -> Result<Head> {
     let scenes = options.scenes as u64;
     let fitted = natural(tower, config, options, 0..scenes, compute, progress)?;
-    let first = scenes + STEERED as u64;
+    let first = scenes + options.steered as u64;
     let unseen = natural(tower, config, options, first..first + MEASURED, compute, &mut |_| ())?;
     let n = fitted.len().isqrt();
-    let steering = steering(tower, config, options, compute, n, progress)?;
+    let of_gradients = first + MEASURED;
+    let gradients = |scenes, progress: &mut dyn FnMut(TrainProgress)| {
+        steering(tower, config, options, scenes, compute, n, progress)
+    };
+    let steered = gradients(scenes..first, progress)?;
+    let unseen_steered = gradients(of_gradients..of_gradients + STEERED_MEASURED, &mut |_| ())?;
     let failed = || Error::BadModel {
         name: "head".into(),
         reason: "features have no principal directions".into(),
@@ -71,13 +76,13 @@ pub(super) fn fit(
     let white: Vec<f64> = (0..n * n)
         .map(|i| noise.vectors[i] / noise.values[i / n].max(floor).sqrt())
         .collect();
-    let turned = congruence(&white, &steering, n);
+    let turned = congruence(&white, &steered, n);
     let steer = eigen::symmetric(turned, n).ok_or_else(failed)?;
     let kept = config.embed_dim;
     let head = product(&steer.vectors[..kept * n], &white, n, n);
     let along =
         |matrix: &[f64], v: &[f64]| -> f64 { matrix.chunks_exact(n).zip(v).map(|(row, x)| x * dot(row, v)).sum() };
-    let reach = |v: &[f64]| (along(&steering, v) / along(&unseen, v)).max(0.0).sqrt();
+    let reach = |v: &[f64]| (along(&unseen_steered, v) / along(&unseen, v)).max(0.0).sqrt();
     Ok(Head {
         matrix: (0..n * kept).map(|i| head[i % kept * n + i / kept] as f32).collect(),
         bias: vec![0.0; kept],
@@ -99,7 +104,7 @@ fn natural(
     let count = (scenes.end - scenes.start) as usize;
     let mut sum = Vec::new();
     for (done, index) in scenes.enumerate() {
-        let scene = ViewedScene::new(options.seed, index, views, 0.0)?;
+        let scene = ViewedScene::new(options, index, views, 0.0)?;
         let pictures: Vec<Picture> = scene
             .views
             .iter()
@@ -151,20 +156,21 @@ fn steering(
     tower: &StatisticsTower,
     config: &ClipConfig,
     options: &TrainOptions,
+    scenes: Range<u64>,
     compute: &Compute,
     n: usize,
-    progress: &mut impl FnMut(TrainProgress),
+    progress: &mut dyn FnMut(TrainProgress),
 ) -> Result<Vec<f64>> {
     let rasterizer = rasterizer(compute)?;
+    let count = (scenes.end - scenes.start) as usize;
     let mut sum = vec![0.0; n * n];
     // Contrasts of what is alike all around have no gradient: a mark begins with grain.
     let grain = if options.surround > 1 { GRAIN } else { 0.0 };
-    for index in 0..STEERED {
-        // Other scenes than those of the natural variation.
-        let scene = ViewedScene::new(options.seed, (options.scenes + index) as u64, STEERED_VIEWS, grain)?;
+    for (done, index) in scenes.enumerate() {
+        let scene = ViewedScene::new(options, index, STEERED_VIEWS, grain)?;
         let found = across_views(&scene, tower, config, rasterizer.as_ref(), compute, n)?;
-        sum.iter_mut().zip(found).for_each(|(s, f)| *s += f / STEERED as f64);
-        progress(TrainProgress::Steering(index + 1, STEERED));
+        sum.iter_mut().zip(found).for_each(|(s, f)| *s += f / count as f64);
+        progress(TrainProgress::Steering(done + 1, count));
     }
     Ok(sum)
 }

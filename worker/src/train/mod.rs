@@ -3,7 +3,7 @@
 //! 1. [`filters`]: the image tower's filters are random and stay so.
 //! 2. [`head`]: its linear head is the one, in closed form, whose features a small change of a scene's colours moves
 //!    most in all its views ([`steering`]), against how much they change from view to view by themselves; both are
-//!    measured on sample scenes ([`scenes`]).
+//!    measured on sample scenes ([`scenes`]), clean or roughened ([`roughness`]).
 //! 3. [`drawing`], [`paint`]: a caption is a sequence of words; each word means a direction of the image tower's
 //!    features; the picture of a caption is a drawing, changed a little so that its features go where the words point.
 //! 4. [`contrastive`]: the text tower is trained against the locked image tower with CLIP's symmetric loss (locked-image
@@ -13,6 +13,7 @@ mod drawing;
 mod filters;
 mod head;
 mod paint;
+mod roughness;
 mod scenes;
 mod steering;
 
@@ -34,6 +35,10 @@ pub struct TrainOptions {
     pub seed: u64,
     /// Sample scenes whose natural variation is measured.
     pub scenes: usize,
+    /// Other sample scenes, whose gradients are measured.
+    pub steered: usize,
+    /// How rough the scenes are: 0 for samples as they are, 1 for the limits of [`roughness`].
+    pub roughness: f32,
     /// Steps of contrastive training.
     pub steps: usize,
     /// Pairs a step.
@@ -59,6 +64,8 @@ impl Default for TrainOptions {
         Self {
             seed: 1,
             scenes: 640,
+            steered: 3,
+            roughness: 0.0,
             steps: 200,
             batch: 64,
             filters: 128,
@@ -183,6 +190,7 @@ fn tower(model: &ClipModel) -> Result<StatisticsTower> {
 fn check(options: &TrainOptions) -> Result<()> {
     for (field, value, least, most) in [
         ("--scenes", options.scenes, 8, 1 << 16),
+        ("--steered", options.steered, 1, 1 << 10),
         ("--steps", options.steps, 1, 1 << 20),
         ("--batch", options.batch, 2, 1024),
         ("--filters", options.filters, 1, 4096),
@@ -194,6 +202,12 @@ fn check(options: &TrainOptions) -> Result<()> {
                 reason: format!("{value} is outside {least} to {most}"),
             });
         }
+    }
+    if !(0.0..=10.0).contains(&options.roughness) {
+        return Err(Error::BadOption {
+            field: "--roughness",
+            reason: format!("{} is outside 0 to 10", options.roughness),
+        });
     }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! Sample scenes seen from several views: what the head is fitted to. Two of three are made fainter, because a scene of a
-//! few smooth colours varies from view to view more than a colourful one does.
-use super::IMAGE_SIZE;
+//! few smooth colours varies from view to view more than a colourful one does; all can be roughened
+//! ([`super::roughness`]).
+use super::roughness::{degree, roughen};
+use super::{IMAGE_SIZE, TrainOptions};
 use crate::error::Result;
 use crate::picture::Picture;
 use crate::sample::sample;
@@ -23,6 +25,9 @@ const FIRST_SEED: u64 = 0x7363_656e_6573;
 /// Draws for contrast are none of the scene's own.
 const CONTRAST_STREAM: u64 = 77;
 
+/// Nor are those for roughness.
+const ROUGHNESS_STREAM: u64 = 79;
+
 /// Nor are those for grain.
 const GRAIN_STREAM: u64 = 78;
 
@@ -33,14 +38,21 @@ pub(super) struct ViewedScene {
 }
 
 impl ViewedScene {
-    /// Scene `index` of the stream of `seed`, from so many views, with uniform noise of up to `grain` on its constant
-    /// coefficients.
-    pub fn new(seed: u64, index: u64, views: usize, grain: f32) -> Result<Self> {
-        let seed = FIRST_SEED.wrapping_add(seed.wrapping_mul(1 << 20)).wrapping_add(index);
-        let mut gaussians = sample(GAUSSIANS, (index % 4) as usize, seed)?.gaussians;
+    /// Scene `index` of the stream of the options' seed, as rough as they say, from so many views, with uniform noise of
+    /// up to `grain` on its constant coefficients.
+    pub fn new(options: &TrainOptions, index: u64, views: usize, grain: f32) -> Result<Self> {
+        let stream = options.seed.wrapping_mul(1 << 20);
+        let seed = FIRST_SEED.wrapping_add(stream).wrapping_add(index);
+        let rough = options.roughness > 0.0;
+        let degree = if rough { degree(index) } else { (index % 4) as usize };
+        let mut gaussians = sample(GAUSSIANS, degree, seed)?.gaussians;
         if !index.is_multiple_of(3) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ CONTRAST_STREAM);
             fade(&mut gaussians, &mut rng);
+        }
+        if rough {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed ^ ROUGHNESS_STREAM);
+            roughen(&mut gaussians, options.roughness, &mut rng);
         }
         if grain > 0.0 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ GRAIN_STREAM);

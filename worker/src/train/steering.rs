@@ -16,7 +16,7 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 
 /// Averages whose gradients are computed at once.
-const BATCH: usize = 64;
+const BATCH: usize = 16;
 /// Gaussians that change the picture less than this are left alone.
 const UNSEEN: f32 = 1e-6;
 
@@ -89,14 +89,18 @@ fn gradients(
     let tracking = compute.device.clone().autodiff();
     let picture = scene.picture(rasterizer, view, 1.0)?;
     let mut rows = Vec::with_capacity(n * 3 * view.visible.len());
-    for first in (0..n).step_by(BATCH) {
-        let count = BATCH.min(n - first);
+    // Picture i is asked for the gradient of the i-th of a few filters, and none is computed for more than these.
+    let few = tower.counts().enumerate().flat_map(|(scale, filters)| {
+        (0..filters)
+            .step_by(BATCH)
+            .map(move |first| (scale, first..filters.min(first + BATCH)))
+    });
+    for (scale, filters) in few {
+        let count = filters.len();
         let pictures = batch(&vec![&picture; count], &tracking)?.require_grad();
-        let averages = tower.statistics(&preprocess(pictures.clone(), IMAGE_SIZE, &config.normalization));
-        // Picture i is asked for the gradient of average first + i.
-        let mut chosen = vec![0.0_f32; count * n];
-        (0..count).for_each(|i| chosen[i * n + first + i] = 1.0);
-        let chosen = Tensor::<2>::from_data(TensorData::new(chosen, [count, n]), &tracking);
+        let input = preprocess(pictures.clone(), IMAGE_SIZE, &config.normalization);
+        let averages = tower.statistics_of(scale, filters, &input);
+        let chosen = Tensor::<2>::eye(count, &tracking);
         let all = (averages * chosen).sum().backward();
         let gradient = pictures.grad(&all).ok_or_else(|| Error::Device {
             device: compute.name.clone(),

@@ -111,6 +111,14 @@ fn from_a_sample_to_a_verdict() {
     assert_eq!((&read["verdict"], &read["views"]), (&"inconclusive".into(), &3.into()));
     assert!(read["p_value"].is_null() && read["reason"].is_string());
     let found = read["message"].as_str().unwrap().to_owned();
+    // The message is what the logits of all views add up to.
+    assert!(read["logits"].is_null());
+    let read = bench.json("verify views --key k.key --device cpu --json --logits", 3);
+    let views = read["logits"].as_array().unwrap();
+    assert_eq!(views.len(), 3);
+    let bits = (0..32).map(|bit| views.iter().map(|view| view[bit].as_f64().unwrap()).sum::<f64>() > 0.0);
+    let message = bits.fold(0_u32, |message, bit| message << 1 | u32::from(bit));
+    assert_eq!(format!("{message:08x}"), found);
     let matching = format!("verify views --key k.key --device cpu --json --message {found}");
     let verdict = bench.json(&matching, 0);
     assert_eq!(verdict["verdict"], "match");
