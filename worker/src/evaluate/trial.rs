@@ -3,15 +3,13 @@ use std::fmt;
 use std::str::FromStr;
 
 use guardsplat_evaluation::attack::Attack;
-use guardsplat_evaluation::report::names;
+use guardsplat_evaluation::report::names::{self, SH_DEGREE};
 use guardsplat_scene::alter::{ShNoise, add_sh_noise, prune_faint, prune_random, truncate_sh};
 use guardsplat_scene::convert::convert;
 
 use crate::error::{Error, Result};
 use crate::scene::{Format, Gaussians, Scene};
 
-/// Attacks that drop bands of spherical harmonics are called this, and the highest degree that is left.
-const SH_DEGREE: &str = "sh-degree:";
 /// What the mask of the attacks on pictures is called.
 const MASK: &str = "mask:";
 

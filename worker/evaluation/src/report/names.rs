@@ -56,6 +56,8 @@ pub const SH_NOISE: &str = "sh-noise:";
 pub const OCCLUSION: &str = "occlusion:";
 /// Conversions to another format and back are called this, and the format.
 pub const FORMAT: &str = "format:";
+/// Bands of spherical harmonics above a degree are dropped: `sh-degree:0`.
+pub const SH_DEGREE: &str = "sh-degree:";
 /// Formats that scenes can have.
 pub const FORMATS: [&str; 5] = ["ply", "compressed-ply", "spz", "splat", "sog"];
 /// Compressed by the learned codec of quality 3, whose weights somebody has to give.

@@ -3,7 +3,7 @@ use super::{Kind, Options};
 use crate::report::names::{
     ALL_ATTRIBUTES, DC, FORMAT, FORMATS, LAMBDA_MSG, LAMBDA_OFFSET, LAMBDA_RECON, MESSAGE_ONLY, NO_OFFSET, NONE,
     OCCLUSION, PAPER_ATTACKS, PRUNE_LOWEST, PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, ROBUST,
-    ROBUST_TO_ALL, SH_NOISE, STANDARD,
+    ROBUST_TO_ALL, SH_DEGREE, SH_NOISE, STANDARD,
 };
 use crate::report::paper::{self, ABLATION_BITS, ROBUSTNESS_BITS, Source};
 use crate::report::selection::Selection;
@@ -139,9 +139,10 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
         Kind::Formats => {
             let mut names: Vec<String> = vec![NONE.into()];
             names.extend(FORMATS.map(|format| format!("{FORMAT}{format}")));
+            names.push(format!("{SH_DEGREE}0"));
             let expected: Vec<&str> = names.iter().map(String::as_str).collect();
-            let more = family(selection, options.bits, FORMAT, &expected);
-            let attacks = expected.into_iter().chain(more).collect();
+            let more = [FORMAT, SH_DEGREE].map(|prefix| family(selection, options.bits, prefix, &expected));
+            let attacks = expected.iter().copied().chain(more.into_iter().flatten()).collect();
             vec![section("format", false, by_attack(options.bits, attacks, None))]
         }
         Kind::Sensitivity => {
@@ -221,7 +222,14 @@ fn family<'a>(selection: &Selection<'a>, bits: u32, prefix: &str, known: &[&str]
 
 /// Attacks on pictures that are not among those known: all that no other report tells.
 fn others<'a>(selection: &Selection<'a>, bits: u32, known: &[&str]) -> Vec<&'a str> {
-    let told = [PRUNE_LOWEST_PREFIX, PRUNE_RANDOM_PREFIX, SH_NOISE, OCCLUSION, FORMAT];
+    let told = [
+        PRUNE_LOWEST_PREFIX,
+        PRUNE_RANDOM_PREFIX,
+        SH_NOISE,
+        OCCLUSION,
+        FORMAT,
+        SH_DEGREE,
+    ];
     let is_told = |attack: &str| told.iter().any(|prefix| attack.starts_with(prefix));
     let all = attacks(selection, bits);
     all.filter(|attack| !is_told(attack) && !known.contains(attack))

@@ -21,6 +21,7 @@ fn some() -> Records {
         "prune-random:0.1",
         "sh-noise:0.01",
         "format:spz",
+        "sh-degree:0",
     ] {
         all.push(Record::Reading(reading(&marks[0], attack, &[15])));
         all.push(Record::Reading(reading(&marks[1], attack, &[31])));
@@ -95,6 +96,7 @@ fn ablations_and_families() {
     let formats = rows(&made(Kind::Formats, &records));
     assert_eq!(formats[1], row("format:ply", "not measured"));
     assert_eq!(formats[3], row("format:spz", "96.88"));
+    assert_eq!(formats[6..], [row("sh-degree:0", "96.88")]);
     let longer = rows(&made(Kind::Longer, &records));
     assert_eq!(longer, [row("128", "not measured")]);
 }
