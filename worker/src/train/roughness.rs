@@ -7,8 +7,8 @@
 use crate::scene::Gaussians;
 use rand::{Rng, RngExt};
 
-/// Largest standard deviation of coefficients that are not constant: of all channels together, and of each channel. A
-/// third of the way to it is what `playbot_31k.ply` has (docs/clip.md, "Lightness").
+/// Largest standard deviation of coefficients that are not constant: of all channels together, and of each channel.
+/// `playbot_31k.ply` has about two thirds of it (docs/clip.md, "Lightness is what varies with the view").
 const VIEWS: [f32; 2] = [0.24, 0.09];
 /// The same of constant coefficients.
 const GRAIN: [f32; 2] = [0.7, 0.28];
