@@ -186,8 +186,7 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                 add(BITS, names::RING, ring, &none)?;
             }
             Kind::Formats => {
-                let mut trials = vec![names::NONE.to_string(), "sh-degree:0".into()];
-                trials.extend(names::FORMATS.map(|format| format!("{}{format}", names::FORMAT)));
+                let trials = names::formats();
                 let trials: Vec<&str> = trials.iter().map(String::as_str).collect();
                 add(BITS, names::STANDARD, *standard, &trials)?;
             }

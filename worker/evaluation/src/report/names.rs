@@ -60,6 +60,15 @@ pub const FORMAT: &str = "format:";
 pub const SH_DEGREE: &str = "sh-degree:";
 /// Formats that scenes can have.
 pub const FORMATS: [&str; 5] = ["ply", "compressed-ply", "spz", "splat", "sog"];
+/// What a mark is read after to know which formats it survives: nothing, each format, and what formats drop most of.
+pub fn formats() -> Vec<String> {
+    let formats = FORMATS.map(|format| format!("{FORMAT}{format}"));
+    std::iter::once(NONE.into())
+        .chain(formats)
+        .chain([format!("{SH_DEGREE}0")])
+        .collect()
+}
+
 /// Compressed by the learned codec of quality 3, whose weights somebody has to give.
 pub const VAE: &str = "vae:3";
 /// Attacks of the paper's Table 2, in its order.

@@ -1,9 +1,9 @@
 //! Which cases each report asks for, whether they were measured or not.
 use super::{Kind, Options};
 use crate::report::names::{
-    ALL_ATTRIBUTES, DC, FORMAT, FORMATS, LAMBDA_MSG, LAMBDA_OFFSET, LAMBDA_RECON, MESSAGE_ONLY, NO_OFFSET, NONE,
-    OCCLUSION, PAPER_ATTACKS, PRUNE_LOWEST, PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, ROBUST,
-    ROBUST_TO_ALL, SH_DEGREE, SH_NOISE, STANDARD,
+    ALL_ATTRIBUTES, DC, FORMAT, LAMBDA_MSG, LAMBDA_OFFSET, LAMBDA_RECON, MESSAGE_ONLY, NO_OFFSET, NONE, OCCLUSION,
+    PAPER_ATTACKS, PRUNE_LOWEST, PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, ROBUST, ROBUST_TO_ALL,
+    SH_DEGREE, SH_NOISE, STANDARD, formats,
 };
 use crate::report::paper::{self, ABLATION_BITS, ROBUSTNESS_BITS, Source};
 use crate::report::selection::Selection;
@@ -137,9 +137,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             vec![section("perturbed", false, by_attack(options.bits, attacks, None))]
         }
         Kind::Formats => {
-            let mut names: Vec<String> = vec![NONE.into()];
-            names.extend(FORMATS.map(|format| format!("{FORMAT}{format}")));
-            names.push(format!("{SH_DEGREE}0"));
+            let names = formats();
             let expected: Vec<&str> = names.iter().map(String::as_str).collect();
             let more = [FORMAT, SH_DEGREE].map(|prefix| family(selection, options.bits, prefix, &expected));
             let attacks = expected.iter().copied().chain(more.into_iter().flatten()).collect();
