@@ -165,6 +165,11 @@ fn machine() -> u64 {
         .map_or(total, |limits| limits.total_memory.min(total))
 }
 
+/// Lets [`peak`] begin anew with what is in use now. Says whether the system did so.
+pub fn forget_peak() -> bool {
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
+}
+
 /// The most memory that this process has had in use at once, in bytes; `None` where the system does not tell.
 pub fn peak() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

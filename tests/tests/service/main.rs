@@ -16,10 +16,10 @@ use guardsplat_tests::Bench;
 use serde_json::Value;
 
 /// Marks like the embed jobs of these tests, offline.
-const OFFLINE: &str = "embed in.ply expected.ply --key k.key --message c0ffee42 --seed 5 --size 32 --device cpu --force \
+const OFFLINE: &str = "embed in.ply expected.ply --key k.key --message c0ffee42 --seed 5 --size 64 --device cpu --force \
     --report report --json --preset";
 /// The same through the service.
-const EMBED: &str = "embed in.ply --key site --message c0ffee42 --seed 5 --size 32 --force --preset";
+const EMBED: &str = "embed in.ply --key site --message c0ffee42 --seed 5 --size 64 --force --preset";
 /// A key as in `k.key`.
 const KEY: &str = "key create --bits 32 --seed 7 --display-name site";
 /// `embed --force` with the tiny CLIP, which sees too little for any target.

@@ -10,6 +10,9 @@
 //!
 //! A second factor, on SSIM within reconstruction, holds an SSIM in the same way, between 0 and 1: a weight that scenes full of
 //! texture do not feel would leave a scene of few smooth surfaces hardly any place for a mark.
+//!
+//! Where bits stay wrong, both targets give way a little, and no further than the scene needs ([`Yielding`]): a scene of few
+//! smooth surfaces holds 64 bits at 38 dB that it does not hold at 40, and one full of texture gains nothing.
 use serde::{Deserialize, Serialize};
 
 use super::settings::within;
@@ -34,7 +37,28 @@ pub struct Balance {
     /// SSIM to hold on training views, by weighing it less where it is above; `None` leaves its weight.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target_ssim: Option<f64>,
+    /// What is given up of both where bits stay wrong; `None` for nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yielding: Option<Yielding>,
 }
+
+/// How far targets give way. After [`YIELDS_AFTER`] steps the share that they have given way grows by [`YIELDING`] times what
+/// the running bit accuracy lacks of `below`, and shrinks likewise; it stays within 0 and 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Yielding {
+    /// Training bit accuracy below which they do.
+    pub below: f64,
+    /// Of the PSNR at most, dB.
+    pub psnr_db: f64,
+    /// Of the SSIM at most.
+    pub ssim: f64,
+}
+
+/// Steps before which bits may be wrong because they were not learnt yet.
+const YIELDS_AFTER: usize = 80;
+/// Of the share of a [`Yielding`], for each step and all bits that are lacking: all of it within 80 steps of 0.05.
+const YIELDING: f64 = 0.25;
 
 /// Of the logarithm of the factor on SSIM, for each unit below the target.
 const SSIM_PROPORTIONAL: f64 = 300.0;
@@ -53,6 +77,7 @@ impl Default for Balance {
             limit: 100.0,
             memory: 0.8,
             target_ssim: None,
+            yielding: None,
         }
     }
 }
@@ -64,6 +89,11 @@ impl Balance {
         within("balance.integral", self.integral, 0.0, 100.0)?;
         within("balance.limit", self.limit, 1.0, 1e6)?;
         within("balance.target_ssim", self.target_ssim.unwrap_or(0.0), 0.0, 1.0)?;
+        if let Some(yielding) = self.yielding {
+            within("balance.yielding.below", yielding.below, 0.0, 1.0)?;
+            within("balance.yielding.psnr_db", yielding.psnr_db, 0.0, 100.0)?;
+            within("balance.yielding.ssim", yielding.ssim, 0.0, 1.0)?;
+        }
         within("balance.memory", self.memory, 0.0, 0.9999)
     }
 }
@@ -78,6 +108,9 @@ pub struct Balancer {
     factor: f64,
     /// The same two of SSIM.
     ssim: (f64, f64),
+    steps: usize,
+    /// Share of the [`Yielding`] that is given up.
+    given: f64,
 }
 
 /// What terms of the loss are multiplied by.
@@ -98,6 +131,8 @@ impl Balancer {
             sum: 0.0,
             factor: 1.0,
             ssim: (0.0, 1.0),
+            steps: 0,
+            given: 0.0,
         }
     }
 
@@ -117,7 +152,15 @@ impl Balancer {
         let before = self.running.unwrap_or(now);
         let running: [f64; 3] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
         self.running = Some(running);
-        let mut below = b.target_psnr_db - running[0];
+        self.steps += 1;
+        let mut given = [0.0; 2];
+        if let Some(yielding) = b.yielding {
+            if self.steps > YIELDS_AFTER {
+                self.given = (self.given + YIELDING * (yielding.below - running[1])).clamp(0.0, 1.0);
+            }
+            given = [yielding.psnr_db, yielding.ssim].map(|most| most * self.given);
+        }
+        let mut below = b.target_psnr_db - given[0] - running[0];
         if running[1] >= b.bit_accuracy {
             below = below.max(0.0);
         }
@@ -125,7 +168,7 @@ impl Balancer {
         self.sum = (self.sum + b.integral * below).clamp(-limit, limit);
         self.factor = (self.sum + b.proportional * below).clamp(-limit, limit).exp();
         if let Some(target) = b.target_ssim {
-            let below = target - running[2];
+            let below = target - given[1] - running[2];
             let least = SSIM_LEAST.ln();
             let sum = (self.ssim.0 + SSIM_INTEGRAL * below).clamp(least, 0.0);
             self.ssim = (sum, (sum + SSIM_PROPORTIONAL * below).clamp(least, 0.0).exp());
@@ -196,6 +239,37 @@ mod tests {
         slow.update(40.0, 0.5, 0.5);
         slow.update(30.0, 0.5, 0.5); // the mean is 38
         assert!(slow.factors().reconstruction < 1.0 && slow.factors().ssim == 1.0);
+    }
+
+    #[test]
+    fn targets_give_way_where_bits_stay_wrong_and_come_back() {
+        let yielding = Yielding {
+            below: 0.9,
+            psnr_db: 2.0,
+            ssim: 0.004,
+        };
+        let mut b = Balancer::new(Some(Balance {
+            target_psnr_db: 40.0,
+            target_ssim: Some(0.994),
+            proportional: 1.0,
+            integral: 0.0,
+            memory: 0.0,
+            yielding: Some(yielding),
+            ..Balance::default()
+        }));
+        let mut after = |steps: usize, bits: f64| {
+            for _ in 0..steps {
+                b.update(40.0, bits, 0.992);
+            }
+            (f64::from(b.factors().reconstruction).ln(), b.factors().ssim)
+        };
+        // Not while they are learnt; then by a quarter of the tenth that is lacking, each step.
+        assert_eq!(after(YIELDS_AFTER, 0.5), (0.0, 1.0));
+        assert!((after(1, 0.8).0 + 2.0 * 0.025).abs() < 1e-6);
+        // Two dB at most, and a mark that is above the lower SSIM has room.
+        let (psnr, ssim) = after(100, 0.8);
+        assert!((psnr + 2.0).abs() < 1e-6 && ssim < 1.0, "{psnr} {ssim}");
+        assert_eq!(after(100, 1.0), (0.0, 1.0));
     }
 
     #[test]

@@ -40,6 +40,12 @@ impl Learned {
         }
     }
 
+    /// Makes all changes smaller or larger by a factor.
+    pub fn scale(&mut self, factor: f32, scene: &Scene) {
+        self.values.iter_mut().for_each(|v| *v *= factor);
+        self.settle(scene);
+    }
+
     /// To be called after the values have changed: works out anew what the file keeps of them.
     pub fn settle(&mut self, scene: &Scene) {
         let Some(kept) = &mut self.kept else {

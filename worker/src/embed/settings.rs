@@ -6,6 +6,7 @@ use super::adam::AdamOptions;
 use super::augment::Augmentation;
 use super::balance::Balance;
 use super::descent::DescentOptions;
+use super::target::Target;
 use crate::error::{Error, Result};
 
 /// Weights of the terms of the loss.
@@ -66,18 +67,6 @@ pub struct Verify {
     pub size: Option<u32>,
     /// The message must be right from so many of them.
     pub message_views: usize,
-}
-
-/// What a marked scene must reach to be written.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Target {
-    /// Mean bit accuracy on held-out views.
-    pub bit_accuracy: f64,
-    /// Mean PSNR on held-out views, dB.
-    pub psnr_db: f64,
-    /// Whether the whole message must be right from [`Verify::message_views`] views.
-    pub message: bool,
 }
 
 /// Training views on a circle around the scene, all at one height and one distance, as in the paper's public code, instead

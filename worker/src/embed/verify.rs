@@ -1,5 +1,5 @@
 //! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views over the sphere.
-use super::settings::{Settings, Target};
+use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::{Comparison, Engine, Reading, default_size};
 use crate::message::Message;
@@ -22,6 +22,10 @@ pub struct Verification {
     pub message: Message,
     /// Whether that is the whole message.
     pub message_recovered: bool,
+    /// Bits of it that are wrong.
+    pub wrong_bits: usize,
+    /// Bits that are wrong where all views are read together, as a claim reads a scene.
+    pub wrong_bits_of_all: usize,
     /// How much the mark shows.
     pub quality: Quality,
     /// How many views.
@@ -61,34 +65,17 @@ pub fn verify(
     pairs.truncate(KEPT_PAIRS);
     let reading = Reading::new(logits)?;
     let read = reading.of_first(settings.verify.message_views)?.message()?;
+    let wrong_bits_of_all = message.len() - reading.message()?.matches(message);
     Ok(Verification {
         comparison: reading.compare(message)?,
         reading,
         message_recovered: read == *message,
+        wrong_bits: message.len() - read.matches(message),
+        wrong_bits_of_all,
         message: read,
         quality,
         views: settings.verify.views,
         size,
         pairs,
     })
-}
-
-impl Verification {
-    /// What misses the target, in words; nothing when all is reached.
-    pub fn missed(&self, target: &Target) -> Vec<String> {
-        let mut missed = Vec::new();
-        let accuracy = self.comparison.bit_accuracy;
-        if accuracy < target.bit_accuracy {
-            missed.push(format!("bit accuracy {accuracy:.4} is below {}", target.bit_accuracy));
-        }
-        if let Some(psnr) = self.quality.psnr.psnr_db
-            && psnr < target.psnr_db
-        {
-            missed.push(format!("PSNR {psnr:.2} dB is below {} dB", target.psnr_db));
-        }
-        if target.message && !self.message_recovered {
-            missed.push(format!("the message reads {}", self.message));
-        }
-        missed
-    }
 }

@@ -24,14 +24,16 @@ const POOLS: [usize; 3] = [1, 3, 10];
 const RATE: f64 = 1e-6;
 /// Wrong claims about each group of views.
 const WRONG: u64 = 250;
-/// What people do to a picture before they show it: screenshots at half the size, cropped, sent, and all of that.
-const CHANGES: [&str; 7] = [
+/// What people do to a picture before they show it: screenshots at half the size, cropped, of a page that shows it, sent, and
+/// some of that together.
+const CHANGES: [&str; 8] = [
     "scale:0.5",
     "crop:0.8",
     "jpeg:75",
     "webp:75",
     "brightness:0.8..1.2",
     "border:0.1",
+    "page:0.6",
     "crop:0.8+scale:0.75+jpeg:85",
 ];
 

@@ -1,4 +1,5 @@
 //! One picture read in every framing, and pictures of one suspect taken together.
+use super::window::Window;
 use super::{Engine, Framing, Reading, without_borders};
 use crate::error::Result;
 use crate::picture::Picture;
@@ -9,6 +10,8 @@ pub struct Framed {
     whole: Vec<Vec<f32>>,
     /// Without its borders, if it has any.
     trimmed: Option<Vec<Vec<f32>>>,
+    /// Its parts, if it is large enough and the engine reads parts.
+    parts: Option<Vec<Vec<f32>>>,
 }
 
 impl Framed {
@@ -21,7 +24,11 @@ impl Framed {
         let trimmed = without_borders(picture)
             .map(|trimmed| Framing::read(engine, &trimmed))
             .transpose()?;
-        Ok(Self { whole, trimmed })
+        let parts = match engine.extractor.reads_exact_colours() {
+            true => Window::read(engine, picture)?,
+            false => None,
+        };
+        Ok(Self { whole, trimmed, parts })
     }
 
     /// Logits of the picture as it was given.
@@ -31,7 +38,7 @@ impl Framed {
 }
 
 /// Readings of pictures of one suspect, all in the same framing, as given first. Framings without borders are there only
-/// if some picture has any: others would be the same once more.
+/// if some picture has any, and parts if some picture is large enough: others would be the same once more.
 ///
 /// # Errors
 /// No pictures, or logits that are not finite.
@@ -45,6 +52,16 @@ pub fn framings(engine: &Engine, pictures: &[Framed]) -> Result<Vec<(Framing, Re
                 _ => picture.whole[place].clone(),
             };
             readings.push((framing, Reading::new(pictures.iter().map(of_picture).collect())?));
+        }
+    }
+    if pictures.iter().any(|picture| picture.parts.is_some()) {
+        for (place, window) in Window::tried().enumerate() {
+            let of_picture = |picture: &Framed| match &picture.parts {
+                Some(logits) => logits[place].clone(),
+                None => picture.as_given().to_vec(),
+            };
+            let reading = Reading::new(pictures.iter().map(of_picture).collect())?;
+            readings.push((Framing::of(window), reading));
         }
     }
     Ok(readings)

@@ -3,6 +3,7 @@
 //! Each is read for itself, and each is a hypothesis of its own: whoever decides on the best of them pays for all.
 use super::Engine;
 use super::restore::{Guess, guesses, read_guesses};
+use super::window::Window;
 use crate::error::Result;
 use crate::picture::Picture;
 
@@ -22,6 +23,8 @@ pub struct Framing {
     pub trimmed: bool,
     /// What is guessed to have been done to its tones, and undone.
     pub undone: Guess,
+    /// A part of it is read, the rest is not.
+    pub window: Option<Window>,
 }
 
 impl std::fmt::Display for Framing {
@@ -36,6 +39,9 @@ impl std::fmt::Display for Framing {
         if self.trimmed {
             f.write_str(", without borders")?;
         }
+        if let Some(window) = self.window {
+            write!(f, ", {window}")?;
+        }
         Ok(())
     }
 }
@@ -48,9 +54,17 @@ impl Framing {
                 quarter_turns,
                 mirrored,
                 trimmed,
-                undone: Guess::Nothing,
+                ..Self::default()
             })
         })
+    }
+
+    /// A part of a picture, as it is.
+    pub fn of(window: Window) -> Self {
+        Self {
+            window: Some(window),
+            ..Self::default()
+        }
     }
 
     /// The ways that this engine tries on a picture, as given first; with borders or `trimmed`. How a picture lies makes no

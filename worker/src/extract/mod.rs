@@ -7,6 +7,7 @@ mod kind;
 mod pictures;
 mod reading;
 mod restore;
+mod window;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
@@ -17,6 +18,7 @@ pub use kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use reading::{Comparison, Reading};
 pub use restore::{Guess, Tone, guesses, read_guesses};
+pub use window::Window;
 
 use crate::error::Result;
 use crate::picture::Picture;

@@ -177,6 +177,11 @@ pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
         views: reading.views.len() as u32,
         logits: reading.summed.clone(),
         undone: undone(framing.undone),
+        part: framing.window.map(|window| api::PicturePart {
+            left_twelfths: window.left,
+            top_twelfths: window.top,
+            side_twelfths: window.side,
+        }),
     }
 }
 

@@ -58,17 +58,11 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
             force,
             bad_rows,
         };
-        let mut outcome = embed(engine, &job, &mut |progress| {
+        let outcome = embed(engine, &job, &mut |progress| {
             if let Some(progress) = convert::embedding_progress(&progress) {
                 reporter.tell(progress);
             }
         })?;
-        if secret {
-            let read = outcome.verification.message.to_string();
-            for missed in &mut outcome.missed {
-                *missed = missed.replace(&read, "otherwise");
-            }
-        }
         if !outcome.written {
             return Err(Error::TargetMissed(outcome.missed.join(", ")));
         }

@@ -4,6 +4,7 @@ use std::time::Duration;
 use guardsplat_proto::v1::{
     CompleteJobRequest, FailJobRequest, Failure, Job, LeaseJobResponse, Progress, ReleaseJobRequest, ReportJobRequest,
 };
+use guardsplat_worker::memory;
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
 
@@ -31,6 +32,8 @@ pub struct Lease {
     pub duration: Duration,
     /// What the work is a part of, as `traceparent` has it; empty where nobody traces.
     pub trace_parent: String,
+    /// Whether the peak of memory is this attempt's, and not also of what was before.
+    measured: bool,
 }
 
 /// Why an attempt ends that is not done.
@@ -82,6 +85,7 @@ impl Lease {
             token: answer.lease_token,
             duration,
             trace_parent: answer.trace_parent,
+            measured: memory::forget_peak(),
         };
         Ok(Some((lease, job)))
     }
@@ -136,6 +140,7 @@ impl Lease {
             readings: outcome.readings,
             engine: ENGINE.into(),
             views: outcome.views,
+            peak_memory_bytes: self.peak(),
         };
         let call = "complete the job";
         persist(call, async || {
@@ -143,6 +148,11 @@ impl Lease {
         })
         .await?;
         Ok(())
+    }
+
+    /// Bytes of memory that the process took at most during the attempt; those of a GPU of its own are not among them.
+    fn peak(&self) -> Option<u64> {
+        memory::peak().filter(|_| self.measured)
     }
 
     /// The attempt failed; tried for as long as the lease lasts.
@@ -168,6 +178,7 @@ impl Lease {
         let request = FailJobRequest {
             name: self.job.clone(),
             lease_token: self.token.clone(),
+            peak_memory_bytes: self.peak(),
             ..request
         };
         let call = "end the job";

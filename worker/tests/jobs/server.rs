@@ -239,6 +239,14 @@ impl ArtifactService for Service {
         Err(Status::unimplemented("not for workers"))
     }
 
+    async fn start_upload(&self, _: Request<StartUploadRequest>) -> Result<Response<StartUploadResponse>, Status> {
+        Err(Status::unimplemented("not for workers"))
+    }
+
+    async fn finish_upload(&self, _: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
+        Err(Status::unimplemented("not for workers"))
+    }
+
     async fn get_artifact(&self, _: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         Err(Status::unimplemented("not for workers"))
     }

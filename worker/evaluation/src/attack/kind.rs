@@ -37,6 +37,8 @@ pub enum Kind {
     Window,
     /// White frame around the picture, as wide as this share of its shorter side (at least a pixel); the picture grows.
     Border,
+    /// At a random place of a page, of whose sides it is this share; the rest is white, with boxes of random colours.
+    Page,
     /// Values times this, clamped.
     Brightness,
     /// Distance of values from the mean grey of the picture times this, as torchvision's `adjust_contrast`.
@@ -90,7 +92,7 @@ const fn limits(least: f64, most: f64, grid: Grid, identity: Option<f64>) -> Opt
 
 impl Kind {
     /// Every kind, in the order of the docs.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Jpeg,
         Self::Webp,
         Self::Noise,
@@ -107,6 +109,7 @@ impl Kind {
         Self::CropRandom,
         Self::Window,
         Self::Border,
+        Self::Page,
         Self::Brightness,
         Self::Contrast,
         Self::Gamma,
@@ -152,6 +155,7 @@ impl Kind {
             Self::CropRandom => ("crop-random", real(0.01, 1.0, 1.0)),
             Self::Window => ("window", limits(1.0, side, Grid::Whole, Some(side))),
             Self::Border => ("border", real(0.0, 1.0, 0.0)),
+            Self::Page => ("page", real(0.1, 1.0, 1.0)),
             Self::Brightness => ("brightness", real(0.0, 10.0, 1.0)),
             Self::Contrast => ("contrast", real(0.0, 10.0, 1.0)),
             Self::Gamma => ("gamma", real(0.1, 10.0, 1.0)),

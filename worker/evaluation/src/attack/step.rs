@@ -86,6 +86,7 @@ impl Step {
             Kind::CropRandom => frame::crop_random(&picture, value, random),
             Kind::Window => frame::window(&picture, value as u32),
             Kind::Border => frame::border(&picture, value)?,
+            Kind::Page => frame::page(&picture, value, random)?,
             Kind::Brightness => colour::brightness(picture, value),
             Kind::Contrast => colour::contrast(picture, value),
             Kind::Gamma => colour::gamma(picture, value),

@@ -29,7 +29,7 @@ pub(super) fn section(decision: &Decision, verification: &Verification) -> Marku
 fn row(framing: &Framing) -> Markup {
     let name = match framing.kind {
         FramingKind::AsGiven => "As given",
-        FramingKind::Crop => "Crops",
+        FramingKind::Crop => "Parts, or without borders",
         FramingKind::QuarterTurn => "Quarter turns",
         FramingKind::Mirrored => "Mirrored",
         FramingKind::Scaling => "Other scales",

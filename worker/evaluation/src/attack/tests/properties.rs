@@ -116,6 +116,7 @@ fn every_other_strength_changes_something() {
         "crop-random:0.9",
         "window:39",
         "border:0.1",
+        "page:0.9",
         "brightness:0.9",
         "contrast:0.9",
         "gamma:0.9",

@@ -18,6 +18,7 @@ fn sizes_are_shares_to_the_nearest_pixel() {
     assert_eq!(size("fit:512", 300, 512), (300, 512));
     assert_eq!(size("window:512", 1000, 300), (512, 300));
     assert_eq!(size("border:0.5", 10, 4), (14, 8));
+    assert_eq!(size("page:0.4", 10, 4), (25, 10));
     assert_eq!(size("quarter-turns:1", 10, 4), (4, 10));
     assert_eq!(size("rotate:30", 10, 4), (10, 4));
     assert_eq!(size("crop:0.01", 30, 7), (1, 1));
@@ -56,6 +57,26 @@ fn borders_are_white_and_outside() {
     assert_eq!(crop_imm(&framed, 2, 2, 10, 4).to_image(), picture);
     let white = framed.pixels().filter(|pixel| pixel.0 == [255; 3]).count();
     assert_eq!(white, 14 * 8 - 10 * 4);
+}
+
+#[test]
+fn pages_have_the_picture_in_one_piece_and_much_else() {
+    let picture = varied(40, 20);
+    let mut places = std::collections::BTreeSet::new();
+    for index in 0..20 {
+        let page = attack("page:0.5").apply(&picture, 3, index).unwrap();
+        let all = (0..=40).flat_map(|left| (0..=20).map(move |top| (left, top)));
+        let at = |&(left, top): &(u32, u32)| crop_imm(&page, left, top, 40, 20).to_image() == picture;
+        let found: Vec<_> = all.filter(at).collect();
+        assert_eq!(found.len(), 1);
+        places.extend(found);
+        let plain = page.pixels().filter(|pixel| pixel.0 == [255; 3]).count();
+        assert!(
+            (1000..2400 * 3 / 4).contains(&plain),
+            "{plain} of 2,400 pixels beside the picture"
+        );
+    }
+    assert!(places.len() > 15, "{places:?}");
 }
 
 #[test]
