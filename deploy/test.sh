@@ -35,6 +35,13 @@ run_tests() {
     return "$status"
 }
 
+# What Grafana, Prometheus and KEDA are to ask, read as Prometheus does.
+check_queries() {
+    local tool=(--locked --manifest-path tools/promql/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}/promql")
+    cargo test --quiet "${tool[@]}"
+    cargo run --quiet "${tool[@]}" -- deploy/monitoring/{dashboard.json,alerts.yaml} deploy/kubernetes/scaling.yaml
+}
+
 stage setup setup
 stage "setup of tests" setup_tests
 for tool in fmt clippy; do
@@ -47,6 +54,7 @@ done
 # serves the tests and the quickstart, so that no dependency is built twice.
 stage formatting cargo fmt --all --check
 stage protos bash deploy/check-api.sh
+stage queries check_queries
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests

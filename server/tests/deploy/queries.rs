@@ -14,6 +14,7 @@ const BESIDES: [&str; 3] = ["job", "instance", "le"];
 fn exported() -> String {
     let metrics = Metrics::default();
     metrics.tally(Some(Default::default()), 0);
+    metrics.workers(Some(&[]));
     for (part, well) in Readiness::default().parts() {
         metrics.ready(part, well);
     }
