@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{OsStringValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use uuid::Uuid;
 
 use crate::commands;
@@ -17,6 +17,22 @@ pub struct Arguments {
     pub global: Global,
     #[command(subcommand)]
     pub command: Command,
+}
+
+impl Arguments {
+    /// What was typed, and the name of its command: `jobs watch`.
+    pub fn read() -> clap::error::Result<(Self, String)> {
+        let matches = Self::command().try_get_matches()?;
+        let name = command_name(&matches);
+        Ok((Self::from_arg_matches(&matches)?, name))
+    }
+}
+
+/// The command and those below it, which are words of this program.
+fn command_name(matches: &ArgMatches) -> String {
+    let below = std::iter::successors(matches.subcommand(), |(_, matches)| matches.subcommand());
+    let names: Vec<&str> = below.map(|(name, _)| name).collect();
+    names.join(" ")
 }
 
 const EXAMPLE: &str = "\
@@ -199,6 +215,19 @@ mod tests {
             "completions bash",
         ] {
             assert!(parse(line).is_ok(), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_command_is_called_by_its_words_alone() {
+        for (line, name) in [
+            ("jobs watch J --cursor C", "jobs watch"),
+            ("embed IN -o O --key K --message 0", "embed"),
+            ("--server http://h:1 token list", "token list"),
+        ] {
+            let line = std::iter::once("guardsplat").chain(line.split_whitespace());
+            let matches = Arguments::command().try_get_matches_from(line).unwrap();
+            assert_eq!(command_name(&matches), name);
         }
     }
 

@@ -15,7 +15,7 @@ use crate::error::{Error, Result, why_lost};
 use crate::interrupt::Stage;
 use crate::server::{Server, is_lost};
 use crate::settings::Settings;
-use crate::trace;
+use crate::trace::{self, Trace};
 
 /// What the commands share.
 pub struct Context {
@@ -38,9 +38,14 @@ impl Context {
             server: Server::new(&Settings::load(global)?)?,
             console: Console::new(),
             json: global.json,
-            trace: trace::parent(),
+            trace: None,
             stage: RefCell::new(Stage::Nothing),
         })
+    }
+
+    /// From here on, calls say that they are a part of this.
+    pub fn trace(&mut self, trace: &Trace) {
+        self.trace = trace.header.clone();
     }
 
     /// From here on, an interrupt leaves things so.

@@ -117,18 +117,33 @@ impl Error {
         }
     }
 
-    fn document(&self) -> Document {
-        let details = match self {
-            Self::Refused { status, .. } => Some(Details::from(&**status)),
-            _ => None,
-        };
-        let reason = match self {
+    /// Why, in one word: the server's, in capitals, or one of a few.
+    fn word(&self) -> Option<String> {
+        match self {
             Self::NoServer { .. } => Some("no_server".into()),
             Self::Lost { .. } => Some("connection_lost".into()),
             Self::JobFailed { reason, .. } => Some(reason.clone()),
             Self::JobCancelled { .. } => Some("cancelled".into()),
             Self::Interrupted { .. } => Some("interrupted".into()),
-            _ => details.as_ref().and_then(|d| d.reason.clone()),
+            Self::Refused { status, .. } => Details::from(&**status).reason,
+            _ => None,
+        }
+    }
+
+    /// Why, in one word, for a trace: also where programs are told more.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Told(error) => error.reason(),
+            Self::Refused { status, .. } => self.word().unwrap_or_else(|| Details::from(&**status).code),
+            // What OpenTelemetry calls what has no name of its own.
+            _ => self.word().unwrap_or_else(|| "_OTHER".into()),
+        }
+    }
+
+    fn document(&self) -> Document {
+        let details = match self {
+            Self::Refused { status, .. } => Some(Details::from(&**status)),
+            _ => None,
         };
         let job = match self {
             Self::JobFailed { job, .. } | Self::JobCancelled { job } => Some(job.clone()),
@@ -142,7 +157,7 @@ impl Error {
                     _ => details.as_ref().map_or_else(|| self.to_string(), |d| d.message.clone()),
                 },
                 code: details.as_ref().map(|d| d.code.clone()),
-                reason,
+                reason: self.word(),
                 field_violations: details.as_ref().map(|d| d.field_violations.clone()).unwrap_or_default(),
                 resource: details.as_ref().and_then(|d| d.resource.clone()),
                 metadata: details.as_ref().map(|d| d.metadata.clone()),

@@ -23,15 +23,14 @@ mod webhook;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use arguments::Arguments;
 use context::Context;
 use error::{Error, Result};
 use output::Exit;
+use trace::Trace;
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let (arguments, name) = match Arguments::read() {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are no errors. clap's own code for wrong usage, 2, means no match here.
@@ -41,7 +40,7 @@ fn main() -> ExitCode {
         }
     };
     let json = arguments.global.json;
-    match run(arguments) {
+    match run(arguments, &name) {
         Ok(exit) => ExitCode::from(exit.code()),
         Err(error) => {
             error.tell(json);
@@ -50,25 +49,33 @@ fn main() -> ExitCode {
     }
 }
 
-/// Carries out one command; an interrupt ends it at any time.
-fn run(arguments: Arguments) -> Result<Exit> {
+/// Carries out one command, which is called `name`; an interrupt ends it at any time.
+fn run(arguments: Arguments, name: &str) -> Result<Exit> {
     let Arguments { global, command } = arguments;
     if let arguments::Command::Completions(which) = &command {
         return Ok(commands::completions::run(which));
     }
-    let context = Context::new(&global)?;
+    let mut context = Context::new(&global)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .map_err(|source| Error::Runtime { source })?;
     let result = runtime.block_on(async {
-        tokio::select! {
+        let trace = Trace::begin(name);
+        context.trace(&trace);
+        let result = tokio::select! {
             biased;
             () = interrupt::heard() => Err(interrupt::answer(&context).await),
             result = commands::run(&context, command) => result,
-        }
+        };
+        context.console.clear();
+        let (code, failure) = match &result {
+            Ok(exit) => (exit.code(), None),
+            Err(error) => (1, Some(error.reason())),
+        };
+        trace.end(code, failure).await;
+        result
     });
-    context.console.clear();
     // An interrupted command may have left a file being read; the process does not wait for it.
     runtime.shutdown_background();
     result

@@ -143,6 +143,12 @@ pub enum Error {
         /// When there is room for one more.
         retry_after: Duration,
     },
+    /// A caller that has as many watches open as it may have.
+    #[error("{limit} watches are open, and a caller may have no more at once")]
+    TooManyWatches {
+        /// Most that it may have.
+        limit: u32,
+    },
     /// A project that has as much as it may have.
     #[error("project {project} has used up its {limit} {what}")]
     QuotaUsedUp {
@@ -178,6 +184,9 @@ pub enum Error {
     /// An upload that took longer than bytes are kept that nobody finished.
     #[error("the upload was not finished after {} s", .0.as_secs())]
     UploadTooSlow(Duration),
+    /// A watch whose reader did not read.
+    #[error("nothing of the watch was read for {} s; it goes on from the last cursor", .0.as_secs())]
+    WatchStalled(Duration),
     /// The deadline that the caller set has passed.
     #[error("the deadline has passed")]
     DeadlineExceeded,

@@ -266,6 +266,8 @@ fn limits(settings: &Settings) -> Limits {
         max_priority: settings.max_priority,
         max_job_memory: settings.max_job_memory(),
         upload_idle: settings.upload_timeout(),
+        watch_stall: settings.watch_stall(),
+        max_watches: settings.max_watches_per_caller,
         false_positive_rate: settings.false_positive_rate,
         max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),
         max_bytes_of_project: Some(settings.max_artifact_bytes_per_project).filter(|&limit| limit > 0),

@@ -56,9 +56,13 @@ async fn address(context: &Context, name: &str) -> Option<(Artifact, String)> {
         .await
         .ok()?
         .into_inner();
-    let safe = answer.url.starts_with("https://")
-        || answer.url.starts_with("http://") && context.server.url.starts_with("http://");
+    let safe = is_as_safe(&context.server.url, &answer.url);
     Some((answer.artifact?, answer.url)).filter(|_| safe)
+}
+
+/// Whether the way to an address is as safe as the one to the server.
+pub(super) fn is_as_safe(server: &str, url: &str) -> bool {
+    url.starts_with("https://") || url.starts_with("http://") && server.starts_with("http://")
 }
 
 /// Goes on with the file; whether all of it is there.
@@ -84,13 +88,7 @@ async fn fetch(context: &Context, url: &str, artifact: &Artifact, file: &mut Des
 
 /// An answer that has the rest of the bytes.
 async fn ask(url: &str, offset: u64, size: u64, limit: Duration) -> Option<Response> {
-    // As everything else here it speaks TLS by ring; another provider that is chosen would do as well.
-    let _ = rustls::crypto::ring::default_provider().install_default();
-    let client = Client::builder()
-        .connect_timeout(CONNECT.min(limit))
-        .redirect(Policy::none());
-    let client = client.build().ok()?;
-    let (mut request, mut expected) = (client.get(url), StatusCode::OK);
+    let (mut request, mut expected) = (client(limit)?.get(url), StatusCode::OK);
     if offset > 0 {
         request = request.header(RANGE, format!("bytes={offset}-"));
         expected = StatusCode::PARTIAL_CONTENT;
@@ -98,4 +96,33 @@ async fn ask(url: &str, offset: u64, size: u64, limit: Duration) -> Option<Respo
     let answer = timeout(limit, request.send()).await.ok()?.ok()?;
     let whole = answer.status() == expected && answer.content_length() == Some(size - offset);
     Some(answer).filter(|_| whole)
+}
+
+/// What speaks to a store: to none but the one that the server named.
+pub(super) fn client(limit: Duration) -> Option<Client> {
+    // As everything else here it speaks TLS by ring; another provider that is chosen would do as well.
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let client = Client::builder()
+        .connect_timeout(CONNECT.min(limit))
+        .redirect(Policy::none());
+    client.build().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_way_is_less_safe_than_the_one_to_the_server() {
+        for (server, url, safe) in [
+            ("https://splat", "https://store", true),
+            ("https://splat", "http://store", false),
+            ("http://splat", "https://store", true),
+            ("http://splat", "http://store", true),
+            ("http://splat", "file:///etc", false),
+            ("http://splat", "", false),
+        ] {
+            assert_eq!(is_as_safe(server, url), safe, "{url} of {server}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 mod destination;
 mod direct;
 mod download;
+mod put;
 mod source;
 mod upload;
 

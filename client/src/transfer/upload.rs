@@ -1,4 +1,4 @@
-//! Sends files in chunks.
+//! Sends files, to the store where the server says how, else to the server in chunks.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -13,6 +13,7 @@ use tokio::time::Instant;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
+use super::put;
 use super::source::{CHUNK, Source};
 use crate::console::Unit;
 use crate::context::{Context, refused, silent};
@@ -21,18 +22,24 @@ use crate::server::is_lost;
 
 const DOING: &str = "sending the file";
 /// Chunks read ahead of the network.
-const AHEAD: usize = 4;
+pub(super) const AHEAD: usize = 4;
 /// Between two looks at how far it is.
-const LOOK: Duration = Duration::from_millis(200);
+pub(super) const LOOK: Duration = Duration::from_millis(200);
 
-/// Sends a file, from the beginning again if the connection is lost; `before` of `total` bytes went with other files.
+/// Sends a file; `before` of `total` bytes went with other files.
 pub async fn upload(context: &Context, source: &Source, before: u64, total: u64) -> Result<Artifact> {
+    match put::upload(context, source, before, total).await? {
+        Some(artifact) => Ok(artifact),
+        None => streamed(context, source, before, total).await,
+    }
+}
+
+/// From the beginning again if the connection is lost.
+async fn streamed(context: &Context, source: &Source, before: u64, total: u64) -> Result<Artifact> {
     let mut backoff = context.backoff();
     loop {
         match attempt(context, source, before, total).await? {
-            Ok(artifact) => {
-                return Ok(artifact);
-            }
+            Ok(artifact) => return Ok(artifact),
             Err(status) if is_lost(&status) => context.pause(&mut backoff, DOING, &status, "").await?,
             Err(status) => return Err(refused(DOING, status)),
         }
@@ -57,7 +64,10 @@ async fn attempt(context: &Context, source: &Source, before: u64, total: u64) ->
     let file = File::open(&source.path).await.map_err(Error::io(&source.path))?;
     let sent = Arc::new(AtomicU64::new(0));
     let (sender, receiver) = mpsc::channel(AHEAD);
-    let reading = tokio::spawn(read(file, metadata(source), sender, Arc::clone(&sent)));
+    let first = UploadArtifactRequest {
+        payload: Some(Payload::Metadata(metadata(source))),
+    };
+    let reading = tokio::spawn(read(file, first, sender, Arc::clone(&sent)));
     let answer = client.upload_artifact(context.request(ReceiverStream::new(receiver)));
     tokio::pin!(answer);
     let mut look = tokio::time::interval(LOOK);
@@ -94,14 +104,13 @@ async fn attempt(context: &Context, source: &Source, before: u64, total: u64) ->
     }
 }
 
-fn metadata(source: &Source) -> UploadArtifactRequest {
-    UploadArtifactRequest {
-        payload: Some(Payload::Metadata(UploadMetadata {
-            display_name: source.display_name.clone(),
-            // No file is longer than this.
-            size_bytes: i64::try_from(source.size).unwrap_or(i64::MAX),
-            sha256: source.sha256.clone(),
-        })),
+/// What is announced of a file.
+pub(super) fn metadata(source: &Source) -> UploadMetadata {
+    UploadMetadata {
+        display_name: source.display_name.clone(),
+        // No file is longer than this.
+        size_bytes: i64::try_from(source.size).unwrap_or(i64::MAX),
+        sha256: source.sha256.clone(),
     }
 }
 

@@ -11,7 +11,8 @@ use guardsplat_proto::v1::key_service_server::KeyServiceServer;
 use guardsplat_proto::v1::registry_service_server::RegistryServiceServer;
 use guardsplat_proto::v1::token_service_server::TokenServiceServer;
 use guardsplat_proto::v1::{
-    Artifact, Asset, CreateJobRequest, Delivery, EmbedResult, Failure, Hook, Job, Key, Owner, Token, WatchJobRequest,
+    Artifact, Asset, CreateJobRequest, Delivery, EmbedResult, Failure, Hook, Job, Key, Owner, Token, UploadMetadata,
+    WatchJobRequest,
 };
 use sha2::{Digest, Sha256};
 use tonic::service::InterceptorLayer;
@@ -43,6 +44,12 @@ pub struct State {
     pub chunks: Vec<usize>,
     /// Uploads that were begun.
     pub uploads: usize,
+    /// Uploads that were begun and go to the store, and the artifacts of those that were finished.
+    pub begun: BTreeMap<String, (UploadMetadata, Option<String>)>,
+    /// How often one was to be finished.
+    pub finishes: usize,
+    /// What the store was sent.
+    pub put: Vec<u8>,
     /// Names that were to be deleted.
     pub deleted: Vec<String>,
     /// Offsets that downloads began at.
@@ -71,6 +78,8 @@ pub struct State {
     pub deliveries: Vec<Delivery>,
     /// What calls showed as authorisation, in their order.
     pub shown: Vec<Option<String>>,
+    /// What calls said that they are a part of.
+    pub traced: Vec<Option<String>>,
     /// The public key, in hexadecimal.
     pub public_key: String,
 
@@ -78,12 +87,16 @@ pub struct State {
     pub watch: VecDeque<Vec<Step>>,
     /// What the next uploads fail with.
     pub upload_errors: VecDeque<Status>,
+    /// What the next finishes of uploads fail with, after they were carried out.
+    pub finish_errors: VecDeque<Status>,
     /// What the next creations fail with; they are kept all the same when it is a lost answer.
     pub create_errors: VecDeque<Status>,
     /// After how many bytes the next downloads end.
     pub download_ends: VecDeque<usize>,
     /// Where artifacts can be fetched from besides: what addresses begin with.
     pub addresses: Option<String>,
+    /// Where they can be sent to besides.
+    pub addresses_to_write: Option<String>,
     /// Whether downloads are damaged on their way.
     pub damage: bool,
 }
@@ -127,9 +140,14 @@ impl Fake {
                 sender.send(address).unwrap();
                 let noting = fake.clone();
                 let note = move |request: Request<()>| {
-                    let shown = request.metadata().get("authorization");
-                    let shown = shown.map(|shown| shown.to_str().unwrap().to_owned());
-                    noting.state().shown.push(shown);
+                    let said = |name| {
+                        let said = request.metadata().get(name);
+                        said.map(|said| said.to_str().unwrap().to_owned())
+                    };
+                    let mut state = noting.state();
+                    state.shown.push(said("authorization"));
+                    state.traced.push(said("traceparent"));
+                    drop(state);
                     Ok(request)
                 };
                 Server::builder()

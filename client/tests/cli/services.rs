@@ -9,13 +9,13 @@ use guardsplat_proto::v1::registry_service_server::RegistryService;
 use guardsplat_proto::v1::{
     Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
     DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
-    ExportCommitmentResponse, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest, GetDownloadUrlRequest,
-    GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest, GetOwnerRequest, GetPublicKeyRequest, Job,
-    JobAttempt, Key, ListAssetsRequest, ListAssetsResponse, ListCommitmentsRequest, ListCommitmentsResponse,
-    ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest, ListJobsResponse, ListKeysRequest,
-    ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey, RequeueJobRequest,
-    UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response,
-    job_attempt, upload_artifact_request,
+    ExportCommitmentResponse, FinishUploadRequest, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest,
+    GetDownloadUrlRequest, GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest, GetOwnerRequest,
+    GetPublicKeyRequest, HttpHeader, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
+    ListCommitmentsRequest, ListCommitmentsResponse, ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
+    RequeueJobRequest, StartUploadRequest, StartUploadResponse, UpdateKeyStateRequest, UploadArtifactRequest,
+    WatchJobRequest, WatchJobResponse, download_artifact_response, job_attempt, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -83,6 +83,49 @@ impl ArtifactService for Fake {
         let mut state = self.state();
         state.chunks = chunks;
         Ok(Response::new(state.artifacts[&name].0.clone()))
+    }
+
+    async fn start_upload(
+        &self,
+        request: Request<StartUploadRequest>,
+    ) -> Result<Response<StartUploadResponse>, Status> {
+        let metadata = request.into_inner().metadata.unwrap();
+        let mut state = self.state();
+        let Some(begin) = state.addresses_to_write.clone() else {
+            return Ok(Response::new(StartUploadResponse::default()));
+        };
+        let upload = format!("uploads/{}", Uuid::new_v4());
+        state.begun.insert(upload.clone(), (metadata, None));
+        let header = HttpHeader {
+            name: "x-ms-blob-type".into(),
+            value: "BlockBlob".into(),
+        };
+        Ok(Response::new(StartUploadResponse {
+            url: format!("{begin}/{upload}"),
+            upload,
+            headers: vec![header],
+            expire_time: None,
+        }))
+    }
+
+    async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
+        let upload = request.into_inner().upload;
+        let (metadata, finished) = self.state().begun[&upload].clone();
+        let bytes = self.state().put.clone();
+        self.state().finishes += 1;
+        let name = match finished {
+            Some(name) => name,
+            None if metadata.sha256 == hex::encode(Sha256::digest(&bytes)) => {
+                self.store(&metadata.display_name, &bytes)
+            }
+            None => return Err(Status::invalid_argument("these are other bytes")),
+        };
+        let mut state = self.state();
+        state.begun.insert(upload, (metadata, Some(name.clone())));
+        match state.finish_errors.pop_front() {
+            Some(error) => Err(error),
+            None => Ok(Response::new(state.artifacts[&name].0.clone())),
+        }
     }
 
     type DownloadArtifactStream = Replies<DownloadArtifactResponse>;

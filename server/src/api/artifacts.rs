@@ -2,8 +2,9 @@
 use futures::stream::{self, BoxStream, StreamExt};
 use guardsplat_proto::v1::artifact_service_server::ArtifactService;
 use guardsplat_proto::v1::{
-    Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, GetArtifactRequest,
-    GetDownloadUrlRequest, GetDownloadUrlResponse, UploadArtifactRequest, download_artifact_response,
+    Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, FinishUploadRequest,
+    GetArtifactRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, StartUploadRequest, StartUploadResponse,
+    UploadArtifactRequest, download_artifact_response,
 };
 use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
@@ -27,6 +28,25 @@ impl ArtifactService for Api {
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
         let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
         self.metrics().uploaded(false, row.size);
+        Ok(Response::new(convert::artifact(row)))
+    }
+
+    async fn start_upload(
+        &self,
+        request: Request<StartUploadRequest>,
+    ) -> Result<Response<StartUploadResponse>, Status> {
+        let project = caller(&request)?.project;
+        let metadata = request.into_inner().metadata;
+        Ok(Response::new(self.start(&project, metadata).await?))
+    }
+
+    async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
+        let project = caller(&request)?.project;
+        let finished = async { Ok(self.finish(&project, &request.get_ref().upload).await?) };
+        let (row, new) = self.within_upload_time(finished).await?;
+        if new {
+            self.metrics().uploaded(false, row.size);
+        }
         Ok(Response::new(convert::artifact(row)))
     }
 

@@ -1,5 +1,5 @@
 //! `JobService`: work that is queued and carried out by workers.
-use futures::stream::BoxStream;
+use futures::stream::{BoxStream, StreamExt as _};
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::{
     CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobAttemptsRequest, ListJobAttemptsResponse,
@@ -57,10 +57,15 @@ impl JobService for Api {
     type WatchJobStream = BoxStream<'static, Result<WatchJobResponse, Status>>;
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
-        let project = caller(&request)?.project;
+        let caller = caller(&request)?;
+        let place = self.places().take(payer(&caller), self.limits().max_watches)?;
         let WatchJobRequest { name, cursor } = request.into_inner();
-        let watching = watch::watch(self.clone(), project, &name, &cursor);
-        Ok(Response::new(watching.await?))
+        let watching = watch::watch(self.clone(), caller.project, &name, &cursor).await?;
+        let kept = move |message| {
+            let _ = &place;
+            message
+        };
+        Ok(Response::new(watching.map(kept).boxed()))
     }
 
     async fn requeue_job(&self, request: Request<RequeueJobRequest>) -> Result<Response<Job>, Status> {

@@ -32,6 +32,7 @@ mod completion;
 mod convert;
 mod deadline;
 mod deliveries;
+mod direct;
 mod evidence;
 mod expiry;
 mod explained;
@@ -52,7 +53,9 @@ mod orphans;
 mod output;
 mod own;
 mod page;
+mod patience;
 mod placement;
+mod places;
 mod positions;
 mod problems;
 mod progress;
@@ -83,6 +86,7 @@ pub use housekeeping::housekeeping;
 pub use listen::{Door, serve};
 pub use measured::Measured;
 pub use meter::{Meter, Rates};
+pub use placement::seen_since;
 pub use relay::relay;
 pub use text::display_name as check_display_name;
 
@@ -104,6 +108,10 @@ pub struct Limits {
     pub max_job_memory: Option<u64>,
     /// An upload of which nothing arrives for so long is broken off.
     pub upload_idle: Duration,
+    /// A watch whose reader takes nothing for so long is let go.
+    pub watch_stall: Duration,
+    /// Watches that a caller may have open; 0 for no limit.
+    pub max_watches: u32,
     /// How often a claim may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
     /// Jobs of one project that may wait; none for no limit but that of all.
@@ -116,7 +124,8 @@ pub struct Limits {
     pub abandoned_after: Duration,
     /// What hooks may be, and how long they are told.
     pub hooks: Rules,
-    /// How long an address is good for at which the store gives out an artifact; none for no such addresses.
+    /// How long an address is good for at which the store gives out an artifact, or takes one; none for no such
+    /// addresses.
     pub signed_url: Option<Duration>,
     /// How long things are kept.
     pub keep: Keep,
@@ -131,6 +140,8 @@ impl Default for Limits {
             max_priority: *PRIORITIES.end(),
             max_job_memory: None,
             upload_idle: Duration::from_secs(60),
+            watch_stall: Duration::from_secs(60),
+            max_watches: 1_000,
             false_positive_rate: 1e-6,
             max_queued_of_project: None,
             max_bytes_of_project: None,
@@ -166,6 +177,7 @@ struct Shared {
     reports: progress::Reports,
     placement: placement::Placement,
     positions: positions::Positions,
+    places: Arc<places::Places>,
 }
 
 impl Api {
@@ -194,6 +206,7 @@ impl Api {
             reports: progress::Reports::default(),
             placement: placement::Placement::default(),
             positions: positions::Positions::default(),
+            places: Arc::default(),
         };
         Self {
             shared: Arc::new(shared),
@@ -302,6 +315,10 @@ impl Api {
 
     fn placement(&self) -> &placement::Placement {
         &self.shared.placement
+    }
+
+    fn places(&self) -> &Arc<places::Places> {
+        &self.shared.places
     }
 
     /// Breaks off an upload that takes so long that its bytes would count as abandoned.

@@ -1,5 +1,6 @@
 //! Bytes in the store that no row points at. There should be none: rows come before bytes, and go after them. But a store
-//! may carry out late what a server gave up, and a ledger may be set back to a backup.
+//! may carry out late what a server gave up, a client may send something to the store and not finish, and a ledger may be
+//! set back to a backup.
 use std::collections::HashSet;
 
 use futures::TryStreamExt;
@@ -14,12 +15,18 @@ use crate::ledger::ArtifactId;
 const AT_ONCE: usize = 500;
 
 impl Api {
-    /// Deletes bytes that nothing points at, and that are older than anything may be that is still arriving.
+    /// Deletes bytes that nothing points at, and that are older than anything may be that is still arriving. What went to
+    /// the store without the server may wait so long to be finished, and finishing may take so long again.
     pub(super) async fn collect_orphans(&self) -> Result<()> {
-        let older_than = clock::now().saturating_sub(clock::micros(self.limits().abandoned_after));
+        let longest = clock::micros(self.limits().abandoned_after);
+        let [once, twice] = [1, 2].map(|times| clock::now().saturating_sub(longest.saturating_mul(times)));
+        let is_old = |listed: &Listed| match listed.path.is_ahead_of_its_row() {
+            true => listed.written < twice,
+            false => listed.written < once,
+        };
         let mut pages = self.store().list().try_chunks(AT_ONCE);
         while let Some(page) = pages.try_next().await.map_err(|error| Error::from(error.1))? {
-            let old = page.into_iter().filter(|listed| listed.written < older_than).collect();
+            let old = page.into_iter().filter(is_old).collect();
             self.delete_unknown(old).await?;
         }
         Ok(())

@@ -19,6 +19,11 @@ const FRESH: Duration = Duration::from_secs(1);
 const MAX_CLIPS: usize = 64;
 const GIB: f64 = (1_u64 << 30) as f64;
 
+/// From when on a worker was seen that is there now.
+pub fn seen_since(now: i64) -> i64 {
+    now.saturating_sub(clock::micros(LATELY))
+}
+
 /// What this server knows of workers.
 #[derive(Default)]
 pub struct Placement {
@@ -70,7 +75,7 @@ impl Api {
         if let Some(known) = self.placement().known(now) {
             return Ok(known);
         }
-        let since = clock::now().saturating_sub(clock::micros(LATELY));
+        let since = seen_since(clock::now());
         let seen: Arc<[SeenWorker]> = self.ledger().workers_since(since).await?.into();
         self.placement().keep(Some((now, seen.clone())));
         Ok(seen)

@@ -1,15 +1,17 @@
 //! `WatchJob`: a job as it stands, then again whenever it changes, until it is over.
 use std::time::{Duration, Instant};
 
-use futures::stream::{self, BoxStream, StreamExt};
+use futures::stream::{self, BoxStream};
 use guardsplat_proto::v1::WatchJobResponse;
 use tonic::Status;
 
 use super::changes::{For, Heard, Listener};
 use super::names::Kind;
+use super::patience::patient;
 use super::{Api, positions, token};
 use crate::error::{Error, Result};
 use crate::ledger::{JobId, JobRow, JobState};
+use crate::metrics::Watching;
 
 /// How late a change is heard of that was not announced here.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);
@@ -55,8 +57,8 @@ impl Seen {
     }
 }
 
-/// Begins to watch. The ledger is read when the stream is: one who reads slowly skips what happened in between, and
-/// holds up nobody.
+/// Begins to watch. The ledger is read when what was told before has been taken: one who reads slowly skips what happened
+/// in between, and holds up nobody. One who does not read at all is let go after a while.
 pub async fn watch(
     api: Api,
     project: String,
@@ -68,7 +70,9 @@ pub async fn watch(
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
     let known = api.own_job(&project, id).await?;
+    let (metrics, stall) = (api.metrics(), api.limits().watch_stall);
     let watcher = Watcher {
+        _watching: metrics.watching(),
         api,
         project,
         listener,
@@ -80,18 +84,25 @@ pub async fn watch(
         read: Instant::now(),
         over: false,
     };
-    Ok(stream::unfold(Some(watcher), |watcher| async {
+    let telling = stream::unfold(Some(watcher), |watcher| async {
         let mut watcher = watcher?;
         match watcher.next().await {
             Ok(Some(message)) => Some((Ok(message), Some(watcher))),
             Ok(None) => None,
             Err(error) => Some((Err(error.into()), None)),
         }
-    })
-    .boxed())
+    });
+    let shed = move || {
+        metrics.watch_shed();
+        tracing::info!(job = %id, "a watch is shed: its reader takes nothing");
+        Error::WatchStalled(stall).into()
+    };
+    Ok(patient(telling, stall, shed))
 }
 
 struct Watcher {
+    /// For as long as it is looked after.
+    _watching: Watching,
     api: Api,
     project: String,
     listener: Listener,

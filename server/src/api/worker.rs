@@ -62,6 +62,7 @@ impl WorkerService for Api {
         let mut request = request.into_inner();
         let id = Kind::Job.parse("name", &request.name)?;
         let lease_token = request.lease_token.clone();
+        let peak = request.peak_memory_bytes;
         // Whether the lease holds is looked at when the result is written: a worker whose answer was lost says it again.
         let job = self.ledger().get_job(id).await.map_err(Error::from)?;
         let job = job.ok_or_else(|| Kind::Job.not_found(id))?;
@@ -84,6 +85,7 @@ impl WorkerService for Api {
         // What is said again was counted before.
         if !job.state.is_over() {
             self.count_mark(&done);
+            self.metrics().memory_taken(done.kind, peak);
             self.attempt_over(&done);
         }
         Ok(Response::new(CompleteJobResponse {}))
@@ -96,6 +98,7 @@ impl WorkerService for Api {
             failure,
             retryable,
             cancelled,
+            peak_memory_bytes,
         } = request.into_inner();
         let id = Kind::Job.parse("name", &name)?;
         let failure = if cancelled {
@@ -107,7 +110,9 @@ impl WorkerService for Api {
             .ledger()
             .fail(id, &lease_token, failure, retryable, cancelled, clock::now())
             .await;
-        self.attempt_over(&failed.map_err(Error::from)?);
+        let failed = failed.map_err(Error::from)?;
+        self.metrics().memory_taken(failed.kind, peak_memory_bytes);
+        self.attempt_over(&failed);
         Ok(Response::new(FailJobResponse {}))
     }
 

@@ -46,6 +46,14 @@ pub enum StoreError {
         /// Bytes that arrived.
         received: u64,
     },
+    /// Something of another length lies where the bytes should.
+    #[error("{announced} bytes were announced, and {found} are there")]
+    OtherLength {
+        /// Bytes announced.
+        announced: u64,
+        /// Bytes there.
+        found: u64,
+    },
     /// Other bytes arrived than were announced.
     #[error("the bytes have SHA-256 {received}, and {announced} was announced")]
     WrongChecksum {
@@ -177,6 +185,7 @@ impl From<StoreError> for Error {
             E::TooLarge { .. } => "metadata.size_bytes",
             E::WrongChecksum { .. } => "metadata.sha256",
             E::ChunkTooLarge { .. } | E::TooLong { .. } | E::TooShort { .. } => "chunk",
+            E::OtherLength { .. } => "upload",
             E::BadOffset { .. } => "offset",
             E::NoSpace(_) => return Self::NoSpace,
             E::Away(_) | E::Silent(_) | E::Short { .. } => {

@@ -2,8 +2,9 @@
 //!
 //! Nothing is visible under its path before all of it arrived and was found to be what was announced: a folder has bytes
 //! in a staged file, which is synced and then renamed, a service takes few bytes at once and more in parts, which it
-//! keeps apart until they are said to be all. A writer that fails or is dropped leaves nothing. Which artifacts there
-//! are is the ledger's business; the store only knows paths, and those are made of ids.
+//! keeps apart until they are said to be all. A writer that fails or is dropped leaves nothing. What a client sent to the
+//! service itself is copied there first and read then, and removed if it is not right. Which artifacts there are is the
+//! ledger's business; the store only knows paths, and those are made of ids.
 mod check;
 mod error;
 mod list;
@@ -15,6 +16,7 @@ mod remote;
 mod sealed;
 mod sign;
 mod start;
+mod taken;
 mod writer;
 
 use std::fmt;
@@ -36,6 +38,8 @@ pub use place::Place;
 pub use reader::Reader;
 pub use remote::is_of_stores;
 pub use sealed::MAX_SECRET_BYTES;
+pub use sign::UploadUrl;
+pub use taken::Taken;
 pub use writer::Writer;
 
 /// Most bytes that one chunk has, in and out.
@@ -50,6 +54,8 @@ const WINDOW_BYTES: usize = 4 << 20;
 /// How long a service may take to answer, all repetitions included; to take bytes, longer.
 const ANSWER: Duration = Duration::from_secs(15);
 const WRITE: Duration = Duration::from_secs(60);
+/// And to copy bytes that it has.
+const COPY: Duration = Duration::from_secs(5 * 60);
 
 /// The bytes of all artifacts. Cheap to clone.
 #[derive(Clone)]
@@ -60,6 +66,8 @@ pub struct ArtifactStore {
 struct Inner {
     place: Place,
     objects: Arc<dyn ObjectStore>,
+    /// The same, with patience for requests that take the store long.
+    patient: Arc<dyn ObjectStore>,
     /// Where it is a folder.
     folder: Option<local::Folder>,
     /// Where it can sign.
@@ -88,35 +96,30 @@ impl ArtifactStore {
         };
         let remote = remote::open(service, name, prefix, environment)
             .map_err(|source| StoreError::unusable(place, "opened", source))?;
-        Ok(Self::new(
-            place.clone(),
-            remote.store,
-            None,
-            Some(remote.signer),
+        Ok(Self::new(Inner {
+            place: place.clone(),
+            objects: remote.store,
+            patient: remote.patient,
+            folder: None,
+            signer: Some(remote.signer),
             max_bytes,
-        ))
+        }))
     }
 
     fn in_folder(folder: &Path, abandoned_after: Duration, max_bytes: u64) -> StoreResult<Self> {
         let (folder, store) = local::open(folder, abandoned_after)?;
-        let place = Place::Folder(folder.path().to_owned());
-        Ok(Self::new(place, Arc::new(store), Some(folder), None, max_bytes))
+        let store: Arc<dyn ObjectStore> = Arc::new(store);
+        Ok(Self::new(Inner {
+            place: Place::Folder(folder.path().to_owned()),
+            objects: store.clone(),
+            patient: store,
+            folder: Some(folder),
+            signer: None,
+            max_bytes,
+        }))
     }
 
-    fn new(
-        place: Place,
-        objects: Arc<dyn ObjectStore>,
-        folder: Option<local::Folder>,
-        signer: Option<Arc<dyn Signer>>,
-        max_bytes: u64,
-    ) -> Self {
-        let inner = Inner {
-            place,
-            objects,
-            folder,
-            signer,
-            max_bytes,
-        };
+    fn new(inner: Inner) -> Self {
         Self { inner: Arc::new(inner) }
     }
 
@@ -198,6 +201,11 @@ impl ArtifactStore {
     /// As [`Self::answered`], for calls that bring bytes.
     async fn written<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
         self.within(WRITE, call).await
+    }
+
+    /// As [`Self::answered`], for copies inside the store.
+    async fn copied<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
+        self.within(COPY, call).await
     }
 
     async fn within<T>(&self, limit: Duration, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {

@@ -7,6 +7,7 @@ use uuid::Uuid;
 
 use super::{StoreError, StoreResult};
 
+const STAGED: &str = "staged";
 const UPLOADS: &str = "uploads";
 const OUTPUTS: &str = "outputs";
 /// Hexadecimal digits of a lease's hash in a path: enough to tell the attempts of a job apart.
@@ -20,6 +21,21 @@ impl ArtifactPath {
     /// Where an upload lies.
     pub fn upload(id: Uuid) -> Self {
         Self(Path::from_iter([UPLOADS.to_owned(), id.to_string()]))
+    }
+
+    /// Where a client puts an upload that the server has not taken yet. Addresses to write at are of such paths only.
+    pub fn staged(id: Uuid) -> Self {
+        Self(Path::from_iter([STAGED.to_owned(), id.to_string()]))
+    }
+
+    /// Where an upload lies that was taken from there. Whoever takes it does so in a folder of their own, so that it is
+    /// not changed any more once it was checked.
+    pub fn taken(attempt: Uuid, id: Uuid) -> Self {
+        Self(Path::from_iter([
+            UPLOADS.to_owned(),
+            attempt.to_string(),
+            id.to_string(),
+        ]))
     }
 
     /// Where an output of an attempt lies. Attempts have folders of their own, so that one that was given up can't
@@ -36,8 +52,14 @@ impl ArtifactPath {
     }
 
     /// What paths begin with.
-    pub(super) fn roots() -> [Path; 2] {
-        [Path::from(UPLOADS), Path::from(OUTPUTS)]
+    pub(super) fn roots() -> [Path; 3] {
+        [STAGED, UPLOADS, OUTPUTS].map(Path::from)
+    }
+
+    /// Whether bytes may lie there for a while before a row says so: those that went to the store without the server.
+    pub fn is_ahead_of_its_row(&self) -> bool {
+        let parts = self.0.parts().count();
+        self.0.prefix_matches(&Path::from(STAGED)) || self.0.prefix_matches(&Path::from(UPLOADS)) && parts == 3
     }
 
     /// The id of the artifact, with which its path ends.
@@ -51,7 +73,8 @@ impl ArtifactPath {
         let is_lease =
             |part: &str| part.len() == LEASE_DIGITS && part.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
         let known = match text.split('/').collect::<Vec<_>>()[..] {
-            [UPLOADS, id] => is_id(id),
+            [STAGED | UPLOADS, id] => is_id(id),
+            [UPLOADS, attempt, id] => is_id(attempt) && is_id(id),
             [OUTPUTS, job, lease, id] => is_id(job) && is_lease(lease) && is_id(id),
             _ => false,
         };

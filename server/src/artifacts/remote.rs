@@ -22,6 +22,8 @@ const OTHER_VARIABLES: [&str; 3] = ["SERVICE_ACCOUNT", "IDENTITY_ENDPOINT", "IDE
 const CONNECT: Duration = Duration::from_secs(3);
 /// How long one try of a request may take, the bytes of a part included.
 const TRY: Duration = Duration::from_secs(30);
+/// The same for copies inside the store, which bring no byte before they are done.
+const LONG_TRY: Duration = super::COPY;
 /// How often a request is tried again, while this has not passed since the first time.
 const TRIES: usize = 6;
 const TRY_AGAIN_FOR: Duration = Duration::from_secs(8);
@@ -29,6 +31,8 @@ const TRY_AGAIN_FOR: Duration = Duration::from_secs(8);
 /// A container, seen from the prefix on.
 pub(super) struct Remote {
     pub store: Arc<dyn ObjectStore>,
+    /// The same, for requests that take long.
+    pub patient: Arc<dyn ObjectStore>,
     pub signer: Arc<dyn Signer>,
 }
 
@@ -47,19 +51,27 @@ pub(super) fn open(
     // reqwest takes the process's provider. Another one that was chosen before would do as well.
     let _ = rustls::crypto::ring::default_provider().install_default();
     let variables = environment.into_iter().filter(|(_, value)| !value.trim().is_empty());
-    match service {
-        Service::S3 => s3(name, variables).map(|store| behind(store, prefix)),
-        Service::Google => google(name, variables).map(|store| behind(store, prefix)),
-        Service::Azure => azure(name, variables).map(|store| behind(store, prefix)),
-    }
+    let variables: Vec<_> = variables.collect();
+    let opened = |one_try| {
+        let (client, variables) = (client(one_try), variables.iter().cloned());
+        match service {
+            Service::S3 => s3(name, client, variables).map(|store| behind(store, prefix)),
+            Service::Google => google(name, client, variables).map(|store| behind(store, prefix)),
+            Service::Azure => azure(name, client, variables).map(|store| behind(store, prefix)),
+        }
+    };
+    let (store, signer) = opened(TRY)?;
+    let (patient, _) = opened(LONG_TRY)?;
+    Ok(Remote { store, patient, signer })
 }
 
 fn s3(
     bucket: &str,
+    client: ClientOptions,
     variables: impl Iterator<Item = (String, String)>,
 ) -> object_store::Result<object_store::aws::AmazonS3> {
     let mut builder = AmazonS3Builder::new()
-        .with_client_options(client())
+        .with_client_options(client)
         // Objects go one by one, in the way that every service of this kind knows.
         .with_disable_bulk_delete(true);
     for (variable, value) in variables.filter(|(variable, _)| variable.starts_with("AWS_")) {
@@ -72,9 +84,10 @@ fn s3(
 
 fn google(
     bucket: &str,
+    client: ClientOptions,
     variables: impl Iterator<Item = (String, String)>,
 ) -> object_store::Result<object_store::gcp::GoogleCloudStorage> {
-    let mut builder = GoogleCloudStorageBuilder::new().with_client_options(client());
+    let mut builder = GoogleCloudStorageBuilder::new().with_client_options(client);
     for (variable, value) in variables {
         if !variable.starts_with("GOOGLE_") && variable != "SERVICE_ACCOUNT" {
             continue;
@@ -88,9 +101,10 @@ fn google(
 
 fn azure(
     container: &str,
+    client: ClientOptions,
     variables: impl Iterator<Item = (String, String)>,
 ) -> object_store::Result<object_store::azure::MicrosoftAzure> {
-    let mut builder = MicrosoftAzureBuilder::new().with_client_options(client());
+    let mut builder = MicrosoftAzureBuilder::new().with_client_options(client);
     for (variable, value) in variables {
         if variable == "IDENTITY_ENDPOINT" {
             builder = builder.with_msi_endpoint(value);
@@ -103,16 +117,13 @@ fn azure(
     builder.with_retry(retry()).with_container_name(container).build()
 }
 
-fn behind(store: impl ObjectStore + Signer + Clone, prefix: &Path) -> Remote {
+fn behind(store: impl ObjectStore + Signer + Clone, prefix: &Path) -> (Arc<dyn ObjectStore>, Arc<dyn Signer>) {
     let store = Arc::new(PrefixStore::new(store, prefix.clone()));
-    Remote {
-        store: store.clone(),
-        signer: store,
-    }
+    (store.clone(), store)
 }
 
-fn client() -> ClientOptions {
-    ClientOptions::new().with_connect_timeout(CONNECT).with_timeout(TRY)
+fn client(one_try: Duration) -> ClientOptions {
+    ClientOptions::new().with_connect_timeout(CONNECT).with_timeout(one_try)
 }
 
 fn retry() -> RetryConfig {

@@ -41,7 +41,7 @@ pub use error::{LedgerError, Result};
 pub use hooks::{
     DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
 };
-pub use operations::{AttemptRow, OperationsLedger, Outcome, Tally, Waiting};
+pub use operations::{AttemptRow, OperationsLedger, Outcome, Running, Tally, Waiting};
 pub use postgres::PostgresLedger;
 pub use queue::{Needs, QueueLedger, SeenWorker, Taker};
 pub use registry::{

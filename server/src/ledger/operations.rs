@@ -8,8 +8,8 @@ use super::{LedgerError, Result};
 pub struct Tally {
     /// Queued jobs by kind; a kind of which none is queued may be missing.
     pub queued: Vec<Waiting>,
-    /// Running jobs by kind.
-    pub running: Vec<(JobKind, u64)>,
+    /// Running jobs by kind; a kind of which none runs may be missing.
+    pub running: Vec<Running>,
     /// Failed jobs by kind and reason.
     pub failed: Vec<(JobKind, i32, u64)>,
 }
@@ -23,6 +23,17 @@ pub struct Waiting {
     pub count: u64,
     /// Since when the first of them could have been given to a worker; it may lie ahead, after a failed attempt.
     pub since: i64,
+}
+
+/// The running jobs of a kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Running {
+    /// What they do.
+    pub kind: JobKind,
+    /// How many they are.
+    pub count: u64,
+    /// Bytes of memory that they probably take together, as far as their scenes told.
+    pub memory: u64,
 }
 
 /// How an attempt ended. Numbers are kept in the database, and are those of `guardsplat.v1.JobAttempt.Outcome`.

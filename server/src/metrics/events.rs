@@ -1,4 +1,5 @@
 //! What happens, counted as it does.
+use std::sync::Arc;
 use std::time::Duration;
 
 use guardsplat_proto::v1::EmbedResult;
@@ -76,6 +77,15 @@ impl Metrics {
         }
     }
 
+    /// What an attempt took of memory, if its worker knows.
+    pub fn memory_taken(&self, job: JobKind, peak: Option<u64>) {
+        if let Some(bytes) = peak {
+            self.memory
+                .get_or_create(&OfKind { kind: kind(job) })
+                .observe(bytes as f64);
+        }
+    }
+
     /// A stage of an attempt is over.
     pub fn stage(&self, job: JobKind, at: Stage, length: Duration) {
         let (kind, stage) = (kind(job), stage(at));
@@ -110,9 +120,30 @@ impl Metrics {
         }
     }
 
+    /// A watch is looked after, until what this gives is dropped.
+    pub fn watching(self: &Arc<Self>) -> Watching {
+        self.watches.inc();
+        Watching(self.clone())
+    }
+
+    /// A watch was let go, because its reader took nothing.
+    pub fn watch_shed(&self) {
+        self.watches_shed.inc();
+    }
+
     /// Whether a part is well.
     pub fn ready(&self, part: &'static str, well: bool) {
         self.ready.get_or_create(&Part { part }).set(well.into());
+    }
+}
+
+/// A watch that is counted.
+#[derive(Debug)]
+pub struct Watching(Arc<Metrics>);
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        self.0.watches.dec();
     }
 }
 

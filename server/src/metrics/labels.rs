@@ -26,14 +26,17 @@ pub const REASONS: [Reason; 5] = [
     Reason::Internal,
     Reason::AttemptsExhausted,
 ];
+/// What workers compute on: all that there is, and what is none of it.
+pub const DEVICES: [&str; 3] = ["cpu", "wgpu", OTHER];
 /// Why calls are refused that others than the caller may want to know of: reasons of errors.
-pub const REFUSALS: [&str; 9] = [
+pub const REFUSALS: [&str; 10] = [
     "TOKEN_MISSING",
     "TOKEN_UNKNOWN",
     "TOKEN_EXPIRED",
     "TOKEN_REVOKED",
     "SCOPE_MISSING",
     "TOO_MANY_CALLS",
+    "TOO_MANY_WATCHES",
     "QUOTA_USED_UP",
     "QUEUE_FULL",
     "NO_SPACE",
@@ -100,6 +103,11 @@ pub struct Mark {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub struct OnDevice {
+    pub device: &'static str,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub struct Build {
     pub version: &'static str,
 }
@@ -163,6 +171,12 @@ pub fn reason(number: i32) -> &'static str {
 pub fn method(path: &str) -> &'static str {
     let known = METHODS.iter().find(|(known, _)| *known == path);
     known.map_or(OTHER, |(path, _)| path.trim_start_matches('/'))
+}
+
+/// The word for what a worker computes on. It says so in words of its own, of which the first is one of a few.
+pub fn device(said: &str) -> &'static str {
+    let first = said.split(':').next().unwrap_or_default();
+    DEVICES.into_iter().find(|known| *known == first).unwrap_or(OTHER)
 }
 
 /// The reason of a refusal, if it is one that is counted.

@@ -15,10 +15,12 @@ use prometheus_client::registry::{Registry, Unit};
 use tonic::Code;
 
 use crate::access::METHODS;
-use crate::ledger::Tally;
-use labels::{AtStage, AttemptEnded, Build, Bytes, Call, Ended, GivenUp, Mark, OfKind, OfMethod, Part, Refused};
+use crate::ledger::{SeenWorker, Tally};
+use labels::{
+    AtStage, AttemptEnded, Build, Bytes, Call, Ended, GivenUp, Mark, OfKind, OfMethod, OnDevice, Part, Refused,
+};
 
-pub use events::{is_first, was_lost};
+pub use events::{Watching, is_first, was_lost};
 pub use labels::{code, kind, method, stage, state};
 pub use page::{Page, serve};
 
@@ -40,6 +42,22 @@ const PSNR: [f64; 13] = [
     20.0, 25.0, 28.0, 30.0, 32.0, 34.0, 36.0, 38.0, 40.0, 42.0, 45.0, 50.0, 60.0,
 ];
 
+/// Memory that an attempt took, in bytes: 128 MiB to 256 GiB, each twice the one before.
+const MEMORY: [f64; 12] = [
+    134_217_728.0,
+    268_435_456.0,
+    536_870_912.0,
+    1_073_741_824.0,
+    2_147_483_648.0,
+    4_294_967_296.0,
+    8_589_934_592.0,
+    17_179_869_184.0,
+    34_359_738_368.0,
+    68_719_476_736.0,
+    137_438_953_472.0,
+    274_877_906_944.0,
+];
+
 type Counts<L> = Family<L, Counter>;
 type Gauges<L> = Family<L, Gauge>;
 type Times<L> = Family<L, Histogram, fn() -> Histogram>;
@@ -51,6 +69,9 @@ pub struct Metrics {
     queued: Gauges<OfKind>,
     oldest: Family<OfKind, Gauge<f64, std::sync::atomic::AtomicU64>>,
     running: Gauges<OfKind>,
+    running_memory: Gauges<OfKind>,
+    workers: Gauges<OnDevice>,
+    worker_memory: Gauges<OnDevice>,
     dead_letters: Gauges<GivenUp>,
     created: Counts<OfKind>,
     requeued: Counts<OfKind>,
@@ -61,6 +82,7 @@ pub struct Metrics {
     wait: Times<OfKind>,
     run: Times<Ended>,
     stages: Times<AtStage>,
+    memory: Times<OfKind>,
     marks: Counts<Mark>,
     accuracy: Histogram,
     psnr: Histogram,
@@ -68,6 +90,8 @@ pub struct Metrics {
     calls: Counts<Call>,
     call_time: Times<OfMethod>,
     refused: Counts<Refused>,
+    watches: Gauge,
+    watches_shed: Counter,
     ready: Gauges<Part>,
 }
 
@@ -85,6 +109,24 @@ impl Default for Metrics {
                 Family::default(),
             ),
             running: add(r, "running_jobs", "Jobs that a worker has", Family::default()),
+            running_memory: add(
+                r,
+                "running_memory_bytes",
+                "Memory that running jobs probably take together, as far as their scenes told",
+                Family::default(),
+            ),
+            workers: add(
+                r,
+                "workers",
+                "Workers that asked for a job lately, or have one",
+                Family::default(),
+            ),
+            worker_memory: add(
+                r,
+                "worker_memory_bytes",
+                "Memory that jobs may take at these workers together, where they say so",
+                Family::default(),
+            ),
             dead_letters: add(
                 r,
                 "dead_letters",
@@ -125,6 +167,12 @@ impl Default for Metrics {
                 "Length of a stage of an attempt, as its worker reports it",
                 job_times,
             ),
+            memory: add(
+                r,
+                "job_memory_bytes",
+                "Memory that an attempt took at most, as its worker measured it",
+                Family::new_with_constructor(|| Histogram::new(MEMORY)),
+            ),
             marks: add(
                 r,
                 "marks",
@@ -162,6 +210,13 @@ impl Default for Metrics {
                 "Calls refused for their token or for a limit, by reason",
                 Family::default(),
             ),
+            watches: add(r, "watches", "Watches that are looked after", Gauge::default()),
+            watches_shed: add(
+                r,
+                "watches_shed",
+                "Watches that were let go because their readers took nothing",
+                Counter::default(),
+            ),
             ready: add(
                 r,
                 "ready",
@@ -189,6 +244,7 @@ impl Metrics {
                 drop(counts.get_or_create(&of));
             }
             drop(self.wait.get_or_create(&of));
+            drop(self.memory.get_or_create(&of));
             for outcome in labels::ATTEMPT_ENDS {
                 let kind = kind(job);
                 drop(self.attempts_ended.get_or_create(&AttemptEnded { kind, outcome }));
@@ -222,7 +278,7 @@ impl Metrics {
 
     /// What the ledger says now; where it says nothing there are no figures rather than old ones.
     pub fn tally(&self, tally: Option<Tally>, now: i64) {
-        for gauges in [&self.queued, &self.running] {
+        for gauges in [&self.queued, &self.running, &self.running_memory] {
             gauges.clear();
         }
         self.oldest.clear();
@@ -236,10 +292,13 @@ impl Metrics {
                 .get_or_create(&of)
                 .set(number(waiting.map_or(0, |waiting| waiting.count)));
             self.oldest.get_or_create(&of).set(seconds(age));
-            let running = tally.running.iter().find(|(kind, _)| *kind == job);
+            let running = tally.running.iter().find(|running| running.kind == job);
             self.running
                 .get_or_create(&of)
-                .set(number(running.map_or(0, |(_, count)| *count)));
+                .set(number(running.map_or(0, |running| running.count)));
+            self.running_memory
+                .get_or_create(&of)
+                .set(number(running.map_or(0, |running| running.memory)));
             for reason in labels::REASONS {
                 let (kind, reason) = (kind(job), labels::reason(reason.into()));
                 drop(self.dead_letters.get_or_create(&GivenUp { kind, reason }));
@@ -250,6 +309,23 @@ impl Metrics {
             self.dead_letters
                 .get_or_create(&GivenUp { kind, reason })
                 .set(number(count));
+        }
+    }
+
+    /// The workers that are there, as the ledger has them; none where it says nothing.
+    pub fn workers(&self, seen: Option<&[SeenWorker]>) {
+        for gauges in [&self.workers, &self.worker_memory] {
+            gauges.clear();
+        }
+        let Some(seen) = seen else { return };
+        for device in labels::DEVICES {
+            let of = OnDevice { device };
+            let there = seen.iter().filter(|worker| labels::device(&worker.device) == device);
+            let (count, memory) = there.fold((0, 0_i64), |(count, memory), worker| {
+                (count + 1, memory.saturating_add(worker.memory.unwrap_or(0)))
+            });
+            self.workers.get_or_create(&of).set(count);
+            self.worker_memory.get_or_create(&of).set(memory);
         }
     }
 

@@ -16,7 +16,7 @@ use tokio::time::{sleep, timeout};
 
 use super::Metrics;
 use crate::api;
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, LedgerError};
 use crate::run::Readiness;
 
 /// Connections at a time; more wait.
@@ -99,8 +99,13 @@ impl Page {
     }
 
     async fn measured(&self) -> Response<Full<Bytes>> {
-        let tally = match timeout(COUNT, self.ledger.tally()).await {
-            Ok(Ok(tally)) => Some(tally),
+        let now = api::now();
+        let counting = async {
+            let tally = self.ledger.tally().await?;
+            Ok::<_, LedgerError>((tally, self.ledger.workers_since(api::seen_since(now)).await?))
+        };
+        let counted = match timeout(COUNT, counting).await {
+            Ok(Ok(counted)) => Some(counted),
             Ok(Err(error)) => {
                 tracing::warn!(%error, "jobs could not be counted for the metrics");
                 None
@@ -110,7 +115,9 @@ impl Page {
                 None
             }
         };
-        self.metrics.tally(tally, api::now());
+        let (tally, workers) = counted.unzip();
+        self.metrics.tally(tally, now);
+        self.metrics.workers(workers.as_deref());
         match self.metrics.text() {
             Ok(metrics) => answer(StatusCode::OK, OPEN_METRICS, metrics),
             Err(error) => {

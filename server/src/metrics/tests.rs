@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 
 use super::*;
-use crate::ledger::{Failure, JobKind, JobRow, JobState, Needs, REASON_WORKER_LOST, Waiting};
+use crate::ledger::{Failure, JobKind, JobRow, JobState, Needs, REASON_WORKER_LOST, Running, Waiting};
 
 fn job(state: JobState, attempt: i32) -> JobRow {
     JobRow {
@@ -89,7 +89,11 @@ fn the_queue_is_as_the_ledger_has_it_or_not_told() {
             count: 7,
             since: 1_000_000,
         }],
-        running: vec![(JobKind::Embed, 2)],
+        running: vec![Running {
+            kind: JobKind::Embed,
+            count: 2,
+            memory: 3_000_000,
+        }],
         failed: vec![(JobKind::Embed, 5, 3), (JobKind::Embed, 99, 1)],
     };
     metrics.tally(Some(tally), 2_500_000);
@@ -101,6 +105,8 @@ fn the_queue_is_as_the_ledger_has_it_or_not_told() {
             r#"guardsplat_oldest_queued_job_age_seconds{kind="verify"} 1.5"#,
             r#"guardsplat_oldest_queued_job_age_seconds{kind="embed"} 0.0"#,
             r#"guardsplat_running_jobs{kind="embed"} 2"#,
+            r#"guardsplat_running_memory_bytes{kind="embed"} 3000000"#,
+            r#"guardsplat_running_memory_bytes{kind="verify"} 0"#,
             r#"guardsplat_dead_letters{kind="embed",reason="attempts_exhausted"} 3"#,
             r#"guardsplat_dead_letters{kind="embed",reason="unspecified"} 1"#,
             r#"guardsplat_dead_letters{kind="verify",reason="invalid_input"} 0"#,
@@ -109,6 +115,45 @@ fn the_queue_is_as_the_ledger_has_it_or_not_told() {
     metrics.tally(None, 0);
     let text = metrics.text().unwrap();
     assert!(!text.contains("guardsplat_queued_jobs{"), "{text}");
+}
+
+#[test]
+fn memory_is_told_by_what_workers_compute_on() {
+    let metrics = Metrics::default();
+    let worker = |device: &str, memory| SeenWorker {
+        name: device.into(),
+        device: device.into(),
+        memory,
+        clips: Vec::new(),
+    };
+    metrics.workers(Some(&[
+        worker("cpu", Some(5)),
+        worker("cpu", Some(7)),
+        worker("wgpu: Some Card (1.2)", Some(i64::MAX)),
+        worker("wgpu: Some Card (1.2)", Some(1)),
+        worker("", None),
+        worker("cpu of my own", Some(9)),
+    ]));
+    metrics.memory_taken(JobKind::Embed, Some(3 << 30));
+    metrics.memory_taken(JobKind::Embed, None);
+    has(
+        &metrics,
+        &[
+            r#"guardsplat_workers{device="cpu"} 2"#,
+            r#"guardsplat_workers{device="wgpu"} 2"#,
+            r#"guardsplat_workers{device="other"} 2"#,
+            r#"guardsplat_worker_memory_bytes{device="cpu"} 12"#,
+            &format!(r#"guardsplat_worker_memory_bytes{{device="wgpu"}} {}"#, i64::MAX),
+            r#"guardsplat_worker_memory_bytes{device="other"} 9"#,
+            r#"guardsplat_job_memory_bytes_bucket{le="2147483648.0",kind="embed"} 0"#,
+            r#"guardsplat_job_memory_bytes_bucket{le="4294967296.0",kind="embed"} 1"#,
+            r#"guardsplat_job_memory_bytes_count{kind="embed"} 1"#,
+            r#"guardsplat_job_memory_bytes_count{kind="verify"} 0"#,
+        ],
+    );
+    metrics.workers(None);
+    let text = metrics.text().unwrap();
+    assert!(!text.contains("guardsplat_workers{"), "{text}");
 }
 
 #[test]

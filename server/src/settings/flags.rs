@@ -62,8 +62,8 @@ pub struct Flags {
     /// are taken from the environment [default: artifacts in the data folder]
     #[arg(long, value_name = "URL")]
     pub artifacts: Option<String>,
-    /// Seconds that an address is good for at which clients fetch an artifact from the store itself; 0 for none
-    /// [default: 0]
+    /// Seconds that an address is good for at which clients fetch an artifact from the store itself, or send it there;
+    /// 0 for none [default: 0]
     #[arg(long, value_name = "SECONDS")]
     pub signed_url_seconds: Option<u64>,
     /// Most bytes of an artifact [default: 4294967296]
@@ -102,6 +102,12 @@ pub struct Flags {
     /// Seconds that an upload may pause [default: 60]
     #[arg(long, value_name = "SECONDS")]
     pub upload_timeout_seconds: Option<u64>,
+    /// Seconds that a watch may go unread before it is let go [default: 60]
+    #[arg(long, value_name = "SECONDS")]
+    pub watch_stall_seconds: Option<u64>,
+    /// Most watches of one caller at once; 0 is no limit [default: 1000]
+    #[arg(long, value_name = "WATCHES")]
+    pub max_watches_per_caller: Option<u32>,
     /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
@@ -181,6 +187,8 @@ impl Flags {
             lease_seconds,
             max_attempts,
             upload_timeout_seconds,
+            watch_stall_seconds,
+            max_watches_per_caller,
             abandoned_after_seconds,
             hook_allow_http,
             hook_allow_private,
@@ -224,6 +232,8 @@ impl Flags {
         set(&mut settings.lease_seconds, lease_seconds);
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
+        set(&mut settings.watch_stall_seconds, watch_stall_seconds);
+        set(&mut settings.max_watches_per_caller, max_watches_per_caller);
         set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
         set(&mut settings.hook_allow_http, hook_allow_http);
         set(&mut settings.hook_allow_private, hook_allow_private);

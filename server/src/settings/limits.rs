@@ -42,6 +42,13 @@ impl Settings {
             ("lease_seconds", self.lease_seconds, 1, DAY),
             ("max_attempts", self.max_attempts.into(), 1, 100),
             ("upload_timeout_seconds", self.upload_timeout_seconds, 1, DAY),
+            ("watch_stall_seconds", self.watch_stall_seconds, 1, DAY),
+            (
+                "max_watches_per_caller",
+                self.max_watches_per_caller.into(),
+                0,
+                1_000_000,
+            ),
             ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
             ("hook_give_up_seconds", self.hook_give_up_seconds, 1, 365 * DAY),
             // A week is the longest that S3 signs for.

@@ -41,7 +41,8 @@ pub struct Settings {
     pub database: Option<DatabaseUrl>,
     /// URL of the store of artifacts; a folder in the data folder where none is named.
     pub artifacts: Option<String>,
-    /// Seconds that an address is good for at which the store itself gives out an artifact; 0 for no such addresses.
+    /// Seconds that an address is good for at which the store itself gives out an artifact, or takes one; 0 for no such
+    /// addresses.
     pub signed_url_seconds: u64,
     /// Most bytes of an artifact.
     pub max_artifact_bytes: u64,
@@ -67,6 +68,10 @@ pub struct Settings {
     pub max_attempts: u32,
     /// Seconds that an upload may pause.
     pub upload_timeout_seconds: u64,
+    /// Seconds that a watch may go unread.
+    pub watch_stall_seconds: u64,
+    /// Most watches of one caller at once; 0 for no limit.
+    pub max_watches_per_caller: u32,
     /// Seconds after which bytes that nobody published are removed.
     pub abandoned_after_seconds: u64,
     /// Whether hooks may be called without TLS.
@@ -173,6 +178,8 @@ impl Default for Settings {
             lease_seconds: 30,
             max_attempts: 3,
             upload_timeout_seconds: 60,
+            watch_stall_seconds: 60,
+            max_watches_per_caller: 1_000,
             abandoned_after_seconds: 24 * 60 * 60,
             hook_allow_http: false,
             hook_allow_private: false,
@@ -208,6 +215,11 @@ impl Settings {
     /// How long an upload may pause.
     pub fn upload_timeout(&self) -> Duration {
         Duration::from_secs(self.upload_timeout_seconds)
+    }
+
+    /// How long a watch may go unread.
+    pub fn watch_stall(&self) -> Duration {
+        Duration::from_secs(self.watch_stall_seconds)
     }
 
     /// When bytes that nobody published are removed.

@@ -89,6 +89,8 @@ fn every_setting_can_be_set_everywhere() {
         ("lease_seconds", "6"),
         ("max_attempts", "7"),
         ("upload_timeout_seconds", "8"),
+        ("watch_stall_seconds", "20"),
+        ("max_watches_per_caller", "21"),
         ("abandoned_after_seconds", "9"),
         ("hook_allow_http", "true"),
         ("hook_allow_private", "true"),

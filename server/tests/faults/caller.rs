@@ -52,7 +52,13 @@ where
 
 impl Caller {
     pub fn new(url: &str) -> Self {
+        Self::with_window(url, None)
+    }
+
+    /// One who is sent so many bytes of a stream ahead of what was read, if not as many as usual.
+    pub fn with_window(url: &str, window: Option<u32>) -> Self {
         let endpoint = Channel::from_shared(url.to_owned()).unwrap();
+        let endpoint = endpoint.initial_stream_window_size(window);
         let channel = endpoint.connect_timeout(Duration::from_secs(5)).connect_lazy();
         Self {
             jobs: JobServiceClient::new(channel.clone()),
@@ -128,9 +134,9 @@ impl Caller {
         Ok(self.worker.clone().lease_job(request).await?.into_inner())
     }
 
-    /// Leases a job, which must be there or come soon.
+    /// Leases a job, which must be there or come soon: when the lease of another runs out, at the latest.
     pub async fn take(&self) -> (Job, String) {
-        let lease = persist(|| self.lease("taker", Duration::from_secs(10)));
+        let lease = persist(|| self.lease("taker", SOON));
         let lease = lease.await.unwrap();
         (lease.job.expect("there is no job"), lease.lease_token)
     }

@@ -30,6 +30,7 @@ async fn fail(caller: &Caller, job: &Job, token: &str, cancelled: bool) {
         failure: (!cancelled).then_some(failure),
         retryable: false,
         cancelled,
+        ..FailJobRequest::default()
     };
     caller.worker.clone().fail_job(request).await.unwrap();
 }

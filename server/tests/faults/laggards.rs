@@ -3,13 +3,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use guardsplat_proto::v1::upload_artifact_request::Payload;
-use guardsplat_proto::v1::{UploadArtifactRequest, UploadMetadata, WatchJobRequest};
+use guardsplat_proto::v1::{UploadArtifactRequest, UploadMetadata, WatchJobRequest, WatchJobResponse};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
 use tokio::time::{Duration, Instant, sleep};
+use tonic::Streaming;
 
 use crate::caller::{Caller, Inputs};
 use crate::load::peak;
-use crate::place::{Place, Quantiles, short_or_full};
+use crate::place::{Place, Quantiles, free_address, short_or_full};
 use crate::stub::Stub;
 use crate::support::SOON;
 
@@ -57,30 +60,71 @@ fn uploads(caller: Caller) -> JoinHandle<tonic::Code> {
     })
 }
 
+/// Jobs that go before the one that is watched: enough for a while, however slow those are that submit more.
+const BEFORE: u32 = 60;
+/// Bytes that may be on the way to a watcher, so that few messages show that it does not read.
+const WINDOW: u32 = 64;
+
+/// Begins to watch on a connection of its own, and reads the first message.
+async fn watching(place: &Place, job: &str, window: Option<u32>) -> Streaming<WatchJobResponse> {
+    let caller = Caller::with_window(&place.url(), window);
+    let request = WatchJobRequest {
+        name: job.to_owned(),
+        cursor: String::new(),
+    };
+    let mut stream = caller.jobs.clone().watch_job(request).await.unwrap().into_inner();
+    stream.message().await.unwrap().unwrap();
+    stream
+}
+
+/// A figure of the server's metrics.
+async fn told(address: &str, name: &str) -> u32 {
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    let request = format!("GET /metrics HTTP/1.1\r\nhost: {address}\r\nconnection: close\r\n\r\n");
+    stream.write_all(request.as_bytes()).await.unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    let figure = answer
+        .lines()
+        .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    figure
+        .unwrap_or_else(|| panic!("no {name} in {answer}"))
+        .parse()
+        .unwrap()
+}
+
 pub async fn do_not_hold_up_others(place: Place) {
     let (count, long) = short_or_full((20, Duration::from_secs(1)), (200, Duration::from_secs(20)));
-    let upload_timeout = short_or_full("1", "10");
-    let server = place.start(&["--upload-timeout-seconds", upload_timeout]).await;
+    let (patience, takes) = short_or_full(("1", Duration::from_millis(500)), ("10", Duration::from_secs(2)));
+    let metrics = free_address();
+    let flags = [
+        "--upload-timeout-seconds",
+        patience,
+        "--watch-stall-seconds",
+        patience,
+        "--metrics-listen",
+        &metrics,
+    ];
+    let server = place.start(&flags).await;
     let caller = place.caller();
     let inputs = Arc::new(caller.inputs().await);
-    // Something goes on all the time that watchers are to hear of.
+    // Something goes on all the time that watchers are to hear of: others are done that go first.
     let watched = caller.submit(inputs.embed(), "").await.unwrap().name;
+    for _ in 0..BEFORE {
+        caller.submit(inputs.verify(), "").await.unwrap();
+    }
     let stop = Arc::new(AtomicBool::new(false));
-    let worker = tokio::spawn(Stub::new(place.caller(), "stub", Duration::from_secs(2)).serve(stop.clone()));
+    let worker = tokio::spawn(Stub::new(place.caller(), "stub", takes).serve(stop.clone()));
     let before = healthy(&place, &inputs, long).await;
 
     let mut watchers = Vec::new();
     for _ in 0..count {
-        let caller = place.caller();
-        let request = WatchJobRequest {
-            name: watched.clone(),
-            cursor: String::new(),
-        };
-        let mut stream = caller.jobs.clone().watch_job(request).await.unwrap().into_inner();
-        stream.message().await.unwrap();
         // Held, and never read again.
-        watchers.push((caller, stream));
+        watchers.push(watching(&place, &watched, Some(WINDOW)).await);
     }
+    let mut reading = watching(&place, &watched, Some(WINDOW)).await;
+    let reader = tokio::spawn(async move { while let Ok(Some(_)) = reading.message().await {} });
+    let opened = Instant::now();
     let uploading: Vec<_> = (0..count).map(|_| uploads(place.caller())).collect();
     let during = healthy(&place, &inputs, long).await;
     let begun = Instant::now();
@@ -88,7 +132,19 @@ pub async fn do_not_hold_up_others(place: Place) {
         let code = upload.await.unwrap();
         assert_ne!(code, tonic::Code::Ok);
     }
-    let shed = begun.elapsed();
+    let broken_off = begun.elapsed();
+    // The watched job is last in the queue, and its place moves meanwhile.
+    while told(&metrics, "guardsplat_watches_shed_total").await < count {
+        assert!(
+            opened.elapsed() < 2 * SOON,
+            "not all of {count} watchers that do not read are shed"
+        );
+        sleep(Duration::from_millis(50)).await;
+    }
+    let shed = opened.elapsed();
+    // The one who reads is left.
+    assert_eq!(told(&metrics, "guardsplat_watches").await, 1);
+    assert!(!reader.is_finished());
     // Nothing of them is left on the disk.
     let staged = || {
         let kept = place.bench.kept();
@@ -102,12 +158,15 @@ pub async fn do_not_hold_up_others(place: Place) {
     }
     place.figure(&format!(
         "{count} watchers that do not read and {count} uploads that stop: healthy calls {before}; with them {during} \
-         (p99 {:+.0} %); uploads all broken off, {:.1} s after that; the server had {} MiB",
+         (p99 {:+.0} %); watchers all shed {:.1} s after they were there, uploads broken off {:.1} s after the calls; the \
+         server had {} MiB",
         (during.p99 / before.p99 - 1.0) * 100.0,
         shed.as_secs_f64(),
+        broken_off.as_secs_f64(),
         peak(&server)
     ));
     drop(watchers);
+    reader.abort();
     stop.store(true, Ordering::Relaxed);
     worker.await.unwrap();
     server.stop().await;

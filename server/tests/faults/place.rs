@@ -17,6 +17,12 @@ pub fn short_or_full<T>(short: T, in_full: T) -> T {
     if full() { in_full } else { short }
 }
 
+/// An address that is free now; whoever comes in between makes the test fail, and nothing worse.
+pub fn free_address() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().to_string()
+}
+
 /// A folder and a ledger for one server after the other.
 pub struct Place {
     pub bench: Bench,
@@ -56,13 +62,10 @@ impl Place {
         if let Some(url) = url {
             bench.variable("GUARDSPLAT_DATABASE", url);
         }
-        // Free now; whoever comes in between makes the test fail, and nothing worse.
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
         Self {
             bench,
             cluster,
-            address,
+            address: free_address(),
         }
     }
 

@@ -168,6 +168,7 @@ impl Stub {
                 failure: Some(failure),
                 retryable: true,
                 cancelled: false,
+                ..FailJobRequest::default()
             };
             let _ = self.dies_amid(job, "amid a failure", worker.fail_job(request)).await;
         }

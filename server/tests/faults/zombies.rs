@@ -30,6 +30,7 @@ pub async fn says_everything(caller: &Caller, job: &Job, token: &str) -> Vec<(&'
         failure: Some(failure),
         retryable: true,
         cancelled: false,
+        ..FailJobRequest::default()
     };
     let mut worker = caller.worker.clone();
     let answers = [

@@ -64,6 +64,8 @@ async fn metrics_and_readiness_have_an_address_of_their_own() {
     let waiting = tokio::spawn(async move {
         let request = LeaseJobRequest {
             worker: "stub".into(),
+            device: "cpu".into(),
+            memory_bytes: 5 << 30,
             wait,
             ..LeaseJobRequest::default()
         };
@@ -76,6 +78,9 @@ async fn metrics_and_readiness_have_an_address_of_their_own() {
         tokio::time::sleep(std::time::Duration::from_millis(50)).await;
     }
     assert_eq!(get(&address, "/readyz").await.0, 200);
+    let (_, text) = get(&address, "/metrics").await;
+    let memory = format!(r#"guardsplat_worker_memory_bytes{{device="cpu"}} {}"#, 5_u64 << 30);
+    assert!(text.contains(&memory), "{memory} is not in\n{text}");
     assert_eq!(server.stop().await.code(), Some(0));
     assert!(waiting.await.unwrap().is_err());
 }

@@ -9,8 +9,10 @@ use guardsplat_proto::v1::undone::Kind;
 use crate::api::problems::Problems;
 use crate::error::Result;
 
-/// Most framings. Workers try some seventy tones, with borders and without.
+/// Most framings. Workers try some seventy tones, with borders and without, and some thirty parts.
 const MOST: usize = 1024;
+/// What parts of pictures are told in.
+const TWELFTHS: u32 = 12;
 
 /// What was read in each framing, checked against the bits of the key.
 pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
@@ -35,8 +37,16 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
             let positive = undone.factor.is_finite() && undone.factor > 0.0;
             problems.check(positive, &field("undone.factor"), "must be above 0");
         }
+        if let Some(part) = &reading.part {
+            let inside = |from: u32| from <= TWELFTHS && part.side_twelfths <= TWELFTHS - from;
+            let inside = part.side_twelfths > 0 && inside(part.left_twelfths) && inside(part.top_twelfths);
+            problems.check(inside, &field("part"), "must lie within the picture's twelve twelfths");
+        }
+        let part = reading
+            .part
+            .map(|part| (part.left_twelfths, part.top_twelfths, part.side_twelfths));
         let undone = reading.undone.map(|undone| (undone.kind, undone.factor.to_bits()));
-        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone)) {
+        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone, part)) {
             problems.add(format!("readings[{i}]"), "is in the same framing as another one");
         }
     }
@@ -72,6 +82,11 @@ fn name(reading: &FramedReading) -> String {
     if reading.trimmed {
         done.push("without borders".to_owned());
     }
+    if let Some(part) = &reading.part {
+        let percent = |twelfths: u32| (100 * twelfths + TWELFTHS / 2) / TWELFTHS;
+        let [side, left, top] = [part.side_twelfths, part.left_twelfths, part.top_twelfths].map(percent);
+        done.push(format!("{side} % of its sides from {left} % right and {top} % down"));
+    }
     match done.is_empty() {
         true => "as given".into(),
         false => done.join(", "),
@@ -83,6 +98,7 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
     use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
         _ if reading.undone.is_some() => Tone,
+        _ if reading.part.is_some() => Crop,
         (true, ..) => Crop,
         (_, true, _) => Mirrored,
         (_, _, 0) => AsGiven,
@@ -101,7 +117,7 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
 mod tests {
     use super::*;
     use crate::error::Error;
-    use guardsplat_proto::v1::Undone;
+    use guardsplat_proto::v1::{PicturePart, Undone};
 
     fn reading(quarter_turns: u32, mirrored: bool, trimmed: bool) -> FramedReading {
         FramedReading {
@@ -111,6 +127,18 @@ mod tests {
             views: 1,
             logits: vec![1.0; 64],
             undone: None,
+            part: None,
+        }
+    }
+
+    fn part(left: u32, top: u32, side: u32) -> FramedReading {
+        FramedReading {
+            part: Some(PicturePart {
+                left_twelfths: left,
+                top_twelfths: top,
+                side_twelfths: side,
+            }),
+            ..reading(0, false, false)
         }
     }
 
@@ -148,6 +176,25 @@ mod tests {
         assert_eq!(counts, [1, 2]);
         assert!(checked(&[brightened(0.81), brightened(0.81)], 64).is_err());
         assert!(checked(&[brightened(0.0)], 64).is_err() && checked(&[brightened(f32::NAN)], 64).is_err());
+    }
+
+    #[test]
+    fn parts_are_framings_of_their_own_and_lie_within_the_picture() {
+        let readings = [reading(0, false, false), part(3, 0, 6), part(4, 0, 6)];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "50 % of its sides from 25 % right and 0 % down");
+        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 2]);
+        assert!(checked(&[part(3, 0, 6), part(3, 0, 6)], 64).is_err());
+        for outside in [
+            part(7, 0, 6),
+            part(0, 7, 6),
+            part(0, 0, 0),
+            part(13, 0, 1),
+            part(0, u32::MAX, 1),
+        ] {
+            assert!(checked(&[outside], 64).is_err());
+        }
     }
 
     #[test]

@@ -153,6 +153,7 @@ impl Bench {
             readings,
             engine: "a test".into(),
             views: vec![seen(103)],
+            ..CompleteJobRequest::default()
         };
         self.server.worker.clone().complete_job(request).await.map(|_| ())
     }

@@ -45,6 +45,7 @@ pub struct Server {
     pub registry: RegistryServiceClient<Channel>,
     pub worker: WorkerServiceClient<Channel>,
     pub channel: Channel,
+    pub url: String,
     folder: TempDir,
     ledger: Arc<dyn Ledger>,
     tokens: bool,
@@ -116,7 +117,7 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, 0).await.unwrap();
         let api = Api::new(ledger.clone(), store, master, notary, limits).traced(traces);
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let address = format!("http://{}", listener.local_addr().unwrap());
+        let url = format!("http://{}", listener.local_addr().unwrap());
         let (end, ended) = oneshot::channel();
         let shutdown = async { ended.await.unwrap_or_default() };
         let guard = match tokens {
@@ -133,7 +134,7 @@ impl Server {
         let served = tokio::spawn(serve(routes, door, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));
         tokio::spawn(relay(api.clone()));
-        let channel = Channel::from_shared(address).unwrap().connect_lazy();
+        let channel = Channel::from_shared(url.clone()).unwrap().connect_lazy();
         Self {
             jobs: JobServiceClient::new(channel.clone()),
             artifacts: ArtifactServiceClient::new(channel.clone()),
@@ -141,6 +142,7 @@ impl Server {
             registry: RegistryServiceClient::new(channel.clone()),
             worker: WorkerServiceClient::new(channel.clone()),
             channel,
+            url,
             api,
             folder,
             ledger,

@@ -4,6 +4,7 @@ mod admission;
 mod artifacts;
 mod calls;
 mod claims;
+mod direct;
 mod harness;
 mod hooks;
 mod housekeeping;

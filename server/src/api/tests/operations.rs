@@ -5,8 +5,8 @@ use guardsplat_proto::v1::job::State;
 use guardsplat_proto::v1::job_attempt::Outcome;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{
-    DeleteArtifactRequest, EmbedResult, FailJobRequest, Failure, JobAttempt, ListJobAttemptsRequest, ListJobsRequest,
-    Progress, ReportJobRequest, RequeueJobRequest,
+    CompleteJobRequest, DeleteArtifactRequest, EmbedResult, FailJobRequest, Failure, JobAttempt,
+    ListJobAttemptsRequest, ListJobsRequest, Progress, ReportJobRequest, RequeueJobRequest,
 };
 use tonic::{Code, Status};
 
@@ -22,6 +22,7 @@ async fn fail(server: &Server, job: &str, token: &str, reason: Reason, retryable
         }),
         retryable,
         cancelled: false,
+        ..FailJobRequest::default()
     };
     server.worker.clone().fail_job(request).await.unwrap();
 }
@@ -159,15 +160,27 @@ async fn what_happens_is_counted() {
         psnr_db: Some(41.0),
         ..EmbedResult::default()
     });
-    for _ in 0..2 {
-        // Said again it is no second mark.
-        server.complete(&job.name, &token, result.clone()).await.unwrap();
+    for peak in [3_u64 << 30, 5 << 30] {
+        // Said again it is no second mark, also when the worker has measured anew.
+        let request = CompleteJobRequest {
+            name: job.name.clone(),
+            lease_token: token.clone(),
+            result: Some(result.clone()),
+            peak_memory_bytes: Some(peak),
+            ..CompleteJobRequest::default()
+        };
+        server.worker.clone().complete_job(request).await.unwrap();
     }
     has(r#"guardsplat_jobs_created_total{kind="embed"} 1"#);
     has(r#"guardsplat_job_attempts_ended_total{kind="embed",outcome="succeeded"} 1"#);
     has(r#"guardsplat_jobs_ended_total{kind="embed",state="succeeded"} 1"#);
     has(r#"guardsplat_marks_total{recovered="true"} 1"#);
     has("guardsplat_mark_psnr_db_sum 41.0");
+    has(r#"guardsplat_job_memory_bytes_count{kind="embed"} 1"#);
+    has(&format!(
+        r#"guardsplat_job_memory_bytes_sum{{kind="embed"}} {:?}"#,
+        (3_u64 << 30) as f64
+    ));
     for (stage, count) in [("preparing", 1), ("optimising", 1), ("reading", 1), ("storing", 0)] {
         has(&format!(
             r#"guardsplat_stage_seconds_count{{kind="embed",stage="{stage}"}} {count}"#

@@ -16,6 +16,7 @@ use super::harness::{
     Server, key_output, key_spec, metadata, not_found, refused, sha256, upload_messages, verify_spec,
 };
 use crate::access::Scope::{self, Admin, Embed, Verify, Worker};
+use crate::api::clock;
 
 /// What a project can do but carry out jobs.
 const ALL: [Scope; 3] = [Embed, Verify, Admin];
@@ -32,6 +33,7 @@ struct Project {
     token_name: String,
     hook: String,
     delivery: String,
+    upload: String,
 }
 
 const SCENE: &[u8] = b"a scene";
@@ -93,7 +95,11 @@ impl Project {
         };
         let job = jobs.create_job(asking(&token, job)).await.unwrap().into_inner().name;
         let id: uuid::Uuid = token.split('_').nth(1).unwrap().parse().unwrap();
+        let begun = server
+            .api
+            .name_of_upload(name, id, clock::now(), metadata("a.ply", SCENE));
         Self {
+            upload: begun.unwrap(),
             artifact,
             key,
             owner,
@@ -225,6 +231,12 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
+        "FinishUpload" => {
+            let request = FinishUploadRequest {
+                upload: other.upload.clone(),
+            };
+            one(request.encode_to_vec(), &other.upload)
+        }
         "DownloadArtifact" => named!(DownloadArtifactRequest, artifact, offset: 0),
         "GetDownloadUrl" => named!(GetDownloadUrlRequest, artifact),
         "GetArtifact" => named!(GetArtifactRequest, artifact),
@@ -267,7 +279,9 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListHooks" => Own(Vec::new(), own.hook.clone()),
         "ListDeliveries" => Own(Vec::new(), own.delivery.clone()),
         "RedeliverDelivery" => named!(RedeliverDeliveryRequest, delivery),
-        "UploadArtifact" | "CreateOwner" | "CreateToken" | "CreateHook" | "GetPublicKey" => NamesNothing,
+        "UploadArtifact" | "StartUpload" | "CreateOwner" | "CreateToken" | "CreateHook" | "GetPublicKey" => {
+            NamesNothing
+        }
         _ => panic!("say what {path} does with what is another project's"),
     }
 }

@@ -32,18 +32,18 @@ fn bucket(endpoint: &Endpoint) -> ArtifactStore {
     ArtifactStore::open_at(&place, endpoint.environment(), abandoned, MAX_ARTIFACT_BYTES).unwrap()
 }
 
-async fn server(endpoint: &Endpoint, limits: Limits) -> Server {
+pub async fn server(endpoint: &Endpoint, limits: Limits) -> Server {
     let folder = TempDir::new().unwrap();
     let ledger = SqliteLedger::open(&folder.path().join("ledger.sqlite")).await.unwrap();
     Server::with_store(Arc::new(ledger), bucket(endpoint), folder, limits, false).await
 }
 
-fn bytes(count: usize, seed: usize) -> Vec<u8> {
+pub fn bytes(count: usize, seed: usize) -> Vec<u8> {
     let mixed = |i: usize| (i + seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56;
     (0..count).map(|i| mixed(i) as u8).collect()
 }
 
-async fn download(server: &Server, name: &str) -> Result<Vec<u8>, Status> {
+pub async fn download(server: &Server, name: &str) -> Result<Vec<u8>, Status> {
     let request = DownloadArtifactRequest {
         name: name.into(),
         offset: 0,

@@ -3,10 +3,12 @@ use std::time::{Duration, Instant};
 
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::State;
+use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{
     CancelJobRequest, FailJobRequest, Failure, Progress, ReportJobRequest, WatchJobRequest, WatchJobResponse,
 };
+use tonic::transport::Channel;
 use tonic::{Code, Status, Streaming};
 use uuid::Uuid;
 
@@ -206,6 +208,115 @@ async fn slow_watchers_hold_up_nobody() {
         }
         assert_eq!((last, before), (State::Failed, 10));
     }
+}
+
+/// A watch on a connection of its own, whose stream has room for a message or two that nobody has read.
+async fn narrow(server: &Server, name: &str) -> Streaming<WatchJobResponse> {
+    let endpoint = Channel::from_shared(server.url.clone()).unwrap();
+    let channel = endpoint.initial_stream_window_size(512).connect().await.unwrap();
+    let request = WatchJobRequest {
+        name: name.into(),
+        ..WatchJobRequest::default()
+    };
+    let answer = JobServiceClient::new(channel).watch_job(request).await;
+    answer.unwrap().into_inner()
+}
+
+fn is_told(server: &Server, line: &str) -> bool {
+    let text = server.api.metrics().text().unwrap();
+    text.lines().any(|told| told == line)
+}
+
+#[tokio::test]
+async fn who_does_not_read_is_shed_and_others_are_not() {
+    // Reports of a lease as short as this are written every 400 ms.
+    let server = Server::with(Limits {
+        lease: Duration::from_millis(1600),
+        watch_stall: Duration::from_secs(2),
+        ..Limits::default()
+    })
+    .await;
+    let name = server.create(key_spec(8)).await.name;
+    let (_, token) = server.take().await;
+    let mut stalled = narrow(&server, &name).await;
+    let first = next(&mut stalled).await.unwrap().unwrap();
+    let reader = |mut stream: Streaming<WatchJobResponse>, pause| {
+        tokio::spawn(async move {
+            let mut last = None;
+            while let Some(message) = stream.message().await? {
+                last = message.job;
+                tokio::time::sleep(pause).await;
+            }
+            Ok::<_, Status>(last.unwrap().state())
+        })
+    };
+    // It takes less than is told, and so is soon behind.
+    let slow = reader(narrow(&server, &name).await, Duration::from_millis(500));
+    let healthy = reader(watch(&server, &name, "").await.unwrap(), Duration::ZERO);
+    let mut done = 0;
+    while !is_told(&server, "guardsplat_watches_shed_total 1") {
+        done += 1;
+        assert!(done < 200, "nobody was shed");
+        report(&server, &name, &token, done).await;
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    // Its stream is still there, and what it held is not.
+    assert!(is_told(&server, "guardsplat_watches 2"));
+    assert!(!slow.is_finished() && !healthy.is_finished());
+    let (mut cursor, mut seen) = (first.cursor, 0);
+    let shed = loop {
+        match next(&mut stalled).await {
+            Ok(message) => {
+                let message = message.expect("ended without a word");
+                (cursor, seen) = (message.cursor, message.job.unwrap().progress.unwrap().done);
+            }
+            Err(status) => break Err::<(), _>(status),
+        }
+    };
+    let details = refused(shed, Code::Unavailable, "WATCH_STALLED");
+    assert!(details.retry_info().is_some());
+    assert!(seen < done, "{seen} of {done}");
+    fail(&server, &name, &token).await;
+    // It goes on behind what it has read.
+    assert_eq!(
+        state(&mut watch(&server, &name, &cursor).await.unwrap()).await,
+        State::Failed
+    );
+    assert_eq!(healthy.await.unwrap().unwrap(), State::Failed);
+    assert_eq!(slow.await.unwrap().unwrap(), State::Failed);
+    assert!(is_told(&server, "guardsplat_watches_shed_total 1"));
+    let left = async {
+        while !is_told(&server, "guardsplat_watches 0") {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), left).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_caller_has_so_many_watches_at_once() {
+    let server = Server::with(Limits {
+        max_watches: 2,
+        ..Limits::default()
+    })
+    .await;
+    let name = server.create(key_spec(8)).await.name;
+    let first = watch(&server, &name, "").await.unwrap();
+    let _second = watch(&server, &name, "").await.unwrap();
+    let details = refused(
+        watch(&server, &name, "").await,
+        Code::ResourceExhausted,
+        "TOO_MANY_WATCHES",
+    );
+    assert_eq!(details.error_info().unwrap().metadata["limit"], "2");
+    drop(first);
+    // That it is gone has to be heard first.
+    let third = async {
+        while watch(&server, &name, "").await.is_err() {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), third).await.unwrap();
 }
 
 #[tokio::test]

@@ -45,6 +45,7 @@ async fn fail(server: &Server, job: &str, token: &str, reason: Reason, retryable
         failure,
         retryable,
         cancelled: false,
+        ..FailJobRequest::default()
     };
     server.worker.clone().fail_job(request).await.map(|_| ())
 }

@@ -10,8 +10,14 @@ fn paths_are_made_of_ids() {
     assert_eq!(path.to_string().matches('/').count(), 3);
     assert!(!path.to_string().contains("token"));
     assert_ne!(path, ArtifactPath::output(job, "another", id));
-    for path in [path, ArtifactPath::upload(id)] {
+    for (path, ahead) in [
+        (path, false),
+        (ArtifactPath::upload(id), false),
+        (ArtifactPath::taken(job, id), true),
+        (ArtifactPath::staged(id), true),
+    ] {
         assert_eq!(ArtifactPath::parse(&path.to_string()).unwrap(), path);
+        assert_eq!((path.id(), path.is_ahead_of_its_row()), (Some(id), ahead), "{path}");
     }
     for bad in [
         "",
@@ -22,6 +28,7 @@ fn paths_are_made_of_ids() {
         "uploads/00000000-0000-0000-0000-000000000002#1",
         "uploads/00000000000000000000000000000002",
         "uploads/00000000-0000-0000-0000-000000000002/",
+        "staged/00000000-0000-0000-0000-000000000002/00000000-0000-0000-0000-000000000002",
         "outputs/00000000-0000-0000-0000-000000000002/../00000000-0000-0000-0000-000000000002",
         "outputs/00000000-0000-0000-0000-000000000002/0123456789ABCDEF/00000000-0000-0000-0000-000000000002",
     ] {
@@ -32,7 +39,7 @@ fn paths_are_made_of_ids() {
 proptest! {
     #[test]
     fn no_text_leads_out_of_the_store(
-        text in "(uploads|outputs|\\.\\.|[a-z/#.%]*)(/[a-f0-9./#%-]{0,40}){0,4}",
+        text in "(staged|uploads|outputs|\\.\\.|[a-z/#.%]*)(/[a-f0-9./#%-]{0,40}){0,4}",
     ) {
         if let Ok(path) = ArtifactPath::parse(&text) {
             prop_assert_eq!(path.to_string(), text);

@@ -103,3 +103,58 @@ async fn a_signed_address_gives_one_artifact_for_a_time() {
         .unwrap();
     assert_eq!(none, None);
 }
+
+#[tokio::test]
+async fn what_is_taken_stays_only_if_it_is_kept() {
+    let bench = Bench::s3().await;
+    let store = &bench.store;
+    let (data, id) = (bytes(3000), Uuid::now_v7());
+    let staged = ArtifactPath::staged(id);
+    let address = store.upload_url(&staged, 3000, Duration::from_secs(60)).await.unwrap();
+    let address = address.unwrap();
+    assert!(
+        !address.url.contains("5ec2e7") && address.headers.is_empty(),
+        "{address:?}"
+    );
+    let sent = reqwest::Client::new().put(&address.url).body(data.clone()).send().await;
+    assert_eq!(sent.unwrap().status(), 200);
+    assert_eq!(fetch(&address.url).await.0, 403, "it is for writing");
+    let path = ArtifactPath::taken(Uuid::now_v7(), id);
+    let take = async || store.take(&staged, path.clone(), Announced::of(&data)).await.unwrap();
+    drop(take().await);
+    for _ in 0..200 {
+        if bench.files().len() == 1 {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(bench.files(), [bench.file(&staged)]);
+    take().await.remove().await.unwrap();
+    assert_eq!(bench.files(), [bench.file(&staged)]);
+    take().await.keep();
+    store.delete(&staged).await.unwrap();
+    assert_eq!(fs::read(bench.file(&path)).unwrap(), data);
+}
+
+/// Of Azure only what it is asked for is known here.
+#[tokio::test]
+async fn each_service_is_sent_to_as_it_wants() {
+    let lifetime = Duration::from_secs(60);
+    let path = ArtifactPath::staged(Uuid::now_v7());
+    let environment = [
+        ("AZURE_STORAGE_ACCOUNT_NAME", "account"),
+        ("AZURE_STORAGE_ACCOUNT_KEY", "NWVjMmU3"),
+    ];
+    let environment = environment.map(|(name, value)| (name.into(), value.into()));
+    let place = Place::parse("az://container/a").unwrap();
+    let azure = ArtifactStore::open_at(&place, environment, Duration::ZERO, 1 << 40).unwrap();
+    let address = azure.upload_url(&path, 5000 << 20, lifetime).await.unwrap().unwrap();
+    let begin = format!("https://account.blob.core.windows.net/container/a/{path}?");
+    assert!(address.url.starts_with(&begin), "{}", address.url);
+    assert_eq!(address.headers, [("x-ms-blob-type", "BlockBlob")]);
+    // More than one request brings, and a folder.
+    let many = azure.upload_url(&path, (5000 << 20) + 1, lifetime).await.unwrap();
+    assert!(many.is_none());
+    let folder = Bench::folder().await;
+    assert!(folder.store.upload_url(&path, 1, lifetime).await.unwrap().is_none());
+}

@@ -1,7 +1,7 @@
 //! What operators ask: counts, attempts and their ends, and another try for a job that failed.
 use super::super::{
-    Failure, JobKind, JobState, LedgerError, NewJob, Outcome, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, Tally,
-    Waiting,
+    Failure, JobKind, JobState, LedgerError, Needs, NewJob, Outcome, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+    Running, Tally, Waiting,
 };
 use super::Factory;
 use super::fixture::*;
@@ -168,8 +168,30 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
     let lease = claim_of(&*ledger, refused_one, at(11)).await;
     let no_retry = ledger.fail(refused_one, &lease.token, failure("no scene"), false, false, at(12));
     no_retry.await.unwrap();
-    let running = queue(&*ledger, at(20)).await;
-    claim_of(&*ledger, running, at(21)).await;
+    // What its scene will probably take counts, and else what it takes at least; sums do not overflow.
+    let sizes = [
+        (None, None),
+        (Some(1), Some(2_000_000)),
+        (Some(1_000_000), None),
+        (Some(i64::MAX), Some(i64::MAX)),
+    ];
+    let mut memory = Vec::new();
+    for (least, likely) in sizes {
+        let running = NewJob {
+            needs: Needs {
+                memory: least,
+                likely_memory: likely,
+                clip: None,
+            },
+            ..new_job()
+        };
+        let id = running.id;
+        ledger.create_job(running, at(20)).await.unwrap();
+        claim_of(&*ledger, id, at(21)).await;
+        memory.push(ledger.tally().await.unwrap().running[0].memory);
+    }
+    assert_eq!(memory[..3], [0, 2_000_000, 3_000_000]);
+    assert_eq!(memory[3], i64::MAX as u64);
     queue(&*ledger, at(30)).await;
     queue(&*ledger, at(31)).await;
     ledger.create_job(verify(uuid::Uuid::now_v7()), at(32)).await.unwrap();
@@ -182,7 +204,11 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
         tally,
         Tally {
             queued: vec![waiting(JobKind::Embed, 2, at(30)), waiting(JobKind::Verify, 1, at(32))],
-            running: vec![(JobKind::Embed, 1)],
+            running: vec![Running {
+                kind: JobKind::Embed,
+                count: 4,
+                memory: memory[3],
+            }],
             failed: vec![(JobKind::Embed, REASON_ATTEMPTS_EXHAUSTED, 1), (JobKind::Verify, 4, 1)],
         }
     );

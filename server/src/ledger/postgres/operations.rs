@@ -3,7 +3,7 @@ use sqlx::postgres::PgRow;
 use sqlx::{Connection, PgConnection, Row};
 use uuid::Uuid;
 
-use super::super::operations::{AttemptRow, OperationsLedger, Outcome, Tally, Waiting, count};
+use super::super::operations::{AttemptRow, OperationsLedger, Outcome, Running, Tally, Waiting, count};
 use super::super::types::{ArtifactId, Failure, JobId, JobRow, JobState};
 use super::super::{LedgerError, Result, numbers};
 use super::{PostgresLedger, jobs, rows, with};
@@ -12,8 +12,10 @@ use super::{PostgresLedger, jobs, rows, with};
 pub(super) const QUEUED: &str =
     "SELECT kind, count(*) AS count, min(queue_time) AS since FROM jobs WHERE state = 1 GROUP BY kind";
 
-/// Running jobs by kind.
-pub(super) const RUNNING: &str = "SELECT kind, count(*) AS count FROM jobs WHERE state = 2 GROUP BY kind";
+/// Running jobs by kind. The sum is one without limits.
+pub(super) const RUNNING: &str = "SELECT kind, count(*) AS count, \
+    least(coalesce(sum(coalesce(likely_memory, memory)), 0), 9223372036854775807)::bigint AS memory \
+    FROM jobs WHERE state = 2 GROUP BY kind";
 
 /// Failed jobs by kind and reason.
 pub(super) const FAILED: &str = "SELECT kind, coalesce(failure_reason, 0) AS reason, count(*) AS count \
@@ -67,8 +69,11 @@ async fn tally(db: &mut PgConnection) -> Result<Tally> {
         });
     }
     for row in sqlx::query(RUNNING).fetch_all(&mut *db).await? {
-        let kind = numbers::job_kind(rows::number(&row, "kind")?)?;
-        tally.running.push((kind, count(row.try_get("count")?)));
+        tally.running.push(Running {
+            kind: numbers::job_kind(rows::number(&row, "kind")?)?,
+            count: count(row.try_get("count")?),
+            memory: count(row.try_get("memory")?),
+        });
     }
     for row in sqlx::query(FAILED).fetch_all(&mut *db).await? {
         let kind = numbers::job_kind(rows::number(&row, "kind")?)?;

@@ -3,7 +3,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
-use super::super::operations::{AttemptRow, OperationsLedger, Outcome, Tally, Waiting, bits, count};
+use super::super::operations::{AttemptRow, OperationsLedger, Outcome, Running, Tally, Waiting, bits, count};
 use super::super::types::{ArtifactId, Failure, JobId, JobRow, JobState};
 use super::super::{LedgerError, Result, numbers};
 use super::{SqliteLedger, jobs, rows};
@@ -12,9 +12,10 @@ use super::{SqliteLedger, jobs, rows};
 pub(super) const QUEUED: &str = "SELECT kind, count(*) AS count, min(queue_time) AS since \
     FROM jobs INDEXED BY jobs_queue WHERE state = 1 GROUP BY kind";
 
-/// Running jobs by kind.
-pub(super) const RUNNING: &str =
-    "SELECT kind, count(*) AS count FROM jobs INDEXED BY jobs_leases WHERE state = 2 GROUP BY kind";
+/// Running jobs by kind. The sum is one of floating point, which does not overflow.
+pub(super) const RUNNING: &str = "SELECT kind, count(*) AS count, \
+    CAST(total(coalesce(likely_memory, memory)) AS INTEGER) AS memory \
+    FROM jobs INDEXED BY jobs_leases WHERE state = 2 GROUP BY kind";
 
 /// Failed jobs by kind and reason, from the index alone.
 pub(super) const FAILED: &str = "SELECT kind, coalesce(failure_reason, 0) AS reason, count(*) AS count \
@@ -39,8 +40,11 @@ impl OperationsLedger for SqliteLedger {
             });
         }
         for row in sqlx::query(RUNNING).fetch_all(&mut *db).await? {
-            let kind = numbers::job_kind(row.try_get("kind")?)?;
-            tally.running.push((kind, count(row.try_get("count")?)));
+            tally.running.push(Running {
+                kind: numbers::job_kind(row.try_get("kind")?)?,
+                count: count(row.try_get("count")?),
+                memory: count(row.try_get("memory")?),
+            });
         }
         for row in sqlx::query(FAILED).fetch_all(&mut *db).await? {
             let kind = numbers::job_kind(row.try_get("kind")?)?;
