@@ -1,15 +1,17 @@
 //! What the calls of a command are a part of, as W3C Trace Context has it: what `TRACEPARENT` says; and below that, or by
 //! itself, the command's own span, where `OTEL_EXPORTER_OTLP_ENDPOINT` names a collector. It is sent there by OTLP when
 //! the command is over, and holds the command's name and how it ended, and nothing of what it was given.
+use std::collections::HashMap;
 use std::time::Duration;
 
+use opentelemetry::propagation::TextMapPropagator as _;
 use opentelemetry::trace::{
-    Span as _, SpanContext, SpanId, SpanKind, Status, TraceContextExt as _, TraceFlags, TraceId, TraceState,
-    Tracer as _, TracerProvider as _,
+    Span as _, SpanContext, SpanKind, Status, TraceContextExt as _, Tracer as _, TracerProvider as _,
 };
 use opentelemetry::{Context, KeyValue};
 use opentelemetry_otlp::SpanExporter;
 use opentelemetry_sdk::Resource;
+use opentelemetry_sdk::propagation::TraceContextPropagator;
 use opentelemetry_sdk::trace::{SdkTracerProvider, Span};
 use tonic::metadata::{Ascii, MetadataValue};
 
@@ -40,17 +42,14 @@ impl Trace {
     /// Begins, as the environment says. Must be called where tokio runs.
     pub fn begin(command: &str) -> Self {
         let variable = |name: &str| std::env::var(name).ok();
-        let given = variable("TRACEPARENT").filter(|text| is_parent(text.trim()));
+        let given = variable("TRACEPARENT").as_deref().and_then(context);
         let own = match is_collected(variable) {
-            true => Own::begin(command, given.as_deref().and_then(context)),
+            true => Own::begin(command, given.clone()),
             false => None,
         };
-        let text = match &own {
-            Some(own) => Some(text(own.span.span_context())),
-            None => given,
-        };
+        let part_of = own.as_ref().map(|own| own.span.span_context().clone()).or(given);
         Self {
-            header: text.and_then(|text| text.trim().parse().ok()),
+            header: part_of.and_then(text).and_then(|text| text.parse().ok()),
             own,
         }
     }
@@ -106,32 +105,19 @@ fn is_collected(variable: impl Fn(&str) -> Option<String>) -> bool {
     !off && ENDPOINTS.into_iter().any(named)
 }
 
-/// Whether a text has the form of version 00; what is in it the server looks at.
-fn is_parent(text: &str) -> bool {
-    let lengths: Vec<usize> = text.split('-').map(str::len).collect();
-    let plain = text.bytes().all(|b| b == b'-' || b.is_ascii_hexdigit());
-    text.starts_with("00-") && lengths == [2, 32, 16, 2] && plain
-}
-
-/// The span that a text of that form names; none where there can't be such a one.
+/// The span that a `traceparent` names; none where it makes no sense.
 fn context(text: &str) -> Option<SpanContext> {
-    let [_, trace, span, flags] = text.trim().split('-').collect::<Vec<_>>()[..] else {
-        return None;
-    };
-    let context = SpanContext::new(
-        TraceId::from_hex(trace).ok()?,
-        SpanId::from_hex(span).ok()?,
-        TraceFlags::new(u8::from_str_radix(flags, 16).ok()?) & TraceFlags::SAMPLED,
-        true,
-        TraceState::default(),
-    );
-    context.is_valid().then_some(context)
+    let header = HashMap::from([(HEADER.to_owned(), text.to_owned())]);
+    let found = TraceContextPropagator::new().extract_with_context(&Context::new(), &header);
+    Some(found.span().span_context().clone()).filter(SpanContext::is_valid)
 }
 
-/// A span as the header names it.
-fn text(context: &SpanContext) -> String {
-    let flags = u8::from(context.is_sampled());
-    format!("00-{}-{}-{flags:02x}", context.trace_id(), context.span_id())
+/// A span as `traceparent` names it.
+fn text(context: SpanContext) -> Option<String> {
+    let mut header = HashMap::new();
+    let context = Context::new().with_remote_span_context(context);
+    TraceContextPropagator::new().inject_context(&context, &mut header);
+    header.remove(HEADER)
 }
 
 #[cfg(test)]
@@ -142,13 +128,12 @@ mod tests {
 
     #[test]
     fn parents_are_read_as_they_are_written() {
-        assert!(is_parent(GIVEN));
-        assert_eq!(text(&context(GIVEN).unwrap()), GIVEN);
-        for nonsense in ["", "00-1-2-3", "é", &GIVEN.replace("00-", "ff-")] {
-            assert!(!is_parent(nonsense), "{nonsense}");
-        }
+        assert_eq!(text(context(GIVEN).unwrap()).unwrap(), GIVEN);
+        assert_eq!(text(context(&format!(" {GIVEN}\n")).unwrap()).unwrap(), GIVEN);
         let nobody = GIVEN.replace("b7ad6b7169203331", "0000000000000000");
-        assert!(is_parent(&nobody) && context(&nobody).is_none());
+        for nonsense in ["", "00", "é", &GIVEN.replace("00-", "ff-"), &nobody] {
+            assert!(context(nonsense).is_none(), "{nonsense}");
+        }
     }
 
     #[test]

@@ -45,6 +45,16 @@ pub struct Compute {
     pub max_buffer: Option<u64>,
 }
 
+/// What [`open`] opened, to be asked what it holds.
+static OPENED_DEVICE: OnceLock<wgpu::Device> = OnceLock::new();
+
+/// Bytes of device memory that this process holds, used or kept for use; `None` while it has opened no wgpu device, and
+/// where the driver's allocator does not tell.
+pub fn memory_held() -> Option<u64> {
+    let report = OPENED_DEVICE.get()?.generate_allocator_report()?;
+    Some(report.total_reserved_bytes)
+}
+
 /// Opens the device that was chosen. A process opens wgpu once; later calls get the same one.
 ///
 /// # Errors
@@ -82,6 +92,7 @@ fn open_wgpu() -> Result<Compute> {
         let info = setup.adapter.get_info();
         let name = format!("wgpu: {} ({})", info.name, info.driver_info);
         let limits = setup.device.limits();
+        let _ = OPENED_DEVICE.set(setup.device);
         Ok(Compute {
             device,
             name,
@@ -139,6 +150,7 @@ mod tests {
                 assert!(first.name.starts_with("wgpu: "), "{}", first.name);
                 assert_eq!(open(DeviceChoice::Wgpu).unwrap().device, first.device);
                 assert_eq!(Tensor::<1>::ones([4], &first.device).sum().into_scalar::<f32>(), 4.0);
+                assert!(memory_held().is_some_and(|bytes| bytes >= 4 * 4));
             }
             Err(error) => assert!(adapters().is_empty() && error.to_string().contains("Vulkan"), "{error}"),
         }

@@ -321,6 +321,26 @@ fn a_missed_target_writes_nothing_unless_forced() {
 }
 
 #[test]
+fn a_mark_a_little_too_strong_is_made_weaker_and_one_far_too_strong_is_refused() {
+    let ((folder, input), engine) = (scene_file(), engine());
+    let output = folder.path().join("out.ply");
+    let mut wanted = settings();
+    let mut psnr = |target: f64| {
+        wanted.target.psnr_db = target;
+        let done = run(&engine, &input, &output, &wanted, false).unwrap();
+        (done.verification.quality.psnr.psnr_db.unwrap(), done.written)
+    };
+    let (as_learned, written) = psnr(0.0);
+    assert!(written);
+    let (weaker, written) = psnr(as_learned + 0.6);
+    assert!(
+        written && (0.6..0.9).contains(&(weaker - as_learned)),
+        "{as_learned} {weaker}"
+    );
+    assert_eq!(psnr(as_learned + 3.0), (as_learned, false));
+}
+
+#[test]
 fn a_held_out_margin_that_holds_ends_the_run() {
     let (engine, scene) = (engine(), Scene::from_gaussians(small_scene()));
     let mut easy = Preset::Standard.settings().early_stop.unwrap();

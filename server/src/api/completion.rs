@@ -60,7 +60,7 @@ fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
     // Which attempt it is, the ledger looks at.
     told.lease_token.clear();
     // Measured anew when it is said again.
-    told.peak_memory_bytes = None;
+    (told.peak_memory_bytes, told.peak_device_memory_bytes) = (None, None);
     Sha256::digest(told.encode_to_vec()).into()
 }
 

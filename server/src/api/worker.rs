@@ -62,7 +62,7 @@ impl WorkerService for Api {
         let mut request = request.into_inner();
         let id = Kind::Job.parse("name", &request.name)?;
         let lease_token = request.lease_token.clone();
-        let peak = request.peak_memory_bytes;
+        let (peak, on_device) = (request.peak_memory_bytes, request.peak_device_memory_bytes);
         // Whether the lease holds is looked at when the result is written: a worker whose answer was lost says it again.
         let job = self.ledger().get_job(id).await.map_err(Error::from)?;
         let job = job.ok_or_else(|| Kind::Job.not_found(id))?;
@@ -85,7 +85,7 @@ impl WorkerService for Api {
         // What is said again was counted before.
         if !job.state.is_over() {
             self.count_mark(&done);
-            self.metrics().memory_taken(done.kind, peak);
+            self.metrics().memory_taken(done.kind, peak, on_device);
             self.attempt_over(&done);
         }
         Ok(Response::new(CompleteJobResponse {}))
@@ -99,6 +99,7 @@ impl WorkerService for Api {
             retryable,
             cancelled,
             peak_memory_bytes,
+            peak_device_memory_bytes,
         } = request.into_inner();
         let id = Kind::Job.parse("name", &name)?;
         let failure = if cancelled {
@@ -111,7 +112,8 @@ impl WorkerService for Api {
             .fail(id, &lease_token, failure, retryable, cancelled, clock::now())
             .await;
         let failed = failed.map_err(Error::from)?;
-        self.metrics().memory_taken(failed.kind, peak_memory_bytes);
+        self.metrics()
+            .memory_taken(failed.kind, peak_memory_bytes, peak_device_memory_bytes);
         self.attempt_over(&failed);
         Ok(Response::new(FailJobResponse {}))
     }

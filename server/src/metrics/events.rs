@@ -77,12 +77,13 @@ impl Metrics {
         }
     }
 
-    /// What an attempt took of memory, if its worker knows.
-    pub fn memory_taken(&self, job: JobKind, peak: Option<u64>) {
-        if let Some(bytes) = peak {
-            self.memory
-                .get_or_create(&OfKind { kind: kind(job) })
-                .observe(bytes as f64);
+    /// What an attempt took of the machine's memory and of its accelerator's, as far as its worker knows.
+    pub fn memory_taken(&self, job: JobKind, peak: Option<u64>, on_device: Option<u64>) {
+        let of = OfKind { kind: kind(job) };
+        for (taken, bytes) in [(&self.memory, peak), (&self.device_memory, on_device)] {
+            if let Some(bytes) = bytes {
+                taken.get_or_create(&of).observe(bytes as f64);
+            }
         }
     }
 

@@ -83,6 +83,7 @@ pub struct Metrics {
     run: Times<Ended>,
     stages: Times<AtStage>,
     memory: Times<OfKind>,
+    device_memory: Times<OfKind>,
     marks: Counts<Mark>,
     accuracy: Histogram,
     psnr: Histogram,
@@ -173,6 +174,12 @@ impl Default for Metrics {
                 "Memory that an attempt took at most, as its worker measured it",
                 Family::new_with_constructor(|| Histogram::new(MEMORY)),
             ),
+            device_memory: add(
+                r,
+                "job_device_memory_bytes",
+                "Memory of its accelerator that a worker held at most during an attempt, as it measured it",
+                Family::new_with_constructor(|| Histogram::new(MEMORY)),
+            ),
             marks: add(
                 r,
                 "marks",
@@ -245,6 +252,7 @@ impl Metrics {
             }
             drop(self.wait.get_or_create(&of));
             drop(self.memory.get_or_create(&of));
+            drop(self.device_memory.get_or_create(&of));
             for outcome in labels::ATTEMPT_ENDS {
                 let kind = kind(job);
                 drop(self.attempts_ended.get_or_create(&AttemptEnded { kind, outcome }));

@@ -134,8 +134,8 @@ fn memory_is_told_by_what_workers_compute_on() {
         worker("", None),
         worker("cpu of my own", Some(9)),
     ]));
-    metrics.memory_taken(JobKind::Embed, Some(3 << 30));
-    metrics.memory_taken(JobKind::Embed, None);
+    metrics.memory_taken(JobKind::Embed, Some(3 << 30), None);
+    metrics.memory_taken(JobKind::Embed, None, Some(1 << 30));
     has(
         &metrics,
         &[
@@ -149,6 +149,9 @@ fn memory_is_told_by_what_workers_compute_on() {
             r#"guardsplat_job_memory_bytes_bucket{le="4294967296.0",kind="embed"} 1"#,
             r#"guardsplat_job_memory_bytes_count{kind="embed"} 1"#,
             r#"guardsplat_job_memory_bytes_count{kind="verify"} 0"#,
+            r#"guardsplat_job_device_memory_bytes_sum{kind="embed"} 1073741824.0"#,
+            r#"guardsplat_job_device_memory_bytes_count{kind="embed"} 1"#,
+            r#"guardsplat_job_device_memory_bytes_count{kind="verify"} 0"#,
         ],
     );
     metrics.workers(None);

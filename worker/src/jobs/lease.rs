@@ -1,10 +1,11 @@
 //! The right to one attempt of a job: kept by heartbeats, and given back with the attempt's outcome.
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use guardsplat_proto::v1::{
     CompleteJobRequest, FailJobRequest, Failure, Job, LeaseJobResponse, Progress, ReleaseJobRequest, ReportJobRequest,
 };
-use guardsplat_worker::memory;
+use guardsplat_worker::{device, memory};
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
 
@@ -34,6 +35,8 @@ pub struct Lease {
     pub trace_parent: String,
     /// Whether the peak of memory is this attempt's, and not also of what was before.
     measured: bool,
+    /// Bytes of the accelerator's memory that were held at most, of those times that it was looked at.
+    device_peak: AtomicU64,
 }
 
 /// Why an attempt ends that is not done.
@@ -86,6 +89,7 @@ impl Lease {
             duration,
             trace_parent: answer.trace_parent,
             measured: memory::forget_peak(),
+            device_peak: AtomicU64::new(0),
         };
         Ok(Some((lease, job)))
     }
@@ -100,6 +104,7 @@ impl Lease {
         let mut silent = false;
         loop {
             beat.tick().await;
+            self.look_at_device();
             let latest = *progress.borrow();
             match self.report(latest.filter(|_| latest != sent)).await {
                 Ok(true) => return Ended::Cancelled,
@@ -141,6 +146,7 @@ impl Lease {
             engine: ENGINE.into(),
             views: outcome.views,
             peak_memory_bytes: self.peak(),
+            peak_device_memory_bytes: self.look_at_device(),
         };
         let call = "complete the job";
         persist(call, async || {
@@ -153,6 +159,12 @@ impl Lease {
     /// Bytes of memory that the process took at most during the attempt; those of a GPU of its own are not among them.
     fn peak(&self) -> Option<u64> {
         memory::peak().filter(|_| self.measured)
+    }
+
+    /// Bytes of the accelerator's memory that the process held at most whenever this was called, if it uses one.
+    fn look_at_device(&self) -> Option<u64> {
+        let now = device::memory_held()?;
+        Some(self.device_peak.fetch_max(now, Ordering::Relaxed).max(now))
     }
 
     /// The attempt failed; tried for as long as the lease lasts.
@@ -179,6 +191,7 @@ impl Lease {
             name: self.job.clone(),
             lease_token: self.token.clone(),
             peak_memory_bytes: self.peak(),
+            peak_device_memory_bytes: self.look_at_device(),
             ..request
         };
         let call = "end the job";

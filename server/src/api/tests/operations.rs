@@ -167,6 +167,7 @@ async fn what_happens_is_counted() {
             lease_token: token.clone(),
             result: Some(result.clone()),
             peak_memory_bytes: Some(peak),
+            peak_device_memory_bytes: Some(peak / 2),
             ..CompleteJobRequest::default()
         };
         server.worker.clone().complete_job(request).await.unwrap();
@@ -180,6 +181,10 @@ async fn what_happens_is_counted() {
     has(&format!(
         r#"guardsplat_job_memory_bytes_sum{{kind="embed"}} {:?}"#,
         (3_u64 << 30) as f64
+    ));
+    has(&format!(
+        r#"guardsplat_job_device_memory_bytes_sum{{kind="embed"}} {:?}"#,
+        (3_u64 << 29) as f64
     ));
     for (stage, count) in [("preparing", 1), ("optimising", 1), ("reading", 1), ("storing", 0)] {
         has(&format!(
