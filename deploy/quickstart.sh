@@ -34,8 +34,8 @@ while [ $# -gt 0 ]; do
 done
 
 case $preset in
-    draft | standard | paper) ;;
-    *) echo "quickstart: $preset is not a preset, must be draft, standard or paper" >&2; exit 1 ;;
+    draft | standard | thorough | paper) ;;
+    *) echo "quickstart: $preset is not a preset, must be draft, standard, thorough or paper" >&2; exit 1 ;;
 esac
 case $device in
     auto | wgpu | cpu) ;;

@@ -27,6 +27,8 @@ pub enum Preset {
     Draft,
     /// What is recommended
     Standard,
+    /// Twice the work, for more bits that are right
+    Thorough,
     /// Steps, views and sizes of the paper
     Paper,
 }
@@ -36,6 +38,7 @@ impl From<Preset> for embed_spec::Preset {
         match preset {
             Preset::Draft => Self::Draft,
             Preset::Standard => Self::Standard,
+            Preset::Thorough => Self::Thorough,
             Preset::Paper => Self::Paper,
         }
     }

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// The message in hexadecimal, as many bits as the key has
     #[arg(long, value_name = "HEX")]
     message: String,
-    /// draft, standard or paper
+    /// draft, standard, thorough or paper
     #[arg(long, default_value = "standard")]
     preset: Preset,
     /// Decides views, backgrounds and augmentation

@@ -159,9 +159,7 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                 (alone.lambda.offset_dc, alone.lambda.offset_rest) = (0.0, 0.0);
                 (alone.balance, alone.early_stop) = (None, None);
                 add(BITS, names::MESSAGE_ONLY, alone, &none)?;
-                let mut fixed = *standard;
-                (fixed.balance, fixed.early_stop) = (None, None);
-                add(BITS, FIXED_WEIGHTS, fixed, &none)?;
+                add(BITS, names::FIXED_WEIGHTS, fixed_weights(standard), &none)?;
             }
             Kind::Pruning => {
                 let trials = [names::NONE, names::PRUNE_LOWEST, names::PRUNE_RANDOM];
@@ -169,12 +167,14 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
             }
             Kind::Perturbations => add(BITS, names::STANDARD, *standard, &PERTURBATIONS)?,
             Kind::Sensitivity => {
-                add(BITS, names::STANDARD, *standard, &none)?;
+                // Where a PSNR is held, weights are changed all along, and what they were at first decides nothing.
+                let fixed = fixed_weights(standard);
+                add(BITS, names::FIXED_WEIGHTS, fixed, &none)?;
                 for weight in [0.25, 0.5, 2.0, 4.0] {
-                    let mut likeness = *standard;
+                    let mut likeness = fixed;
                     likeness.lambda.reconstruction *= weight as f32;
                     add(BITS, &format!("{}{weight}", names::LAMBDA_RECON), likeness, &none)?;
-                    let mut message = *standard;
+                    let mut message = fixed;
                     message.lambda.message *= weight as f32;
                     add(BITS, &format!("{}{weight}", names::LAMBDA_MSG), message, &none)?;
                 }
@@ -210,10 +210,17 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
     Ok(plan)
 }
 
+/// These settings with weights of the loss that stay as they are; all steps are taken, so that runs can be compared.
+fn fixed_weights(standard: &Settings) -> Settings {
+    Settings {
+        balance: None,
+        early_stop: None,
+        ..*standard
+    }
+}
+
 /// The circle of views of the variant that is trained on one; the public code's height is that of its data sets.
 const RING: Ring = Ring { elevation: 30.0 };
-/// The variant whose weights of the loss stay as they are, instead of being changed so that a PSNR is held.
-const FIXED_WEIGHTS: &str = "fixed weights";
 const PERTURBATIONS: [&str; 8] = [
     names::NONE,
     "sh-noise:0.01",

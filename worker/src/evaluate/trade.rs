@@ -80,7 +80,7 @@ struct Own {
 /// A file that is no such array, names that are empty, too long, or there twice, settings that are refused, and names in
 /// `only` that there are none of.
 pub fn variants(base: &Settings, own: Option<&str>, only: &[String]) -> Result<Vec<Variant>> {
-    let presets = [Preset::Draft, Preset::Standard, Preset::Paper].map(|preset| (preset.name(), preset.settings()));
+    let presets = Preset::ALL.map(|preset| (preset.name(), preset.settings()));
     let mut all: Vec<Candidate> = Vec::new();
     if !presets.iter().any(|(_, settings)| settings == base) {
         all.push(Candidate::settled(BASE, *base));

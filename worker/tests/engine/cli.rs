@@ -213,7 +213,7 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
         ),
         (
             "embed in.ply out.ply --key k.key --message 5c --preset fast",
-            "draft, standard or paper",
+            "draft, standard, thorough or paper",
         ),
         (
             "embed in.ply out.ply --key k.key --message 5c --device cpu --size 4",

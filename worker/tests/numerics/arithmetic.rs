@@ -153,7 +153,7 @@ pub fn adam_in_a_vast_scene() {
         dc: paper.lambda.offset_dc,
         rest: paper.lambda.offset_rest,
     };
-    for preset in [Preset::Draft, Preset::Standard, Preset::Paper] {
+    for preset in Preset::ALL {
         assert!(preset.settings().adam.epsilon <= 1e-12);
     }
     let options = paper.adam;

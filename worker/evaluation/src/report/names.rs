@@ -2,7 +2,7 @@
 //!
 //! Records may carry any others; these are the ones that a report expects, and says are "not measured" without.
 
-/// The variant with all settings as they are by default: DC and rest are learned, with all three losses.
+/// The variant with all settings as they are by default: DC and rest are learned, with a PSNR that is held.
 pub const STANDARD: &str = "standard";
 /// All attributes of the Gaussians are learned.
 pub const ALL_ATTRIBUTES: &str = "all attributes";
@@ -18,15 +18,13 @@ pub const ROBUST_TO_ALL: &str = "robust to all";
 pub const RING: &str = "ring";
 /// Only the message counts.
 pub const MESSAGE_ONLY: &str = "message only";
-/// Message and likeness count, the offsets' size does not.
-pub const NO_OFFSET: &str = "no offset penalty";
+/// Message and likeness count with weights that stay as they are, instead of being changed so that a PSNR is held.
+pub const FIXED_WEIGHTS: &str = "fixed weights";
 
-/// Variants that change the weight of likeness are called this, and the weight.
+/// Variants that change the weight of likeness are called this, and what it is multiplied by; weights are fixed then.
 pub const LAMBDA_RECON: &str = "lambda-recon:";
-/// Variants that change the weight of the message are called this, and the weight.
+/// The same of the message's weight.
 pub const LAMBDA_MSG: &str = "lambda-msg:";
-/// Variants that change the weight of the offsets' size are called this, and the weight.
-pub const LAMBDA_OFFSET: &str = "lambda-offset:";
 
 /// Variants that are timed are called this, the kind of device, a colon, and their own name, such as
 /// "trade:cpu:draft": one folder can hold those of several devices, and marks that other experiments made at other times

@@ -1,6 +1,6 @@
 //! Figures of the paper, to compare with: GuardSplat (CVPR 2025), Blender and LLFF scenes, 200 test views.
 use super::names::{
-    ALL_ATTRIBUTES, DC, MESSAGE_ONLY, NO_OFFSET, NONE, PAPER_ATTACKS, PRUNE_LOWEST, PRUNE_RANDOM, REST, STANDARD,
+    ALL_ATTRIBUTES, DC, FIXED_WEIGHTS, MESSAGE_ONLY, NONE, PAPER_ATTACKS, PRUNE_LOWEST, PRUNE_RANDOM, REST, STANDARD,
 };
 use serde::{Deserialize, Serialize};
 
@@ -123,7 +123,7 @@ fn trained(variant: &str) -> Option<Figure> {
 fn losses(variant: &str) -> Option<Figure> {
     match variant {
         MESSAGE_ONLY => two(100.0, 31.79),
-        NO_OFFSET => two(99.26, 36.88),
+        FIXED_WEIGHTS => two(99.26, 36.88),
         STANDARD => two(99.04, 39.40),
         _ => None,
     }
