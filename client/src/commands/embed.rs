@@ -27,7 +27,7 @@ pub enum Preset {
     Draft,
     /// What is recommended
     Standard,
-    /// Twice the work, and likeness given up sooner where bits stay wrong
+    /// Twice the work, for more bits that are right
     Thorough,
     /// Steps, views and sizes of the paper
     Paper,
