@@ -203,7 +203,7 @@ mod tests {
     fn presets_and_changes_differ_from_each_other() {
         let base = Preset::Standard.settings();
         let all = variants(&base, None, &[]).unwrap();
-        assert_eq!(names(&all)[..4], ["draft", "standard", "paper", "steps-50"]);
+        assert_eq!(names(&all)[..5], ["draft", "standard", "thorough", "paper", "steps-50"]);
         for (place, one) in all.iter().enumerate() {
             one.settings.check().unwrap();
             assert!(
@@ -212,7 +212,7 @@ mod tests {
                 one.name
             );
         }
-        assert_eq!(all.len(), 3 + CHANGES.len());
+        assert_eq!(all.len(), Preset::ALL.len() + CHANGES.len());
         let distorted = all.iter().find(|one| one.name == "distorted").unwrap();
         assert_eq!(distorted.settings.robust_to, RobustTo::all());
     }
