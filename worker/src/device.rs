@@ -92,6 +92,7 @@ fn open_wgpu() -> Result<Compute> {
         let info = setup.adapter.get_info();
         let name = format!("wgpu: {} ({})", info.name, info.driver_info);
         let limits = setup.device.limits();
+        // Set here and nowhere else, and this runs once.
         let _ = OPENED_DEVICE.set(setup.device);
         Ok(Compute {
             device,

@@ -25,7 +25,7 @@ pub(super) struct Section {
 const RUNS: &str = "Means over runs, a run being one mark of one scene with one seed; in brackets 95 % intervals by \
     Student's t, and Wilson's for whole messages. Views of one mark are not counted as independent.";
 const HELD: &str = "The paper's third row has a loss of the offsets' size besides. Here there is none: the weight of likeness \
-                    is changed all along so that a PSNR is held.";
+    is changed all along so that a PSNR is held.";
 const PRUNED: &str = "The paper's PSNR is that of pruned marked views against unmarked ones; the column here compares \
     attacked with unattacked marked views.";
 
