@@ -14,7 +14,7 @@ use crate::zombies::says_everything;
 
 const WORKERS: usize = 4;
 
-async fn cancel(caller: &Caller, name: &str) -> Result<Job, tonic::Status> {
+pub async fn cancel(caller: &Caller, name: &str) -> Result<Job, tonic::Status> {
     let request = CancelJobRequest { name: name.into() };
     Ok(caller.jobs.clone().cancel_job(request).await?.into_inner())
 }

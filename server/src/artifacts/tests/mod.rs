@@ -7,6 +7,7 @@ mod faults;
 mod folder;
 mod paths;
 mod s3;
+mod service;
 
 use std::fs;
 use std::path::{Path, PathBuf};
