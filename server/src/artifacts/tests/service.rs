@@ -1,12 +1,12 @@
-//! The store on whatever service the environment names: an emulator, or an account of one's own. Not run
-//! unless asked for; `server/tests/stores/azure.sh` has the one of Azure and asks.
+//! The store on whatever service the environment names: an emulator, or an account of one's own. Not run unless asked for;
+//! `server/tests/stores/azure.sh` has the one of Azure and asks.
 use super::*;
 
 const LIFETIME: Duration = Duration::from_secs(60);
 
 fn opened() -> ArtifactStore {
     let url = std::env::var("GUARDSPLAT_TEST_ARTIFACTS").expect("GUARDSPLAT_TEST_ARTIFACTS names a place of its own");
-    // Each run has a prefix of its own, so that one that was ended is in nobody's way.
+    // Each run has a prefix of its own, so that one that was ended is in nobody's way. Its object `ledger` stays there.
     let place = Place::parse(&format!("{url}/{}", Uuid::now_v7())).unwrap();
     ArtifactStore::open_at(&place, std::env::vars(), LIFETIME, LIMIT).unwrap()
 }
