@@ -120,6 +120,12 @@ async fn get(store: &ArtifactStore, path: &ArtifactPath, offset: u64) -> StoreRe
         .await
 }
 
+/// Sent as any other program would: without a word of ours.
+async fn fetch(url: &str) -> (u16, Vec<u8>) {
+    let answer = reqwest::get(url).await.unwrap();
+    (answer.status().as_u16(), answer.bytes().await.unwrap().to_vec())
+}
+
 /// All files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();

@@ -61,12 +61,6 @@ async fn credentials_are_not_shown() {
     assert_eq!(shown, format!("ArtifactStore({place}) {place}"));
 }
 
-/// Sent as any other program would: without a word of ours.
-async fn fetch(url: &str) -> (u16, Vec<u8>) {
-    let answer = reqwest::get(url).await.unwrap();
-    (answer.status().as_u16(), answer.bytes().await.unwrap().to_vec())
-}
-
 #[tokio::test]
 async fn a_signed_address_gives_one_artifact_for_a_time() {
     let bench = Bench::s3().await;
