@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes worker/fixtures/clip: what the reference implementations compute, for worker/tests/clip_parity.rs.
+"""Makes crates/engine/fixtures/clip: what the reference implementations compute, for crates/engine/tests/clip_parity.rs.
 
     pip install torch transformers open_clip_torch safetensors numpy
     python3 tools/parity/make_fixtures.py

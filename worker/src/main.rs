@@ -1,5 +1,7 @@
 //! `guardsplat-worker`: marks Gaussian Splatting scenes and reads marks back, on one machine or for a server.
 mod cli;
+mod error;
+mod evaluate;
 mod jobs;
 mod work;
 

@@ -131,7 +131,7 @@ fn the_server_takes_the_settings_it_is_given_everywhere() {
 fn the_worker_takes_what_it_is_given_everywhere() {
     let sources = [
         "worker/src/cli/run.rs",
-        "worker/src/models/mod.rs",
+        "crates/engine/src/models/mod.rs",
         "proto/src/connect.rs",
     ]
     .map(read);

@@ -4,10 +4,10 @@
 //! for what is missing. So a file of a few hundred bytes gets as far as one of megabytes.
 use crate::memory::bounded;
 use burn::tensor::Device;
-use guardsplat_worker::clip::{ClipConfig, ClipModel, Parts, TensorFile, TensorSource as _};
-use guardsplat_worker::message::Key;
-use guardsplat_worker::models::Entry;
-use guardsplat_worker::quality::Lpips;
+use guardsplat_engine::clip::{ClipConfig, ClipModel, Parts, TensorFile, TensorSource as _};
+use guardsplat_engine::message::Key;
+use guardsplat_engine::models::Entry;
+use guardsplat_engine::quality::Lpips;
 use safetensors::tensor::Metadata;
 use std::borrow::Cow;
 use std::sync::LazyLock;

@@ -3,8 +3,8 @@ use crate::memory::bounded;
 use burn::tensor::Device;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use guardsplat_worker::models::lpips::{checkpoint, convert};
-use guardsplat_worker::quality::Lpips;
+use guardsplat_engine::models::lpips::{checkpoint, convert};
+use guardsplat_engine::quality::Lpips;
 use std::io::Write as _;
 
 /// Most bytes of numbers that are made up: the checkpoint has 9.9 MB.

@@ -1,6 +1,6 @@
 //! Pictures of suspects: PNG, JPEG, WebP and OpenEXR.
 use crate::memory::bounded;
-use guardsplat_worker::quality::decode_picture;
+use guardsplat_engine::quality::decode_picture;
 use image::ImageReader;
 use std::io::Cursor;
 

@@ -1,8 +1,8 @@
 //! Texts of users of the engine: cameras, settings, messages.
 use crate::memory::bounded;
-use guardsplat_worker::embed::Preset;
-use guardsplat_worker::message::{MAX_BITS, Message};
-use guardsplat_worker::view::parse_cameras;
+use guardsplat_engine::embed::Preset;
+use guardsplat_engine::message::{MAX_BITS, Message};
+use guardsplat_engine::view::parse_cameras;
 
 /// `cameras.json` and `transforms.json`.
 pub fn cameras(data: &[u8]) {

@@ -1,11 +1,10 @@
 //! Scenes of every format are drawn, marked and written so that programs of other authors read what we read.
 mod compare;
-#[path = "../../../worker/tests/support/tiny.rs"]
-mod tiny;
 
 use std::path::Path;
 use std::sync::LazyLock;
 
+use guardsplat_engine::testing::tiny;
 use guardsplat_scene::{Format, Scene};
 use guardsplat_tests::{Bench, Reader, real_scene};
 

@@ -9,9 +9,8 @@ mod memory;
 mod queue;
 mod restarts;
 mod strangers;
-#[path = "../../../worker/tests/support/tiny.rs"]
-mod tiny;
 
+use guardsplat_engine::testing::tiny;
 use guardsplat_tests::Bench;
 use serde_json::Value;
 

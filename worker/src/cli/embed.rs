@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use clap::Args;
 use guardsplat_distortion::RobustTo;
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
-use guardsplat_worker::memory::Memory;
-use guardsplat_worker::message::Key;
-use guardsplat_worker::quality::{Quality, write_picture};
-use guardsplat_worker::scene::{BadRows, Ignored};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
+use guardsplat_engine::memory::Memory;
+use guardsplat_engine::message::Key;
+use guardsplat_engine::quality::{Quality, write_picture};
+use guardsplat_engine::scene::{BadRows, Ignored};
+use guardsplat_engine::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
@@ -224,7 +224,7 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
         covering_views: outcome.covering_views,
         predicted_memory_bytes: outcome.memory.total(),
         predicted_memory: outcome.memory,
-        peak_memory_bytes: guardsplat_worker::memory::peak(),
+        peak_memory_bytes: guardsplat_engine::memory::peak(),
         written: outcome.written,
         target_missed: &outcome.missed,
     };

@@ -2,23 +2,23 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
+use guardsplat_engine::device::{Compute, DeviceChoice, open};
+use guardsplat_engine::embed::{self, HIDDEN, HiddenKeyOptions, Preset, Settings, create_hidden_key};
+use guardsplat_engine::extract::Engine;
+use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
+use guardsplat_engine::stop::Stop;
 use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
 use guardsplat_evaluation::report::names::VAE;
 use guardsplat_evaluation::report::output;
 use guardsplat_evaluation::report::selection::Selection;
 use guardsplat_evaluation::report::store::Store;
-use guardsplat_worker::device::{Compute, DeviceChoice, open};
-use guardsplat_worker::embed::{self, HIDDEN, HiddenKeyOptions, Preset, Settings, create_hidden_key};
-use guardsplat_worker::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
-use guardsplat_worker::extract::Engine;
-use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
-use guardsplat_worker::stop::Stop;
-use guardsplat_worker::{Error, Result};
 
 use super::display::Display;
 use super::{Budget, Exit, Extractor, print_line};
+use crate::error::{Error, Result};
 use crate::work::{keys, load};
 
 #[derive(Args)]
@@ -86,10 +86,10 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.plot.is_some() && plotted(arguments).is_none() {
-        return Err(Error::BadOption {
-            field: "plot",
-            reason: "it is of trade or of claims: name one of them in --experiments, and not both".into(),
-        });
+        return Err(Error::bad_option(
+            "plot",
+            "it is of trade or of claims: name one of them in --experiments, and not both",
+        ));
     }
     // What is refused leaves no folder behind.
     let mut tools = None;
@@ -99,10 +99,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         let vae = vae(arguments, &compute)?;
         tools = Some((compute, vae));
     } else if !arguments.folder.is_dir() {
-        return Err(Error::BadOption {
-            field: "DIR",
-            reason: format!("{} is no folder of results", arguments.folder.display()),
-        });
+        return Err(Error::bad_option(
+            "DIR",
+            format!("{} is no folder of results", arguments.folder.display()),
+        ));
     }
     let mut store = Store::open(&arguments.folder).map_err(Error::Evaluation)?;
     if let Some((compute, vae)) = tools {
@@ -126,16 +126,16 @@ fn plotted(arguments: &Arguments) -> Option<Kind> {
 fn check(arguments: &Arguments) -> Result<()> {
     timed(arguments)?;
     if let (Extractor::Hidden, Some(name)) = (arguments.extractor, &arguments.clip) {
-        return Err(Error::BadOption {
-            field: "clip",
-            reason: format!("--extractor hidden reads without a CLIP, so {name:?} has no use"),
-        });
+        return Err(Error::bad_option(
+            "clip",
+            format!("--extractor hidden reads without a CLIP, so {name:?} has no use"),
+        ));
     }
     if arguments.scenes.is_empty() {
-        return Err(Error::BadOption {
-            field: "scenes",
-            reason: "name at least one, or ask for --report-only".into(),
-        });
+        return Err(Error::bad_option(
+            "scenes",
+            "name at least one, or ask for --report-only",
+        ));
     }
     for scene in &arguments.scenes {
         std::fs::File::open(scene).map_err(Error::io(scene))?;
@@ -153,11 +153,8 @@ fn vae(arguments: &Arguments, compute: &Compute) -> Result<Option<Vae>> {
     };
     match Vae::load(path, &compute.device) {
         Ok(vae) => Ok(Some(vae)),
-        Err(guardsplat_distortion::Error::Io { path, source }) => Err(Error::Io { path, source }),
-        Err(other) => Err(Error::BadOption {
-            field: "vae",
-            reason: other.to_string(),
-        }),
+        Err(guardsplat_distortion::Error::Io { path, source }) => Err(Error::io(path)(source)),
+        Err(other) => Err(Error::bad_option("vae", other.to_string())),
     }
 }
 
@@ -199,7 +196,7 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
     let settings = arguments.preset.settings();
     match &arguments.settings {
         None => Ok(settings),
-        Some(path) => settings.overridden(&std::fs::read_to_string(path).map_err(Error::io(path))?),
+        Some(path) => Ok(settings.overridden(&std::fs::read_to_string(path).map_err(Error::io(path))?)?),
     }
 }
 
@@ -242,7 +239,7 @@ fn engine(
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
     let known = match arguments.extractor {
         Extractor::Clip => {
-            let (_, identity) = load::clip(clip, &compute, guardsplat_worker::clip::Parts::Image)?;
+            let (_, identity) = load::clip(clip, &compute, guardsplat_engine::clip::Parts::Image)?;
             // A key of another CLIP of that name is one of an earlier version.
             known.filter(|key| key.clip.hash == identity.hash)
         }

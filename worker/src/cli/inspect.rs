@@ -2,15 +2,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use guardsplat_worker::Result;
-use guardsplat_worker::admission::{self, picture_bytes};
-use guardsplat_worker::clip::{Clip, Parts};
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs, needs_to_render};
-use guardsplat_worker::memory::{Bytes, Limits, Memory};
-use guardsplat_worker::scene::{BadRows, Gaussians, Ignored, Scene};
-use guardsplat_worker::splat::{WeightCache, prepare};
-use guardsplat_worker::view::{Extent, Split, ViewSampler};
+use guardsplat_engine::Result;
+use guardsplat_engine::admission::{self, picture_bytes};
+use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs, needs_to_render};
+use guardsplat_engine::memory::{Bytes, Limits, Memory};
+use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
+use guardsplat_engine::splat::{WeightCache, prepare};
+use guardsplat_engine::view::{Extent, Split, ViewSampler};
 use serde::Serialize;
 
 use super::{Budget, Exit, print_json, print_line};

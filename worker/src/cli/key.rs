@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use guardsplat_distortion::RobustTo;
-use guardsplat_worker::device::{Compute, DeviceChoice, open};
-use guardsplat_worker::embed::{HiddenKeyOptions, NewKey, create_hidden_key};
-use guardsplat_worker::message::training::Progress;
-use guardsplat_worker::message::{DecoderKind, Key, KeyOptions, TrainingOptions};
-use guardsplat_worker::stop::Stop;
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::device::{Compute, DeviceChoice, open};
+use guardsplat_engine::embed::{HiddenKeyOptions, NewKey, create_hidden_key};
+use guardsplat_engine::message::training::Progress;
+use guardsplat_engine::message::{DecoderKind, Key, KeyOptions, TrainingOptions};
+use guardsplat_engine::stop::Stop;
+use guardsplat_engine::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;

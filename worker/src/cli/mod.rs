@@ -10,12 +10,11 @@ mod run;
 mod sample;
 mod verify;
 
-use std::error::Error as _;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::{Error, Result};
 use tracing_subscriber::EnvFilter;
 
 /// What a command that could be carried out found; errors exit with 1.
@@ -144,28 +143,28 @@ pub fn run() -> ExitCode {
 /// What is logged: what `RUST_LOG` says, else errors; and of a worker for a server also what it does.
 fn filter(command: &Command) -> EnvFilter {
     let default = match command {
-        Command::Run(_) => "warn,guardsplat_worker=info",
+        Command::Run(_) => "warn,guardsplat_worker=info,guardsplat_engine=info",
         _ => "error",
     };
     EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default))
 }
 
-fn carry_out(command: Command) -> Result<Exit> {
-    match command {
-        Command::Key(command) => key::run(command),
-        Command::Embed(arguments) => embed::run(&arguments),
-        Command::Verify(arguments) => verify::run(&arguments),
-        Command::Render(arguments) => render::run(&arguments),
-        Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Evaluate(arguments) => evaluate::run(&arguments),
-        Command::Sample(arguments) => sample::run(&arguments),
-        Command::Models(command) => models::run(command),
-        Command::Run(arguments) => Ok(run::run(arguments)),
-    }
+fn carry_out(command: Command) -> crate::error::Result<Exit> {
+    Ok(match command {
+        Command::Key(command) => key::run(command)?,
+        Command::Embed(arguments) => embed::run(&arguments)?,
+        Command::Verify(arguments) => verify::run(&arguments)?,
+        Command::Render(arguments) => render::run(&arguments)?,
+        Command::Inspect(arguments) => inspect::run(&arguments)?,
+        Command::Evaluate(arguments) => evaluate::run(&arguments)?,
+        Command::Sample(arguments) => sample::run(&arguments)?,
+        Command::Models(command) => models::run(command)?,
+        Command::Run(arguments) => run::run(arguments),
+    })
 }
 
 /// An error and its causes, leaving out those whose text is part of the one before.
-fn in_full(error: &Error) -> String {
+fn in_full(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {

@@ -3,13 +3,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, Subcommand};
-use guardsplat_worker::clip::{Precision, TensorFile};
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::train::{Retrieval, TrainOptions, TrainProgress, train_clip};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::clip::{Precision, TensorFile};
+use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::train::{Retrieval, TrainOptions, TrainProgress, train_clip};
+use guardsplat_engine::{Error, Result};
 use serde::Serialize;
 
-use guardsplat_worker::models::{Entry, LPIPS, Models};
+use guardsplat_engine::models::{Entry, LPIPS, Models};
 
 use super::display::Display;
 use super::{Exit, print_json, print_line};

@@ -2,16 +2,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use guardsplat_worker::admission::{self, picture_bytes};
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::embed::{SceneSize, needs_to_render};
-use guardsplat_worker::extract::rasterizer;
-use guardsplat_worker::memory::{Limits, Memory};
-use guardsplat_worker::quality::write_picture;
-use guardsplat_worker::scene::{BadRows, Scene};
-use guardsplat_worker::splat::{WeightCache, prepare, sh};
-use guardsplat_worker::view::{Camera, Split, ViewSampler, read_cameras, write_cameras};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::admission::{self, picture_bytes};
+use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::embed::{SceneSize, needs_to_render};
+use guardsplat_engine::extract::rasterizer;
+use guardsplat_engine::memory::{Limits, Memory};
+use guardsplat_engine::quality::write_picture;
+use guardsplat_engine::scene::{BadRows, Scene};
+use guardsplat_engine::splat::{WeightCache, prepare, sh};
+use guardsplat_engine::view::{Camera, Split, ViewSampler, read_cameras, write_cameras};
+use guardsplat_engine::{Error, Result};
 
 use super::display::Display;
 use super::{Background, Budget, Exit, print_line};

@@ -3,8 +3,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::{TOKEN_VARIABLE, Target, Token};
-use guardsplat_worker::device::DeviceChoice;
 
 use super::{Budget, Exit};
 use crate::jobs;

@@ -2,8 +2,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use guardsplat_worker::Result;
-use guardsplat_worker::sample::sample;
+use guardsplat_engine::Result;
+use guardsplat_engine::sample::sample;
 
 use super::{Exit, print_line};
 

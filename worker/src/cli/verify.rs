@@ -3,11 +3,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use guardsplat_worker::Result;
-use guardsplat_worker::device::{DeviceChoice, open};
-use guardsplat_worker::extract::{Comparison, DEFAULT_VIEWS, find_source};
-use guardsplat_worker::message::{Key, Verdict};
-use guardsplat_worker::scene::{BadRows, Ignored};
+use guardsplat_engine::Result;
+use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::extract::{Comparison, DEFAULT_VIEWS, find_source};
+use guardsplat_engine::message::{Key, Verdict};
+use guardsplat_engine::scene::{BadRows, Ignored};
 use serde::Serialize;
 
 use super::display::Display;

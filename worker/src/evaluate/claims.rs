@@ -14,9 +14,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::read::Views;
 use crate::error::{Error, Result};
-use crate::extract::{Engine, Framed, framings};
-use crate::message::Message;
-use crate::picture::Picture;
+use guardsplat_engine::extract::{Engine, Framed, framings};
+use guardsplat_engine::message::Message;
+use guardsplat_engine::picture::Picture;
 
 /// Views of a claim about pictures.
 const POOLS: [usize; 3] = [1, 3, 10];
@@ -85,7 +85,7 @@ impl Claiming<'_> {
             SCENE | NONE => marked.pictures()?,
             UNMARKED => clean()?.pictures()?,
             change => {
-                let attack: Attack = change.parse().map_err(super::judged)?;
+                let attack: Attack = change.parse().map_err(Error::Evaluation)?;
                 marked.attacked(&attack, self.seed)?.pictures()?
             }
         };
@@ -189,7 +189,7 @@ impl Suspect {
         };
         if framed.is_empty() {
             let given = views.iter().map(|view| view.as_given().to_vec()).collect();
-            return Ok(vec![framing(crate::extract::Reading::new(given)?.summed)]);
+            return Ok(vec![framing(guardsplat_engine::extract::Reading::new(given)?.summed)]);
         }
         let read = framings(engine, &framed)?;
         Ok(read.into_iter().map(|(_, reading)| framing(reading.summed)).collect())
@@ -256,10 +256,7 @@ fn wrong_target(rng: &mut ChaCha8Rng) -> Result<Target> {
 }
 
 fn refused(error: guardsplat_codeword::Error) -> Error {
-    Error::BadOption {
-        field: "claims",
-        reason: error.to_string(),
-    }
+    Error::bad_option("claims", error.to_string())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! A claim takes the guess at what was done under which most bits match, and counts every guess in its p-value. The share
 //! of right bits under that guess would be too good: it was searched for. So each bit is read under the guess that all
 //! *other* bits prefer; no bit has a say in how it is read.
-use crate::message::Message;
+use guardsplat_engine::message::Message;
 
 /// How much better than the picture as it is a guess must match: 1 is all bits against half of them.
 const BETTER: f64 = 0.25;

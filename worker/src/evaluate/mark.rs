@@ -5,12 +5,12 @@ use guardsplat_evaluation::report::record::{Embedding, Mark};
 
 use super::machine::Machine;
 use super::read::Views;
-use crate::embed::{Progress, Settings, optimise};
 use crate::error::{Error, Result};
-use crate::extract::Engine;
-use crate::message::Message;
-use crate::quality::{Quality, contact_sheet, measure, write_picture};
-use crate::scene::{Gaussians, Scene};
+use guardsplat_engine::embed::{Progress, Settings, optimise};
+use guardsplat_engine::extract::Engine;
+use guardsplat_engine::message::Message;
+use guardsplat_engine::quality::{Quality, contact_sheet, measure, write_picture};
+use guardsplat_engine::scene::{Gaussians, Scene};
 
 /// Held-out accuracy from which on a mark counts as made.
 const MADE: f64 = 0.99;
@@ -92,7 +92,7 @@ impl Making<'_> {
                 view_steps: optimised.view_steps as u64,
                 view_steps_to_99: made_after.map(|step| (step * self.settings.views_per_step) as u64),
                 decoder_accuracy: key.1,
-                peak_memory_bytes: crate::memory::peak(),
+                peak_memory_bytes: guardsplat_engine::memory::peak(),
                 unmarked_accuracy: Some(before.bit_accuracy),
                 difference_picture: Some(picture),
                 timing: Some(timing),
@@ -112,7 +112,8 @@ impl Making<'_> {
             early_stop: None,
             ..*self.settings
         };
-        optimise(self.engine, self.scene, self.message, &settings, &mut |_| {}).map(|_| ())
+        optimise(self.engine, self.scene, self.message, &settings, &mut |_| {})?;
+        Ok(())
     }
 }
 

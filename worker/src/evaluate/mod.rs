@@ -13,12 +13,6 @@ mod security;
 mod trade;
 mod trial;
 
-pub use plan::{Plan, Trade, Wanted, plan};
+pub use plan::{Trade, plan};
 pub use run::{Options, Progress, run};
 pub use trade::{Variant, variants};
-pub use trial::{SceneChange, Trial};
-
-/// An error of the crate that judges marks.
-fn judged(error: guardsplat_evaluation::Error) -> crate::Error {
-    crate::Error::Evaluation(error)
-}

@@ -6,8 +6,8 @@ use guardsplat_evaluation::report::names;
 
 use super::trade::Variant;
 use super::trial::Trial;
-use crate::embed::{Learn, Ring, Settings};
 use crate::error::{Error, Result};
+use guardsplat_engine::embed::{Learn, Ring, Settings};
 
 /// Bits of most experiments.
 const BITS: usize = 32;
@@ -65,10 +65,10 @@ impl Plan {
         if let Some(unknown) = names.iter().find(|name| !known(name)) {
             let mut all: Vec<&str> = self.wanted.iter().map(|wanted| wanted.variant.as_str()).collect();
             all.dedup();
-            return Err(Error::BadOption {
-                field: "only",
-                reason: format!("{unknown:?} is none of {}", all.join(", ")),
-            });
+            return Err(Error::bad_option(
+                "only",
+                format!("{unknown:?} is none of {}", all.join(", ")),
+            ));
         }
         self.wanted
             .retain(|wanted| names.is_empty() || names.contains(&wanted.variant));
@@ -127,7 +127,7 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
             Kind::Longer => add(LONGER_BITS, names::STANDARD, *standard, &none)?,
             Kind::Robustness => {
                 let attacks: Vec<String> = Attack::suite("all")
-                    .map_err(super::judged)?
+                    .map_err(Error::Evaluation)?
                     .iter()
                     .map(ToString::to_string)
                     .collect();
@@ -239,8 +239,8 @@ fn parsed(texts: &[&str]) -> Result<Vec<Trial>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embed::Preset;
     use crate::evaluate::variants;
+    use guardsplat_engine::embed::Preset;
 
     #[test]
     fn a_mark_that_several_experiments_need_is_made_once() {

@@ -9,12 +9,12 @@ use image::RgbImage;
 
 use super::guessed::cross_chosen;
 use crate::error::{Error, Result};
-use crate::extract::{Engine, Reading, read_guesses};
-use crate::message::Message;
-use crate::picture::Picture;
-use crate::quality::{batch, mean_psnr, psnr, unbatch};
-use crate::scene::Gaussians;
-use crate::view::{Camera, Split, ViewSampler};
+use guardsplat_engine::extract::{Engine, Reading, read_guesses};
+use guardsplat_engine::message::Message;
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
+use guardsplat_engine::scene::Gaussians;
+use guardsplat_engine::view::{Camera, Split, ViewSampler};
 
 /// Numbers of views from which the whole message is read.
 const MESSAGE_VIEWS: [u32; 3] = [1, 5, 10];
@@ -84,14 +84,14 @@ impl Views {
                 false => logits.extend(engine.read_logits(&[picture])?),
             }
         }
-        Reading::new(logits)
+        Ok(Reading::new(logits)?)
     }
 
     /// The same views after an attack on each.
     pub fn attacked(&self, attack: &Attack, seed: u64) -> Result<Self> {
         let images = self.images.iter().enumerate();
         let images = images
-            .map(|(index, image)| attack.apply(image, seed, index as u64).map_err(super::judged))
+            .map(|(index, image)| attack.apply(image, seed, index as u64).map_err(Error::Evaluation))
             .collect::<Result<_>>()?;
         Ok(Self {
             cameras: self.cameras.clone(),
@@ -155,21 +155,23 @@ impl Views {
         }
         let each = pairs()
             .map(|(a, b)| psnr(&to_picture(a), &to_picture(b)))
-            .collect::<Result<Vec<_>>>()?;
+            .collect::<guardsplat_engine::Result<Vec<_>>>()?;
         Ok(mean_psnr(&each)?.psnr_db)
     }
 }
 
 fn to_image(picture: &Picture) -> Result<RgbImage> {
     let bytes = picture.pixels.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8);
-    RgbImage::from_raw(picture.width, picture.height, bytes.collect()).ok_or_else(|| Error::BadOption {
-        field: "picture",
-        reason: format!(
-            "{} numbers are not {} x {} pixels",
-            picture.pixels.len(),
-            picture.width,
-            picture.height
-        ),
+    RgbImage::from_raw(picture.width, picture.height, bytes.collect()).ok_or_else(|| {
+        Error::bad_option(
+            "picture",
+            format!(
+                "{} numbers are not {} x {} pixels",
+                picture.pixels.len(),
+                picture.width,
+                picture.height
+            ),
+        )
     })
 }
 

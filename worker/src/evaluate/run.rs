@@ -17,11 +17,11 @@ use super::plan::{Plan, Wanted};
 use super::read::{Views, cameras};
 use super::security::{Judged, Marked};
 use super::trial::Trial;
-use crate::embed;
 use crate::error::{Error, Result};
-use crate::extract::Engine;
-use crate::message::{Key, Message};
-use crate::scene::Scene;
+use guardsplat_engine::embed;
+use guardsplat_engine::extract::Engine;
+use guardsplat_engine::message::{Key, Message};
+use guardsplat_engine::scene::Scene;
 
 /// Over what a plan is carried out.
 #[derive(Clone, Debug)]
@@ -103,7 +103,7 @@ pub fn run(
                 };
                 let id = match one.carry_out(scene, &name, store, &mut progress) {
                     Ok(id) => id,
-                    Err(Error::NotFinite { .. }) if wanted.timed => {
+                    Err(Error::Engine(guardsplat_engine::Error::NotFinite { .. })) if wanted.timed => {
                         progress(Progress::Failed(format!(
                             "{name}, {}: no longer numbers",
                             wanted.variant
@@ -144,7 +144,7 @@ fn name(path: &Path) -> String {
 /// The message of a seed: none that a decoder was trained on, but for lengths of few messages.
 fn message(bits: usize, seed: u64) -> Result<Message> {
     let mut rng = ChaCha20Rng::seed_from_u64(seed ^ 0x6d65_7373_6167_6500);
-    Message::random(bits, &mut rng)
+    Ok(Message::random(bits, &mut rng)?)
 }
 
 /// One mark and its readings.
@@ -160,10 +160,8 @@ struct One<'a> {
 
 impl One<'_> {
     fn embedding(&self, name: &str, message: &Message) -> Result<Embedding> {
-        let settings = serde_json::to_vec(&self.wanted.settings).map_err(|e| Error::BadOption {
-            field: "settings",
-            reason: e.to_string(),
-        })?;
+        let settings =
+            serde_json::to_vec(&self.wanted.settings).map_err(|e| Error::bad_option("settings", e.to_string()))?;
         Ok(Embedding {
             scene: name.into(),
             bits: self.wanted.bits as u32,
@@ -237,7 +235,7 @@ impl One<'_> {
             tracing::debug!(seconds = mark.seconds, "marked");
             // A file that was lost is made again; its mark is known.
             if !store.has(&id) {
-                store.append(Record::Mark(mark)).map_err(super::judged)?;
+                store.append(Record::Mark(mark)).map_err(Error::Evaluation)?;
             }
             marked
         };
@@ -258,7 +256,7 @@ impl One<'_> {
             let attack = trial.to_string();
             let record = read.record(self.engine, &message, &id, &attack, &plain)?;
             let accuracy = record.accuracy();
-            store.append(Record::Reading(record)).map_err(super::judged)?;
+            store.append(Record::Reading(record)).map_err(Error::Evaluation)?;
             progress(Progress::Read(attack, accuracy));
         }
         for case in cases(store) {
@@ -267,7 +265,7 @@ impl One<'_> {
             for record in records {
                 let (matches, of) = (record.matches(), record.p_values.len());
                 progress(Progress::Claimed(record.told(), matches, of));
-                store.append(Record::Claims(record)).map_err(super::judged)?;
+                store.append(Record::Claims(record)).map_err(Error::Evaluation)?;
             }
         }
         Ok(id)

@@ -10,9 +10,9 @@ use guardsplat_evaluation::steganalysis::{Impression, Judge, Pairs, judge};
 use super::mark::path;
 use super::read::{Views, cameras};
 use super::run::Options;
-use crate::error::Result;
-use crate::extract::Engine;
-use crate::scene::Scene;
+use crate::error::{Error, Result};
+use guardsplat_engine::extract::Engine;
+use guardsplat_engine::scene::Scene;
 
 /// Share of samples whose last bits are replaced in the positive control.
 const CONTROL_RATE: f64 = 0.5;
@@ -66,7 +66,7 @@ impl Judged<'_> {
         let [of_marks, of_controls] = self.look(&scenes, &engine()?, store.folder())?;
         for wanted in wanted {
             let pairs = if wanted.control { &of_controls } else { &of_marks };
-            let verdict = judge(wanted.judge, pairs).map_err(super::judged)?;
+            let verdict = judge(wanted.judge, pairs).map_err(Error::Evaluation)?;
             progress(wanted.name.clone(), verdict.area);
             let detection = Detection {
                 detector: wanted.name,
@@ -80,7 +80,7 @@ impl Judged<'_> {
                 auc_interval: verdict.interval,
                 clusters: verdict.clusters.map(|clusters| clusters as u32),
             };
-            store.append(Record::Detection(detection)).map_err(super::judged)?;
+            store.append(Record::Detection(detection)).map_err(Error::Evaluation)?;
         }
         Ok(())
     }

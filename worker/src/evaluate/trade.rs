@@ -1,8 +1,8 @@
 //! Variants of the settings that are timed: the presets, one change at a time of what costs time, and a user's own.
 use serde::Deserialize;
 
-use crate::embed::{Preset, Settings};
 use crate::error::{Error, Result};
+use guardsplat_engine::embed::{Preset, Settings};
 
 /// What settings are called that are no preset.
 const BASE: &str = "base";
@@ -180,10 +180,7 @@ fn is_known(settings: &Settings, change: &str) -> Result<bool> {
 }
 
 fn bad(reason: String) -> Error {
-    Error::BadOption {
-        field: "variants",
-        reason,
-    }
+    Error::bad_option("variants", reason)
 }
 
 #[cfg(test)]

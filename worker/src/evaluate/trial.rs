@@ -8,7 +8,7 @@ use guardsplat_scene::alter::{ShNoise, add_sh_noise, prune_faint, prune_random, 
 use guardsplat_scene::convert::convert;
 
 use crate::error::{Error, Result};
-use crate::scene::{Format, Gaussians, Scene};
+use guardsplat_engine::scene::{Format, Gaussians, Scene};
 
 /// What the mask of the attacks on pictures is called.
 const MASK: &str = "mask:";
@@ -49,10 +49,9 @@ impl FromStr for Trial {
 
     fn from_str(text: &str) -> Result<Self> {
         let number = |digits: &str| {
-            digits.parse::<f64>().map_err(|e| Error::BadOption {
-                field: "attack",
-                reason: format!("{text:?}: {e}"),
-            })
+            digits
+                .parse::<f64>()
+                .map_err(|e| Error::bad_option("attack", format!("{text:?}: {e}")))
         };
         let change = if let Some(share) = text.strip_prefix(names::PRUNE_LOWEST_PREFIX) {
             SceneChange::PruneLowest(number(share)?)
@@ -73,7 +72,7 @@ impl FromStr for Trial {
             };
             return Ok(Self::Pictures {
                 name: text.into(),
-                attack: attack.map_err(super::judged)?,
+                attack: attack.map_err(Error::Evaluation)?,
             });
         };
         Ok(Self::Scene(change))
@@ -139,19 +138,16 @@ fn format_name(format: Format) -> &'static str {
 
 fn format_of(name: &str) -> Result<Format> {
     let found = FORMATS.iter().find(|(known, _)| *known == name);
-    found.map(|(_, format)| *format).ok_or_else(|| Error::BadOption {
-        field: "attack",
-        reason: format!(
-            "{name:?} is no format of scenes; known are {}",
-            FORMATS.map(|(name, _)| name).join(", ")
-        ),
+    found.map(|(_, format)| *format).ok_or_else(|| {
+        let known = FORMATS.map(|(name, _)| name).join(", ");
+        Error::bad_option("attack", format!("{name:?} is no format of scenes; known are {known}"))
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample::sample;
+    use guardsplat_engine::sample::sample;
 
     #[test]
     fn names_are_those_of_the_reports() {

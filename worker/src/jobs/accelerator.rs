@@ -3,7 +3,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 
-use guardsplat_worker::device::DeviceChoice;
+use guardsplat_engine::device::DeviceChoice;
 use tokio::sync::oneshot;
 
 use super::bench::Bench;

@@ -1,11 +1,11 @@
 //! One attempt at a leased job: what all kinds of jobs need on the way from inputs to outputs.
 use std::path::{Path, PathBuf};
 
+use guardsplat_engine::Error as EngineError;
+use guardsplat_engine::stop::Stop;
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{FramedReading, Job, SeenView, complete_job_request};
-use guardsplat_worker::Error as EngineError;
-use guardsplat_worker::stop::Stop;
 
 use super::accelerator::Accelerator;
 use super::bench::Bench;

@@ -1,11 +1,11 @@
 //! What the engine's thread keeps between jobs: the device, and the engine of the key that was used last.
 use std::path::Path;
 
-use guardsplat_worker::Result;
-use guardsplat_worker::device::{Compute, DeviceChoice, open};
-use guardsplat_worker::extract::Engine;
-use guardsplat_worker::message::Key;
-use guardsplat_worker::stop::Stop;
+use guardsplat_engine::Result;
+use guardsplat_engine::device::{Compute, DeviceChoice, open};
+use guardsplat_engine::extract::Engine;
+use guardsplat_engine::message::Key;
+use guardsplat_engine::stop::Stop;
 
 use crate::work::load;
 

@@ -2,17 +2,17 @@
 use std::time::Duration;
 
 use guardsplat_distortion::{Kind, RobustTo};
+use guardsplat_engine::Error as EngineError;
+use guardsplat_engine::embed::{self, NewKey, Outcome, Preset, Settings};
+use guardsplat_engine::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
+use guardsplat_engine::message::training::Progress as Training;
+use guardsplat_engine::message::{Key, Verdict};
+use guardsplat_engine::scene::{BadRows, Ignored};
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{self as api};
-use guardsplat_worker::Error as EngineError;
-use guardsplat_worker::embed::{self, NewKey, Outcome, Preset, Settings};
-use guardsplat_worker::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
-use guardsplat_worker::message::training::Progress as Training;
-use guardsplat_worker::message::{Key, Verdict};
-use guardsplat_worker::scene::{BadRows, Ignored};
 
 use super::error::{Error, Result};
 use crate::work::findings::{Findings, Views};

@@ -1,15 +1,15 @@
 //! `embed` jobs: the same bytes as the command's for the same seed.
 use std::time::{Duration, Instant};
 
+use guardsplat_engine::Error as EngineError;
+use guardsplat_engine::embed::{Job, Outcome, embed};
+use guardsplat_engine::extract::Framing;
+use guardsplat_engine::message::Key;
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::{PictureFormat, encode_picture};
+use guardsplat_engine::scene::BadRows;
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{EmbedResult, EmbedSpec, SeenView};
-use guardsplat_worker::Error as EngineError;
-use guardsplat_worker::embed::{Job, Outcome, embed};
-use guardsplat_worker::extract::Framing;
-use guardsplat_worker::message::Key;
-use guardsplat_worker::picture::Picture;
-use guardsplat_worker::quality::{PictureFormat, encode_picture};
-use guardsplat_worker::scene::BadRows;
 
 use super::attempt::{Attempt, Outcome as Finished};
 use super::convert;
@@ -81,7 +81,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
                 original: small_png(original)?,
             })
         };
-        let views = pairs.map(view).collect::<guardsplat_worker::Result<_>>()?;
+        let views = pairs.map(view).collect::<guardsplat_engine::Result<_>>()?;
         Ok(Marked {
             outcome,
             sheet,

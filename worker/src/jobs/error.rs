@@ -51,7 +51,7 @@ pub enum Error {
     },
     /// The engine failed.
     #[error("{0}")]
-    Engine(#[from] guardsplat_worker::Error),
+    Engine(#[from] guardsplat_engine::Error),
     /// The engine's thread is gone.
     #[error("the engine panicked: {0}")]
     Panicked(String),
@@ -105,7 +105,7 @@ impl Error {
 
     /// Whether the worker can't go on after it: its engine or its device is gone.
     pub fn is_fatal(&self) -> bool {
-        use guardsplat_worker::Error as Engine;
+        use guardsplat_engine::Error as Engine;
         matches!(
             self,
             Self::Panicked(_) | Self::Stuck(_) | Self::Engine(Engine::Device { .. })

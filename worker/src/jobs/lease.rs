@@ -2,10 +2,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use guardsplat_engine::{device, memory};
 use guardsplat_proto::v1::{
     CompleteJobRequest, FailJobRequest, Failure, Job, LeaseJobResponse, Progress, ReleaseJobRequest, ReportJobRequest,
 };
-use guardsplat_worker::{device, memory};
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
 

@@ -22,8 +22,8 @@ mod worker;
 
 use std::path::PathBuf;
 
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::Target;
-use guardsplat_worker::device::DeviceChoice;
 
 use accelerator::Accelerator;
 pub use error::{Error, Result};

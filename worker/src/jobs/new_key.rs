@@ -2,9 +2,9 @@
 use std::time::{Duration, Instant};
 
 use guardsplat_distortion::RobustTo;
+use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{KeyOutput, KeyResult, KeySpec};
-use guardsplat_worker::message::{Key, KeyOptions, TrainingOptions};
 
 use super::attempt::{Attempt, Outcome};
 use super::convert;

@@ -1,10 +1,10 @@
 //! What this worker can do, for the server to give it jobs that it can carry out.
 use std::time::Duration;
 
+use guardsplat_engine::clip::Clip;
+use guardsplat_engine::memory::Limits;
+use guardsplat_engine::models::{LPIPS, Models, WEIGHTS};
 use guardsplat_proto::v1::LeaseJobRequest;
-use guardsplat_worker::clip::Clip;
-use guardsplat_worker::memory::Limits;
-use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
 
 use super::convert;
 

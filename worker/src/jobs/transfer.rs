@@ -2,12 +2,12 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
+use guardsplat_engine::message::MAX_KEY_BYTES;
 use guardsplat_proto::v1::download_artifact_response::Payload as Down;
 use guardsplat_proto::v1::upload_output_request::Payload as Up;
 use guardsplat_proto::v1::{
     Artifact, DownloadArtifactRequest, DownloadKeyRequest, OutputMetadata, UploadMetadata, UploadOutputRequest,
 };
-use guardsplat_worker::message::MAX_KEY_BYTES;
 use sha2::{Digest, Sha256};
 use tokio::fs::File;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};

@@ -1,11 +1,11 @@
 //! `verify` jobs: whose is this scene, or are these pictures?
 use std::time::{Duration, Instant};
 
+use guardsplat_engine::extract::{MAX_PICTURES, find_source};
+use guardsplat_engine::message::Key;
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
-use guardsplat_worker::extract::{MAX_PICTURES, find_source};
-use guardsplat_worker::message::Key;
 
 use super::attempt::{Attempt, Outcome};
 use super::convert;

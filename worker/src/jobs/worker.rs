@@ -1,8 +1,8 @@
 //! The worker's day: waits for a job, carries it out, says what became of it, until it is to leave.
 use std::time::{Duration, Instant};
 
+use guardsplat_engine::stop::Stop;
 use guardsplat_proto::v1::Job;
-use guardsplat_worker::stop::Stop;
 use tonic::Code;
 
 use super::accelerator::Accelerator;

@@ -1,14 +1,14 @@
 //! What a verification finds: reads scenes and pictures, and says whether the message is there.
-use guardsplat_worker::Result;
-use guardsplat_worker::admission::{self, picture_bytes};
-use guardsplat_worker::extract::{
+use guardsplat_engine::Result;
+use guardsplat_engine::admission::{self, picture_bytes};
+use guardsplat_engine::extract::{
     Comparison, Engine, Framed, Framing, Reading, Source, default_size, framings, read_scene,
 };
-use guardsplat_worker::memory::Memory;
-use guardsplat_worker::message::{Message, Verdict};
-use guardsplat_worker::picture::Picture;
-use guardsplat_worker::quality::read_picture;
-use guardsplat_worker::scene::{BadRows, Ignored, Scene};
+use guardsplat_engine::memory::Memory;
+use guardsplat_engine::message::{Message, Verdict};
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::read_picture;
+use guardsplat_engine::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
 
 use super::shown::Shown;

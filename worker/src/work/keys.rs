@@ -1,10 +1,10 @@
 //! Makes a key for the CLIP of a name.
-use guardsplat_worker::Result;
-use guardsplat_worker::clip::Parts;
-use guardsplat_worker::device::Compute;
-use guardsplat_worker::embed::{NewKey, create_key, natural};
-use guardsplat_worker::message::{DecoderKind, FitOptions, Key, KeyOptions};
-use guardsplat_worker::stop::Stop;
+use guardsplat_engine::Result;
+use guardsplat_engine::clip::Parts;
+use guardsplat_engine::device::Compute;
+use guardsplat_engine::embed::{NewKey, create_key, natural};
+use guardsplat_engine::message::{DecoderKind, FitOptions, Key, KeyOptions};
+use guardsplat_engine::stop::Stop;
 
 use super::load;
 

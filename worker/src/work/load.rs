@@ -1,13 +1,13 @@
 //! Loads what embedding and verifying need: what reads pictures, and the engine for a key, which loads the rest when it is used.
 use std::path::{Path, PathBuf};
 
-use guardsplat_worker::clip::{Clip, Parts};
-use guardsplat_worker::device::Compute;
-use guardsplat_worker::extract::{Engine, HiddenExtractor};
-use guardsplat_worker::memory::Limits;
-use guardsplat_worker::message::{ClipIdentity, Decoding, Key};
-use guardsplat_worker::models::{LPIPS, Models, WEIGHTS};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::device::Compute;
+use guardsplat_engine::extract::{Engine, HiddenExtractor};
+use guardsplat_engine::memory::Limits;
+use guardsplat_engine::message::{ClipIdentity, Decoding, Key};
+use guardsplat_engine::models::{LPIPS, Models, WEIGHTS};
+use guardsplat_engine::{Error, Result};
 
 /// What the CLIP in the repository is called.
 pub const SHIPPED: &str = "guardsplat";

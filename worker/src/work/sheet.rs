@@ -1,7 +1,7 @@
 //! The picture that goes with a marked scene.
-use guardsplat_worker::Result;
-use guardsplat_worker::picture::Picture;
-use guardsplat_worker::quality::contact_sheet;
+use guardsplat_engine::Result;
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::contact_sheet;
 
 /// What it is called.
 pub const NAME: &str = "comparison.png";

@@ -1,7 +1,7 @@
 //! Pictures of what was read, small, for people who look at the evidence.
-use guardsplat_worker::picture::Picture;
-use guardsplat_worker::quality::{PictureFormat, encode_picture};
-use guardsplat_worker::{Error, Result};
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::{PictureFormat, encode_picture};
+use guardsplat_engine::{Error, Result};
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Rgb};
 
@@ -61,7 +61,7 @@ pub fn small_png(picture: &Picture) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use guardsplat_worker::quality::decode_picture;
+    use guardsplat_engine::quality::decode_picture;
 
     #[test]
     fn large_pictures_become_small_and_keep_their_shape() {

@@ -1,7 +1,5 @@
 //! The program as a worker of a server: what it makes of jobs, and how it ends.
 mod server;
-#[path = "../support/tiny.rs"]
-mod tiny;
 mod worker;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};

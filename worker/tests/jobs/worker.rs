@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use super::tiny;
+use guardsplat_engine::testing::tiny;
 
 /// A folder with a tiny CLIP, a sample scene and a key in it.
 pub struct Bench(tempfile::TempDir);

@@ -4,7 +4,7 @@ use guardsplat_commitment::{Commitment, Document, FIRST, OPENING_BYTES, Opening,
 use guardsplat_evidence::sign;
 use uuid::Uuid;
 
-#[path = "../../../../worker/evidence/examples/samples/mod.rs"]
+#[path = "../../../../crates/evidence/examples/samples/mod.rs"]
 mod samples;
 
 pub fn put_all() {

@@ -1,10 +1,10 @@
 //! Keys and weights, mostly without their tensors: the targets fill in zeros.
 use super::put;
 use burn::tensor::Device;
+use guardsplat_engine::clip::{ClipConfig, ClipModel, Parts, Precision};
+use guardsplat_engine::message::key::Secret;
+use guardsplat_engine::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
 use guardsplat_fuzz::TINY_CLIP;
-use guardsplat_worker::clip::{ClipConfig, ClipModel, Parts, Precision};
-use guardsplat_worker::message::key::Secret;
-use guardsplat_worker::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
 
 pub fn put_all() {
     keys();

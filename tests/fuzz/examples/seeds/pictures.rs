@@ -1,7 +1,7 @@
 //! Pictures of all four formats.
 use super::{put, put_damaged};
-use guardsplat_worker::picture::Picture;
-use guardsplat_worker::quality::{PictureFormat, encode_picture};
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::{PictureFormat, encode_picture};
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
 

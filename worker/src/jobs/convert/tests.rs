@@ -1,7 +1,7 @@
 //! What the API says is what the engine does.
-use guardsplat_worker::embed::{Progress, Step, Terms};
-use guardsplat_worker::extract::Reading;
-use guardsplat_worker::message::Message;
+use guardsplat_engine::embed::{Progress, Step, Terms};
+use guardsplat_engine::extract::Reading;
+use guardsplat_engine::message::Message;
 
 use super::*;
 

@@ -6,7 +6,7 @@ use guardsplat_proto::v1::{KeySpec, VerifySpec};
 
 use super::*;
 use crate::jobs::signals;
-use guardsplat_worker::device::DeviceChoice;
+use guardsplat_engine::device::DeviceChoice;
 
 #[allow(dead_code)] // the other tests use the rest
 #[path = "../../../tests/jobs/server.rs"]

@@ -1,0 +1,22 @@
+//! The GuardSplat engine: marks a 3D Gaussian Splatting scene and reads the mark back from pictures of it.
+pub mod admission;
+pub mod clip;
+pub mod device;
+pub mod embed;
+pub mod error;
+pub mod extract;
+pub mod memory;
+pub mod message;
+pub mod models;
+pub mod picture;
+pub mod quality;
+pub mod sample;
+pub mod splat;
+pub mod stop;
+#[doc(hidden)]
+pub mod testing;
+pub mod train;
+pub mod view;
+
+pub use error::{Error, Result};
+pub use guardsplat_scene as scene;
