@@ -22,14 +22,14 @@ use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{self, Door};
+use crate::grpc::listener::{self, ListenerOptions};
 use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::metrics::{self, Page};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
 use crate::service::rate_limit::Rates;
-use crate::service::retention::Keep;
+use crate::service::retention::RetentionPolicy;
 use crate::service::{Limits, Service, clock};
 use crate::settings::{Access, Settings};
 use crate::tasks::{deliveries, housekeeping, remote_changes};
@@ -63,7 +63,7 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     worker: Option<WorkerProcess>,
-    door: Door,
+    door: ListenerOptions,
     /// Where the own worker comes in while the door for all others speaks TLS.
     side: Option<(TcpListener, Guard)>,
     /// Where metrics are to be had.
@@ -125,7 +125,7 @@ impl Server {
             Access::Open => Guard::open(api.meter()),
             Access::Tokens => Guard::tokens(api.meter(), ledger.clone(), own_token),
         };
-        let door = Door {
+        let door = ListenerOptions {
             guard,
             tls,
             measured: api.measured(),
@@ -180,7 +180,7 @@ impl Server {
         // A sender that is gone says the same.
         let drained = drained.map(|_| ()).shared();
         let side = self.side.map(|(listener, guard)| {
-            let door = Door {
+            let door = ListenerOptions {
                 guard,
                 tls: None,
                 measured: self.api.measured(),
@@ -284,7 +284,7 @@ fn limits(settings: &Settings) -> Limits {
         abandoned_after: settings.abandoned_after(),
         hooks: rules(settings),
         signed_url: Some(Duration::from_secs(settings.signed_url_seconds)).filter(|time| !time.is_zero()),
-        keep: Keep {
+        keep: RetentionPolicy {
             uploads: days(settings.keep_uploads_days),
             outputs: days(settings.keep_outputs_days),
             jobs: days(settings.keep_jobs_days),

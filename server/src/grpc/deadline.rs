@@ -1,15 +1,11 @@
 //! Deadlines of callers (`grpc-timeout`): a call that takes longer ends with `DEADLINE_EXCEEDED` and details. tonic has
 //! such a limit too, and answers `CANCELLED`, from which a caller can't tell who ended the call.
-use std::convert::Infallible;
-use std::task::{Context, Poll};
 use std::time::Duration;
 
-use futures::future::BoxFuture;
 use tonic::Status;
-use tonic::body::Body;
-use tonic::codegen::http::{HeaderMap, Request, Response};
-use tower::{Layer, Service};
+use tonic::codegen::http::{HeaderMap, Request};
 
+use super::around::{Answer, AroundCall};
 use crate::error::Error;
 
 /// So much before the deadline the answer is given, to be ahead of tonic's.
@@ -19,43 +15,18 @@ const AHEAD: Duration = Duration::from_millis(2);
 #[derive(Clone, Copy, Debug)]
 pub struct Deadlines;
 
-impl<S> Layer<S> for Deadlines {
-    type Service = WithDeadline<S>;
-
-    fn layer(&self, inner: S) -> WithDeadline<S> {
-        WithDeadline { inner }
-    }
-}
-
-/// A service whose calls end at their deadline.
-#[derive(Clone, Debug)]
-pub struct WithDeadline<S> {
-    inner: S,
-}
-
-impl<S, B> Service<Request<B>> for WithDeadline<S>
-where
-    S: Service<Request<B>, Response = Response<Body>, Error = Infallible>,
-    S::Future: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = Infallible;
-    type Future = BoxFuture<'static, Result<Response<Body>, Infallible>>;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        self.inner.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl AroundCall for Deadlines {
+    fn around<B>(&self, request: &Request<B>) -> impl FnOnce(Answer) -> Answer + 'static {
         let left = timeout(request.headers()).map(|given| given.saturating_sub(AHEAD));
-        let answer = self.inner.call(request);
-        let Some(left) = left else { return Box::pin(answer) };
-        Box::pin(async move {
-            match tokio::time::timeout(left, answer).await {
-                Ok(answer) => answer,
-                Err(_) => Ok(Status::from(Error::DeadlineExceeded).into_http()),
-            }
-        })
+        move |answer| {
+            let Some(left) = left else { return answer };
+            Box::pin(async move {
+                match tokio::time::timeout(left, answer).await {
+                    Ok(answer) => answer,
+                    Err(_) => Ok(Status::from(Error::DeadlineExceeded).into_http()),
+                }
+            })
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::service::clock::{self, timestamp};
 use crate::service::names::Kind;
 use crate::service::page;
 use crate::service::text;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Most hooks of a project: each job's end is told to all of them.
 const MAX_HOOKS: u32 = 100;
@@ -154,7 +154,7 @@ struct Asked {
 
 fn checked(rules: &Rules, request: CreateHookRequest) -> Result<Asked> {
     let hook = request.hook.ok_or_else(|| Error::invalid("hook", "is missing"))?;
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     problems.take(text::display_name("hook.display_name", &hook.display_name))?;
     let url = check_url(rules, &hook.url).map_err(|reason| Error::invalid("hook.url", reason));
     let url = problems.take(url)?;

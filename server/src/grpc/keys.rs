@@ -13,7 +13,7 @@ use crate::service::names::Kind;
 use crate::service::page;
 use crate::service::text;
 use crate::service::to_proto;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"keys"];
@@ -53,7 +53,7 @@ impl KeyService for Service {
 }
 
 fn checked(request: UpdateKeyStateRequest) -> Result<(KeyId, KeyState, String)> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let id = problems.take(Kind::Key.parse("name", &request.name))?;
     let next = match State::try_from(request.state) {
         // Nothing leads there, which is said with the state that the key has.

@@ -7,10 +7,11 @@ use tonic::transport::server::TcpIncoming;
 use tonic::transport::{Server, ServerTlsConfig};
 
 use crate::error::{Error, Result};
+use crate::grpc::around::Around;
 use crate::grpc::deadline::Deadlines;
 use crate::grpc::guard::Guard;
-use crate::grpc::metrics_layer::Measured;
-use crate::grpc::transport_errors::Explained;
+use crate::grpc::metrics_layer::MetricsLayer;
+use crate::grpc::transport_errors::ErrorDetailsLayer;
 
 /// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
 const KEEPALIVE: Duration = Duration::from_secs(30);
@@ -20,19 +21,19 @@ const KEEPALIVE_ANSWER: Duration = Duration::from_secs(10);
 const CALLS_AT_ONCE: u32 = 256;
 
 /// Who is let in, and how.
-pub struct Door {
+pub struct ListenerOptions {
     /// Who.
     pub guard: Guard,
     /// TLS, if that is spoken; then nothing else is.
     pub tls: Option<ServerTlsConfig>,
     /// What counts calls.
-    pub measured: Measured,
+    pub measured: MetricsLayer,
 }
 
 /// Answers calls that come through `door` until `shutdown`, then finishes those that have begun.
 pub async fn serve(
     routes: Routes,
-    door: Door,
+    door: ListenerOptions,
     listener: TcpListener,
     shutdown: impl Future<Output = ()>,
 ) -> Result<()> {
@@ -49,8 +50,8 @@ pub async fn serve(
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
         .layer(door.measured)
-        .layer(Explained)
-        .layer(Deadlines)
+        .layer(Around(ErrorDetailsLayer))
+        .layer(Around(Deadlines))
         .layer(door.guard)
         .add_routes(routes)
         .serve_with_incoming_shutdown(incoming, shutdown)

@@ -32,12 +32,12 @@ pub fn trace_parent<T>(request: &tonic::Request<T>) -> Option<String> {
 
 /// Counts and traces what passes.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MetricsLayer {
     pub(crate) metrics: Arc<Metrics>,
     pub(crate) traces: Traces,
 }
 
-impl<S> Layer<S> for Measured {
+impl<S> Layer<S> for MetricsLayer {
     type Service = Counted<S>;
 
     fn layer(&self, inner: S) -> Counted<S> {
@@ -52,7 +52,7 @@ impl<S> Layer<S> for Measured {
 #[derive(Clone, Debug)]
 pub struct Counted<S> {
     inner: S,
-    measured: Measured,
+    measured: MetricsLayer,
 }
 
 /// A call that is under way. One whose answer is dropped before its end was given up by whoever made it.
@@ -101,7 +101,7 @@ where
     fn call(&mut self, mut request: Request<B>) -> Self::Future {
         let begun = Instant::now();
         let method = metrics::method(request.uri().path());
-        let Measured { metrics, traces } = self.measured.clone();
+        let MetricsLayer { metrics, traces } = self.measured.clone();
         let said = request.headers().get(TRACE_PARENT).and_then(|text| text.to_str().ok());
         let parent = said.and_then(traces::parse);
         let span = traces.call(method, parent.as_ref());

@@ -12,6 +12,7 @@ use tonic::service::Routes;
 use crate::error::{Error, Result};
 use crate::service::Service;
 
+mod around;
 mod artifacts;
 mod deadline;
 #[doc(hidden)]
@@ -61,8 +62,8 @@ impl Service {
     }
 
     /// What counts and traces calls, for the listener.
-    pub fn measured(&self) -> metrics_layer::Measured {
-        metrics_layer::Measured {
+    pub fn measured(&self) -> metrics_layer::MetricsLayer {
+        metrics_layer::MetricsLayer {
             metrics: self.metrics(),
             traces: self.traces().clone(),
         }

@@ -17,7 +17,7 @@ use crate::service::clock::{self, timestamp};
 use crate::service::names::Kind;
 use crate::service::page;
 use crate::service::text;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 #[tonic::async_trait]
 impl TokenService for Service {
@@ -89,7 +89,7 @@ struct Asked {
 
 fn checked(request: CreateTokenRequest) -> Result<Asked> {
     let token = request.token.ok_or_else(|| Error::invalid("token", "is missing"))?;
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     problems.take(text::display_name("token.display_name", &token.display_name))?;
     let scopes = problems.take(scopes(&token.scopes))?;
     let expire_time = problems.take(token.expire_time.map(end).transpose())?.flatten();

@@ -1,16 +1,12 @@
 //! Errors that arise before a call reaches its service, such as a message that is too large or a call that there is
 //! not: tonic answers them with a code and a text, and here they get the `google.rpc` details that all others have.
 use std::collections::HashMap;
-use std::convert::Infallible;
-use std::task::{Context, Poll};
 
-use futures::future::BoxFuture;
-use tonic::body::Body;
-use tonic::codegen::http::{Request, Response};
+use tonic::codegen::http::Request;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
-use tower::{Layer, Service};
 
+use super::around::{Answer, AroundCall};
 use crate::grpc::status::DOMAIN;
 
 /// What the paths of this API begin with; health and reflection are as they are everywhere.
@@ -18,47 +14,22 @@ const OURS: &str = "/guardsplat.";
 
 /// Adds details to errors that have none.
 #[derive(Clone, Copy, Debug)]
-pub struct Explained;
+pub struct ErrorDetailsLayer;
 
-impl<S> Layer<S> for Explained {
-    type Service = WithDetails<S>;
-
-    fn layer(&self, inner: S) -> WithDetails<S> {
-        WithDetails { inner }
-    }
-}
-
-/// A service whose errors have details.
-#[derive(Clone, Debug)]
-pub struct WithDetails<S> {
-    inner: S,
-}
-
-impl<S, B> Service<Request<B>> for WithDetails<S>
-where
-    S: Service<Request<B>, Response = Response<Body>, Error = Infallible>,
-    S::Future: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = Infallible;
-    type Future = BoxFuture<'static, Result<Response<Body>, Infallible>>;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        self.inner.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl AroundCall for ErrorDetailsLayer {
+    fn around<B>(&self, request: &Request<B>) -> impl FnOnce(Answer) -> Answer + 'static {
         let ours = request.uri().path().starts_with(OURS);
-        let answer = self.inner.call(request);
-        Box::pin(async move {
-            let mut answer = answer.await?;
-            // An error that comes before any message stands in the headers.
-            if ours && let Some(status) = Status::from_header_map(answer.headers()).and_then(explain) {
-                // It fails for texts that are no header; this one was read from there.
-                let _ = status.add_header(answer.headers_mut());
-            }
-            Ok(answer)
-        })
+        move |answer| {
+            Box::pin(async move {
+                let mut answer = answer.await?;
+                // An error that comes before any message stands in the headers.
+                if ours && let Some(status) = Status::from_header_map(answer.headers()).and_then(explain) {
+                    // It fails for texts that are no header; this one was read from there.
+                    let _ = status.add_header(answer.headers_mut());
+                }
+                Ok(answer)
+            })
+        }
     }
 }
 

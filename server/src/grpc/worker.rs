@@ -15,7 +15,7 @@ use tonic::{Request, Response, Status, Streaming};
 use crate::error::{Error, Result};
 use crate::grpc::upload_stream::Incoming;
 use crate::service::Service;
-use crate::service::claims::Told;
+use crate::service::claims::WorkerReadings;
 use crate::service::clock;
 use crate::service::completion;
 use crate::service::names::Kind;
@@ -72,7 +72,7 @@ impl WorkerService for Service {
         let job = self.ledger().get_job(id).await.map_err(Error::from)?;
         let job = job.ok_or_else(|| Kind::Job.not_found(id))?;
         let mut completion = completion::check(&job, request.clone())?;
-        let told = Told {
+        let told = WorkerReadings {
             readings: std::mem::take(&mut request.readings),
             engine: request.engine,
             views: std::mem::take(&mut request.views),

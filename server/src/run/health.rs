@@ -18,7 +18,7 @@ use tonic_health::server::{HealthReporter, health_reporter};
 use crate::artifacts::ArtifactStore;
 use crate::ledger::Ledger;
 use crate::metrics::Metrics;
-use crate::service::worker_presence::Alive;
+use crate::service::worker_presence::WorkerPresence;
 
 /// How often the ledger is asked, and how long it may take to answer.
 pub const EVERY: Duration = Duration::from_secs(5);
@@ -48,7 +48,7 @@ pub struct Watched {
     /// The artifacts.
     pub store: ArtifactStore,
     /// Who is there.
-    pub workers: Arc<Alive>,
+    pub workers: Arc<WorkerPresence>,
     /// Where it is told as well.
     pub metrics: Arc<Metrics>,
 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{self, JobKind, JobRow};
 use crate::metrics;
 use crate::service::names::Kind;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 use crate::service::{Service, clock, text, to_proto};
 
 /// Most bytes of a failure's message; the rest is cut off.
@@ -81,7 +81,7 @@ impl Service {
 }
 
 fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let stage = Stage::try_from(progress.stage).ok();
     let known = stage.is_some_and(|stage| stage != Stage::Unspecified);
     problems.check(known, "progress.stage", "is missing or not known");

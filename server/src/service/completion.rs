@@ -11,7 +11,7 @@ use crate::service::names::Kind;
 use crate::service::text;
 use crate::service::to_proto::decode;
 use crate::service::upload;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Most bytes of a result; figures and a few sentences need far less.
 const MAX_RESULT_BYTES: usize = 64 << 10;
@@ -60,13 +60,13 @@ fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
     let mut told = told.clone();
     // Which attempt it is, the ledger looks at.
     told.lease_token.clear();
-    // Measured anew when it is said again.
+    // MetricsLayer anew when it is said again.
     (told.peak_memory_bytes, told.peak_device_memory_bytes) = (None, None);
     Sha256::digest(told.encode_to_vec()).into()
 }
 
 fn embed(result: &EmbedResult) -> Result<Outcome> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let scene = problems.take(Kind::Artifact.parse("embed_result.scene", &result.scene))?;
     let comparison = problems.take(Kind::Artifact.parse("embed_result.comparison", &result.comparison))?;
     problems.check(
@@ -100,7 +100,7 @@ fn verify(result: &VerifyResult) -> Result<Outcome> {
 
 fn key(job: &JobRow, output: KeyOutput) -> Result<Outcome> {
     let spec: KeySpec = decode(&job.spec)?;
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let artifact = problems.take(Kind::Artifact.parse("key_output.key_file", &output.key_file))?;
     let told = output.key.unwrap_or_default();
     problems.check(

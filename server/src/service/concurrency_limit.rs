@@ -7,17 +7,17 @@ use crate::service::rate_limit::Payer;
 
 /// Counts what callers have open. What is kept is bounded by what is open.
 #[derive(Default)]
-pub struct Places(Mutex<HashMap<Payer, u32>>);
+pub struct ConcurrencyLimit(Mutex<HashMap<Payer, u32>>);
 
 /// Of one watch, for as long as its stream is there: also of one that was shed, since it still takes room.
-pub struct Place {
-    places: Arc<Places>,
+pub struct Permit {
+    places: Arc<ConcurrencyLimit>,
     payer: Payer,
 }
 
-impl Places {
+impl ConcurrencyLimit {
     /// A place for one more, if the caller has fewer than `most`; 0 is no limit.
-    pub fn take(self: &Arc<Self>, payer: Payer, most: u32) -> Result<Place> {
+    pub fn take(self: &Arc<Self>, payer: Payer, most: u32) -> Result<Permit> {
         let mut open = self.lock();
         let count = open.get(&payer).copied().unwrap_or(0);
         if most > 0 && count >= most {
@@ -25,7 +25,7 @@ impl Places {
         }
         open.insert(payer.clone(), count.saturating_add(1));
         drop(open);
-        Ok(Place {
+        Ok(Permit {
             places: self.clone(),
             payer,
         })
@@ -37,7 +37,7 @@ impl Places {
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
         let mut open = self.places.lock();
         match open.get_mut(&self.payer) {
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_caller_has_so_many_at_once_and_others_have_theirs() {
-        let places = Arc::new(Places::default());
+        let places = Arc::new(ConcurrencyLimit::default());
         let take = |name: &str, most| places.take(Payer::Project(name.into()), most);
         let (first, _second) = (take("one", 2).unwrap(), take("one", 2).unwrap());
         assert!(matches!(take("one", 2), Err(Error::TooManyWatches { limit: 2 })));

@@ -26,7 +26,7 @@ const MAX_NAME_BYTES: usize = 1024;
 
 /// What is known of an upload that is not finished.
 #[derive(Clone, PartialEq, Message)]
-pub(crate) struct Begun {
+pub(crate) struct PendingUpload {
     /// Id of the artifact to be.
     #[prost(bytes = "vec", tag = "1")]
     id: Vec<u8>,
@@ -161,7 +161,7 @@ impl Service {
         start_time: i64,
         metadata: UploadMetadata,
     ) -> Result<String> {
-        let begun = Begun {
+        let begun = PendingUpload {
             id: id.as_bytes().to_vec(),
             start_time,
             metadata,
@@ -171,13 +171,13 @@ impl Service {
         Ok(format!("{COLLECTION}{}", URL_SAFE_NO_PAD.encode(sealed)))
     }
 
-    fn begun_upload(&self, project: &str, name: &str) -> Result<(Uuid, Begun)> {
+    fn begun_upload(&self, project: &str, name: &str) -> Result<(Uuid, PendingUpload)> {
         let sealed = name.strip_prefix(COLLECTION).filter(|_| name.len() <= MAX_NAME_BYTES);
         let sealed = sealed.ok_or_else(|| Error::invalid("upload", "must be a name that StartUpload gave"))?;
         let open = || {
             let sealed = URL_SAFE_NO_PAD.decode(sealed).ok()?;
             let begun = self.master().open(&context(project), &sealed).ok()?;
-            let begun = Begun::decode(begun.expose_secret()).ok()?;
+            let begun = PendingUpload::decode(begun.expose_secret()).ok()?;
             Some((Uuid::from_slice(&begun.id).ok()?, begun))
         };
         open().ok_or_else(|| Error::NotFound {

@@ -14,7 +14,6 @@ use crate::service::rate_limit::Class;
 use crate::service::rate_limit::payer;
 use crate::service::submission::{self, Submission};
 use crate::service::to_proto;
-use futures::stream::StreamExt as _;
 use guardsplat_proto::v1::{CreateJobRequest, Job, ListJobsRequest, ListJobsResponse};
 use prost::Message as _;
 use uuid::Uuid;

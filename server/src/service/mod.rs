@@ -82,7 +82,7 @@ pub struct Limits {
     /// addresses.
     pub signed_url: Option<Duration>,
     /// How long things are kept.
-    pub keep: retention::Keep,
+    pub keep: retention::RetentionPolicy,
 }
 
 impl Default for Limits {
@@ -103,7 +103,7 @@ impl Default for Limits {
             abandoned_after: Duration::from_secs(24 * 60 * 60),
             hooks: Rules::default(),
             signed_url: None,
-            keep: retention::Keep::default(),
+            keep: retention::RetentionPolicy::default(),
         }
     }
 }
@@ -124,14 +124,14 @@ struct Shared {
     limits: Limits,
     meter: Arc<rate_limit::Meter>,
     metrics: Arc<Metrics>,
-    alive: Arc<worker_presence::Alive>,
+    alive: Arc<worker_presence::WorkerPresence>,
     stages: stages::Stages,
     traces: Traces,
     changes: changes::Changes,
-    reports: progress::Reports,
+    reports: progress::ProgressThrottle,
     placement: placement::Placement,
-    positions: queue_positions::Positions,
-    places: Arc<concurrency_limit::Places>,
+    positions: queue_positions::QueuePositions,
+    places: Arc<concurrency_limit::ConcurrencyLimit>,
 }
 
 impl Service {
@@ -157,9 +157,9 @@ impl Service {
             stages: stages::Stages::default(),
             traces: Traces::default(),
             changes: changes::Changes::default(),
-            reports: progress::Reports::default(),
+            reports: progress::ProgressThrottle::default(),
             placement: placement::Placement::default(),
-            positions: queue_positions::Positions::default(),
+            positions: queue_positions::QueuePositions::default(),
             places: Arc::default(),
         };
         Self {
@@ -184,7 +184,7 @@ impl Service {
     }
 
     /// Whether any worker is there.
-    pub fn alive(&self) -> Arc<worker_presence::Alive> {
+    pub fn alive(&self) -> Arc<worker_presence::WorkerPresence> {
         self.shared.alive.clone()
     }
 
@@ -233,7 +233,7 @@ impl Service {
         &self.shared.changes
     }
 
-    pub(crate) fn reports(&self) -> &progress::Reports {
+    pub(crate) fn reports(&self) -> &progress::ProgressThrottle {
         &self.shared.reports
     }
 
@@ -241,7 +241,7 @@ impl Service {
         &self.shared.placement
     }
 
-    pub(crate) fn places(&self) -> &Arc<concurrency_limit::Places> {
+    pub(crate) fn places(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
         &self.shared.places
     }
 }

@@ -13,7 +13,7 @@ const EVERY: Duration = Duration::from_secs(1);
 
 /// The reports of all jobs that are running.
 #[derive(Default)]
-pub struct Reports(Mutex<HashMap<JobId, Reported>>);
+pub struct ProgressThrottle(Mutex<HashMap<JobId, Reported>>);
 
 /// The reports of one attempt.
 struct Reported {
@@ -24,7 +24,7 @@ struct Reported {
     progress: Option<Vec<u8>>,
 }
 
-impl Reports {
+impl ProgressThrottle {
     /// What is to be written for this report: `None` when it is too soon, else the newest progress, if there is any.
     /// The lease is extended by writes only, so a short one is written more often.
     pub fn due(
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn one_write_a_second_with_the_newest_progress() {
-        let (reports, id, start) = (Reports::default(), Uuid::now_v7(), Instant::now());
+        let (reports, id, start) = (ProgressThrottle::default(), Uuid::now_v7(), Instant::now());
         let due = |progress: Option<&[u8]>, ms| {
             reports.due(
                 id,
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn attempts_are_kept_apart() {
-        let (reports, id, now) = (Reports::default(), Uuid::now_v7(), Instant::now());
+        let (reports, id, now) = (ProgressThrottle::default(), Uuid::now_v7(), Instant::now());
         reports.written(id, "old", now);
         assert_eq!(reports.due(id, "old", Some(vec![1]), LEASE, now), None);
         assert_eq!(reports.due(id, "new", None, LEASE, now), Some(None));
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_short_lease_is_written_more_often() {
-        let (reports, id, now) = (Reports::default(), Uuid::now_v7(), Instant::now());
+        let (reports, id, now) = (ProgressThrottle::default(), Uuid::now_v7(), Instant::now());
         let lease = Duration::from_secs(1);
         reports.written(id, "t", now);
         assert_eq!(

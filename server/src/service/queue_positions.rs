@@ -17,7 +17,7 @@ type Places = HashMap<JobId, i64>;
 
 /// The places as they were last counted.
 #[derive(Default)]
-pub struct Positions(Mutex<Option<(Instant, Arc<Places>)>>);
+pub struct QueuePositions(Mutex<Option<(Instant, Arc<Places>)>>);
 
 impl Service {
     /// Queued jobs before each that is queued.

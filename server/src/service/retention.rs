@@ -11,7 +11,7 @@ const AT_ONCE: u32 = 100;
 
 /// How long things are kept that are over; none for ever.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Keep {
+pub struct RetentionPolicy {
     /// Uploads, since they were last used.
     pub uploads: Option<Duration>,
     /// What jobs made, since their end.
@@ -20,7 +20,7 @@ pub struct Keep {
     pub jobs: Option<Duration>,
 }
 
-impl Keep {
+impl RetentionPolicy {
     fn before(self, now: i64) -> Before {
         let before = |age: Option<Duration>| age.map(|age| now.saturating_sub(clock::micros(age)));
         Before {

@@ -15,7 +15,7 @@ use crate::service::fingerprint;
 use crate::service::message::MAX_BITS;
 use crate::service::names::Kind;
 use crate::service::text;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Most suspects of one job.
 pub const MAX_SUSPECTS: usize = 1000;
@@ -53,7 +53,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     let Some(job) = job else {
         return Err(Error::invalid("job", "is missing"));
     };
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let request_id = problems.take(self::request_id(&request_id))?.flatten();
     problems.take(text::display_name("job.display_name", &job.display_name))?;
     output_only(&job, &mut problems);
@@ -109,7 +109,7 @@ struct Wanted {
     claim: Option<Claim>,
 }
 
-fn embed(spec: &EmbedSpec, problems: &mut Problems) -> Result<Option<Wanted>> {
+fn embed(spec: &EmbedSpec, problems: &mut Violations) -> Result<Option<Wanted>> {
     let scene = problems.take(Kind::Artifact.parse("job.embed.scene", &spec.scene))?;
     let key = problems.take(Kind::Key.parse("job.embed.key", &spec.key))?;
     let claim = problems.take(claims::of_embed(spec))?.flatten();
@@ -139,7 +139,7 @@ fn embed(spec: &EmbedSpec, problems: &mut Problems) -> Result<Option<Wanted>> {
     }))
 }
 
-fn distortions(robust_to: &[i32], problems: &mut Problems) {
+fn distortions(robust_to: &[i32], problems: &mut Violations) {
     const FIELD: &str = "job.embed.robust_to";
     let mut seen = HashSet::new();
     for (i, number) in robust_to.iter().enumerate() {
@@ -153,7 +153,7 @@ fn distortions(robust_to: &[i32], problems: &mut Problems) {
     }
 }
 
-fn verify(spec: &VerifySpec, problems: &mut Problems) -> Result<Option<Wanted>> {
+fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>> {
     const SUSPECTS: &str = "job.verify.suspects";
     let count = spec.suspects.len();
     if count > MAX_SUSPECTS {
@@ -193,7 +193,7 @@ fn verify(spec: &VerifySpec, problems: &mut Problems) -> Result<Option<Wanted>> 
     }))
 }
 
-fn create_key(spec: &KeySpec, problems: &mut Problems) {
+fn create_key(spec: &KeySpec, problems: &mut Violations) {
     problems.check(
         (1..=MAX_BITS).contains(&spec.bits),
         "job.create_key.bits",
@@ -201,7 +201,7 @@ fn create_key(spec: &KeySpec, problems: &mut Problems) {
     );
 }
 
-fn side(field: &str, size: u32, problems: &mut Problems) {
+fn side(field: &str, size: u32, problems: &mut Violations) {
     problems.check(
         size == 0 || SIDES.contains(&size),
         field,
@@ -210,7 +210,7 @@ fn side(field: &str, size: u32, problems: &mut Problems) {
 }
 
 /// The server alone writes these.
-fn output_only(job: &Job, problems: &mut Problems) {
+fn output_only(job: &Job, problems: &mut Violations) {
     let empty = [
         ("name", job.name.is_empty()),
         ("state", job.state == 0),

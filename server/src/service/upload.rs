@@ -4,11 +4,11 @@ use guardsplat_proto::v1::UploadMetadata;
 use crate::artifacts::Announced;
 use crate::error::Result;
 use crate::service::text;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Checks what an upload announces; `field` is where that stands in the request.
 pub fn announced(field: &str, metadata: &UploadMetadata) -> Result<Announced> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     problems.take(text::file_name(
         &format!("{field}.display_name"),
         &metadata.display_name,

@@ -3,9 +3,9 @@ use crate::error::{Error, Result, Violation};
 
 /// What is wrong so far.
 #[derive(Default)]
-pub struct Problems(Vec<Violation>);
+pub struct Violations(Vec<Violation>);
 
-impl Problems {
+impl Violations {
     /// `field` is wrong.
     pub fn add(&mut self, field: impl Into<String>, description: impl Into<String>) {
         self.0.push(Violation {

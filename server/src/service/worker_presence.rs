@@ -8,12 +8,12 @@ pub const LATELY: Duration = Duration::from_secs(30);
 
 /// What is known of workers, by what they say to this server.
 #[derive(Debug, Default)]
-pub struct Alive {
+pub struct WorkerPresence {
     waiting: AtomicUsize,
     heard: Mutex<Option<Instant>>,
 }
 
-impl Alive {
+impl WorkerPresence {
     /// A worker says something.
     pub fn heard(&self) {
         // What it holds is whole at every moment.
@@ -34,7 +34,7 @@ impl Alive {
 }
 
 /// A worker that waits.
-pub struct Waiting<'a>(&'a Alive);
+pub struct Waiting<'a>(&'a WorkerPresence);
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn one_that_waits_or_was_heard_is_there() {
-        let workers = Alive::default();
+        let workers = WorkerPresence::default();
         assert!(!workers.alive());
         let waiting = workers.wait();
         assert!(workers.alive());

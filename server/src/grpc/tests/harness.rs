@@ -29,7 +29,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use crate::access::{self, Scope};
 use crate::artifacts::ArtifactStore;
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::Door;
+use crate::grpc::listener::ListenerOptions;
 use crate::grpc::listener::serve;
 use crate::ledger::{Ledger, NewToken, SqliteLedger};
 use crate::notary::Notary;
@@ -132,7 +132,7 @@ impl Server {
         };
         let (_, health) = tonic_health::server::health_reporter();
         let routes = api.routes().unwrap().add_service(health);
-        let door = Door {
+        let door = ListenerOptions {
             guard,
             tls: None,
             measured: api.measured(),

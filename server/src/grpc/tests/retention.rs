@@ -5,7 +5,7 @@ use guardsplat_proto::v1::{GetArtifactRequest, GetJobRequest};
 
 use super::harness::{Server, not_found, soon};
 use crate::service::Limits;
-use crate::service::retention::Keep;
+use crate::service::retention::RetentionPolicy;
 
 #[tokio::test]
 async fn what_is_old_goes_with_its_bytes() {
@@ -13,7 +13,7 @@ async fn what_is_old_goes_with_its_bytes() {
     let limits = Limits {
         // How often is looked follows from it.
         abandoned_after: Duration::from_secs(1),
-        keep: Keep {
+        keep: RetentionPolicy {
             uploads: short,
             outputs: None,
             jobs: short,

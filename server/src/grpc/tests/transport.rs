@@ -13,6 +13,7 @@ use tonic_reflection::pb::v1::{ServerReflectionRequest, ServerReflectionResponse
 use tower::{Layer, ServiceExt, service_fn};
 
 use super::harness::{Server, chunk, first, metadata, refused};
+use crate::grpc::around::Around;
 use crate::grpc::deadline::Deadlines;
 
 #[tokio::test]
@@ -24,7 +25,7 @@ async fn a_call_ends_at_its_deadline() {
         .body(Body::empty())
         .unwrap();
     let began = Instant::now();
-    let answer = Deadlines.layer(never).oneshot(request).await.unwrap();
+    let answer = Around(Deadlines).layer(never).oneshot(request).await.unwrap();
     assert!(
         (45..2000).contains(&began.elapsed().as_millis()),
         "{:?}",
@@ -48,7 +49,7 @@ async fn a_call_in_time_is_answered() {
         .header("grpc-timeout", "10S")
         .body(Body::empty())
         .unwrap();
-    let answer = Deadlines.layer(at_once).oneshot(request).await.unwrap();
+    let answer = Around(Deadlines).layer(at_once).oneshot(request).await.unwrap();
     assert_eq!(answer.headers()["x-answer"], "yes");
 }
 

@@ -17,7 +17,7 @@ use crate::service::names::Kind;
 use crate::service::to_proto::decode;
 
 /// What a worker told besides the result.
-pub(crate) struct Told {
+pub(crate) struct WorkerReadings {
     /// What it read.
     pub readings: Vec<FramedReading>,
     /// What it is.
@@ -28,7 +28,7 @@ pub(crate) struct Told {
 
 /// What of that was checked.
 struct Checked<'a> {
-    told: &'a Told,
+    told: &'a WorkerReadings,
     framings: Vec<Framing>,
     views: Vec<View>,
 }
@@ -39,7 +39,7 @@ impl Service {
         &self,
         job: &JobRow,
         token: &str,
-        told: &Told,
+        told: &WorkerReadings,
         completion: &mut Completion,
     ) -> Result<()> {
         let Some(claim) = of_job(job)? else { return Ok(()) };

@@ -7,7 +7,7 @@ use guardsplat_proto::v1::FramedReading;
 use guardsplat_proto::v1::undone::Kind;
 
 use crate::error::Result;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Most framings. Workers try some seventy tones, with borders and without, and some thirty parts.
 const MOST: usize = 1024;
@@ -16,7 +16,7 @@ const TWELFTHS: u32 = 12;
 
 /// What was read in each framing, checked against the bits of the key.
 pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     if readings.len() > MOST {
         let reason = format!("has {} entries, at most {MOST} are taken", readings.len());
         problems.add("readings", reason);

@@ -13,9 +13,9 @@ use crate::service::names::Kind;
 use crate::service::submission::Submission;
 use crate::service::to_proto::decode;
 use crate::service::upload;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
-pub(crate) use conclusion::Told;
+pub(crate) use conclusion::WorkerReadings;
 pub(crate) use decision::Decided;
 
 /// What a claim is about.
@@ -47,7 +47,7 @@ pub fn of_verify(spec: &VerifySpec) -> Result<Option<Claim>> {
         ("job.verify.owner", !spec.owner.is_empty()),
         ("job.verify.search", spec.search),
     ];
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     for (field, _) in given.iter().filter(|(_, given)| *given).skip(1) {
         problems.add(*field, "is one too many: give one of message, asset, owner and search");
     }

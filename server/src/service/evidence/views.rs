@@ -3,7 +3,7 @@ use guardsplat_evidence::{Picture, View};
 use guardsplat_proto::v1::SeenView;
 
 use crate::error::Result;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// Most views; all of them travel in one message.
 const MOST: usize = 8;
@@ -14,7 +14,7 @@ const NAME_BYTES: usize = 200;
 
 /// The views, with ten times the difference where the original is known.
 pub fn checked(views: &[SeenView]) -> Result<Vec<View>> {
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     if views.len() > MOST {
         problems.add(
             "views",
@@ -49,7 +49,7 @@ pub fn checked(views: &[SeenView]) -> Result<Vec<View>> {
     Ok(checked)
 }
 
-fn picture(field: String, png: &[u8], problems: &mut Problems) -> Option<Picture> {
+fn picture(field: String, png: &[u8], problems: &mut Violations) -> Option<Picture> {
     match Picture::from_png(png.to_vec()) {
         Ok(picture) if picture.width.max(picture.height) <= SIDE => Some(picture),
         Ok(picture) => {

@@ -15,7 +15,7 @@ use crate::service::page;
 use crate::service::submission;
 use crate::service::text;
 use crate::service::upload;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 const HASH: &str = "must be 64 hexadecimal digits in lower case";
 
@@ -112,7 +112,7 @@ impl Service {
 fn checked(request: CreateAssetRequest) -> Result<Registration> {
     let CreateAssetRequest { asset, request_id } = request;
     let asset = asset.ok_or_else(|| Error::invalid("asset", "is missing"))?;
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let request_id = problems.take(submission::request_id(&request_id))?.flatten();
     let owner = problems.take(Kind::Owner.parse("asset.owner", &asset.owner))?;
     problems.take(text::display_name("asset.display_name", &asset.display_name))?;

@@ -11,7 +11,7 @@ use crate::service::ownership;
 use crate::service::page;
 use crate::service::submission;
 use crate::service::text;
-use crate::service::violations::Problems;
+use crate::service::violations::Violations;
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"owners"];
@@ -55,7 +55,7 @@ impl Service {
 fn checked(request: CreateOwnerRequest) -> Result<(String, Option<Uuid>)> {
     let CreateOwnerRequest { owner, request_id } = request;
     let owner = owner.ok_or_else(|| Error::invalid("owner", "is missing"))?;
-    let mut problems = Problems::default();
+    let mut problems = Violations::default();
     let request_id = problems.take(submission::request_id(&request_id))?.flatten();
     problems.check(!owner.display_name.is_empty(), "owner.display_name", "is missing");
     problems.take(text::display_name("owner.display_name", &owner.display_name))?;
