@@ -8,13 +8,14 @@ use guardsplat_proto::v1::{Asset, CreateAssetRequest, GetAssetRequest, ListAsset
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::{key, owner, suspects};
+use super::{key, owner};
 use crate::arguments::LONGEST_NAME;
 use crate::context::Context;
 use crate::error::Result;
-use crate::names;
+use crate::inputs;
 use crate::output::{Exit, print_json, print_line, printable};
 use crate::report::AssetReport;
+use crate::resource_names;
 use crate::transfer::Source;
 
 /// Assets asked for at a time.
@@ -85,7 +86,7 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
         Command::List(arguments) => list(context, arguments).await?,
         Command::Show { asset } => {
             let request = GetAssetRequest {
-                name: names::asset(asset)?,
+                name: resource_names::asset(asset)?,
             };
             let sent = context.call("reading the asset", request, async |channel, request| {
                 RegistryServiceClient::new(channel).get_asset(request).await
@@ -98,9 +99,9 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
 }
 
 async fn create(context: &Context, arguments: &Create) -> Result<Asset> {
-    let (original, title) = match suspects::Input::scene(&arguments.original) {
-        suspects::Input::Artifact(name) => (Original::Artifact(name), String::new()),
-        suspects::Input::File(path) => hashed(path).await?,
+    let (original, title) = match inputs::Input::scene(&arguments.original) {
+        inputs::Input::Artifact(name) => (Original::Artifact(name), String::new()),
+        inputs::Input::File(path) => hashed(path).await?,
     };
     let owner = owner::find(context, &arguments.owner).await?.name;
     let key = key::find(context, &arguments.key).await?.name;

@@ -5,16 +5,16 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job, ListJobsRequest};
 use serde::Serialize;
 
-use super::dead;
+use super::failed_jobs;
 use crate::context::Context;
-use crate::create::{missed_target, no_result, succeeded};
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
-use crate::names;
+use crate::job::create::{missed_target, no_result, succeeded};
+use crate::job::progress::ProgressView;
+use crate::job::watch::watch;
 use crate::output::{Exit, print_json, print_json_line, print_line, printable, say};
 use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, word};
-use crate::show::Show;
-use crate::watch::watch;
+use crate::resource_names;
 
 /// Jobs asked for at a time.
 const PAGE: u32 = 1000;
@@ -43,7 +43,7 @@ pub enum Command {
         job: String,
     },
     /// Jobs that failed, newest first, with what went wrong
-    Dead(dead::Dead),
+    Dead(failed_jobs::FailedJobs),
     /// The attempts of a job, newest first: when, by which worker, and how each ended
     Attempts {
         /// jobs/ID, or the id alone
@@ -107,25 +107,29 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
     match command {
         Command::List(arguments) => list(context, arguments).await,
         Command::Get { job } => {
-            let request = GetJobRequest { name: names::job(job)? };
+            let request = GetJobRequest {
+                name: resource_names::job(job)?,
+            };
             let sent = context.call("reading the job", request, async |channel, request| {
                 JobServiceClient::new(channel).get_job(request).await
             });
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
-        Command::Watch { job, cursor } => follow(context, names::job(job)?, cursor.clone()).await,
+        Command::Watch { job, cursor } => follow(context, resource_names::job(job)?, cursor.clone()).await,
         Command::Cancel { job } => {
-            let request = CancelJobRequest { name: names::job(job)? };
+            let request = CancelJobRequest {
+                name: resource_names::job(job)?,
+            };
             let sent = context.once("cancelling the job", request, async |channel, request| {
                 JobServiceClient::new(channel).cancel_job(request).await
             });
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
-        Command::Dead(arguments) => dead::list(context, arguments).await,
-        Command::Attempts { job } => dead::attempts(context, names::job(job)?).await,
-        Command::Requeue { job } => dead::requeue(context, names::job(job)?).await,
+        Command::Dead(arguments) => failed_jobs::list(context, arguments).await,
+        Command::Attempts { job } => failed_jobs::attempts(context, resource_names::job(job)?).await,
+        Command::Requeue { job } => failed_jobs::requeue(context, resource_names::job(job)?).await,
     }
 }
 
@@ -192,7 +196,7 @@ async fn follow(context: &Context, name: String, cursor: Option<String>) -> Resu
         job: name.clone(),
         cancel: false,
     });
-    let mut show = Show::default();
+    let mut show = ProgressView::default();
     let over = watch(context, &name, cursor.unwrap_or_default(), |job, cursor| {
         show.job(&context.console, job);
         if context.json {

@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use crate::arguments::Submission;
 use crate::context::Context;
-use crate::create::{create, leave, no_result, succeeded, wait};
 use crate::error::{Error, Result};
-use crate::names;
+use crate::job::create::{create, leave, no_result, succeeded, wait};
 use crate::output::{Exit, print_json, print_line, printable};
 use crate::report::{KeyReport, KeyResultReport};
+use crate::resource_names;
 
 /// Keys asked for at a time.
 const PAGE: i32 = 1000;
@@ -121,7 +121,7 @@ async fn list(context: &Context) -> Result<Exit> {
 
 /// The key that `text` means: its name, its id, or a display name that only one key has.
 pub async fn find(context: &Context, text: &str) -> Result<Key> {
-    if let Some(name) = names::key(text) {
+    if let Some(name) = resource_names::key(text) {
         return get(context, name).await;
     }
     let mut found = all(context).await?;

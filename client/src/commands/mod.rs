@@ -2,14 +2,13 @@
 pub mod artifact;
 pub mod asset;
 pub mod completions;
-mod dead;
 pub mod embed;
+mod failed_jobs;
 pub mod hook;
 pub mod jobs;
 pub mod key;
 pub mod owner;
 pub mod report;
-pub mod suspects;
 pub mod token;
 pub mod verify;
 

@@ -7,9 +7,9 @@ use uuid::Uuid;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_json, print_line, printable};
 use crate::report::OwnerReport;
+use crate::resource_names;
 
 /// Owners asked for at a time.
 const PAGE: i32 = 1000;
@@ -93,7 +93,7 @@ async fn create(context: &Context, display_name: &str) -> Result<Owner> {
 
 /// The owner that `text` means: its name, its id, or a display name that only one owner has.
 pub async fn find(context: &Context, text: &str) -> Result<Owner> {
-    if let Some(name) = names::owner(text) {
+    if let Some(name) = resource_names::owner(text) {
         let sent = context.call(
             "reading the owner",
             GetOwnerRequest { name },

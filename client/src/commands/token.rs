@@ -10,9 +10,9 @@ use serde::Serialize;
 use crate::arguments::display_name;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::TokenReport;
+use crate::resource_names;
 
 /// Tokens asked for at a time.
 const PAGE: i32 = 1000;
@@ -153,7 +153,7 @@ async fn list(context: &Context) -> Result<Exit> {
 
 async fn revoke(context: &Context, token: &str) -> Result<Exit> {
     let request = RevokeTokenRequest {
-        name: names::token(token)?,
+        name: resource_names::token(token)?,
     };
     let sent = context.call("revoking the token", request, async |channel, request| {
         TokenServiceClient::new(channel).revoke_token(request).await

@@ -7,7 +7,7 @@ use guardsplat_proto::v1::{Artifact, DownloadArtifactRequest};
 use tonic::{Code, Status};
 
 use super::destination::Destination;
-use super::direct;
+use super::signed_download;
 use crate::console::Unit;
 use crate::context::{Context, refused};
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ const DOING: &str = "fetching the artifact";
 
 /// Fetches the artifact called `name` into the file `path`: from the store where the server says how, else from the server.
 pub async fn download(context: &Context, name: &str, path: &Path) -> Result<Artifact> {
-    match direct::download(context, name, path).await? {
+    match signed_download::download(context, name, path).await? {
         Some(artifact) => Ok(artifact),
         None => streamed(context, name, path).await,
     }

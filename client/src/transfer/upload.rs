@@ -13,7 +13,7 @@ use tokio::time::Instant;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
-use super::put;
+use super::signed_upload;
 use super::source::{CHUNK, Source};
 use crate::console::Unit;
 use crate::context::{Context, refused, silent};
@@ -28,7 +28,7 @@ pub(super) const LOOK: Duration = Duration::from_millis(200);
 
 /// Sends a file; `before` of `total` bytes went with other files.
 pub async fn upload(context: &Context, source: &Source, before: u64, total: u64) -> Result<Artifact> {
-    match put::upload(context, source, before, total).await? {
+    match signed_upload::upload(context, source, before, total).await? {
         Some(artifact) => Ok(artifact),
         None => streamed(context, source, before, total).await,
     }

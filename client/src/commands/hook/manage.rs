@@ -10,9 +10,9 @@ use serde::Serialize;
 use crate::arguments::display_name;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::{DeliveryReport, HookReport};
+use crate::resource_names;
 
 /// Entries asked for at a time.
 const PAGE: i32 = 1000;
@@ -173,7 +173,7 @@ pub async fn list(context: &Context) -> Result<Exit> {
 
 /// Deletes one.
 pub async fn delete(context: &Context, text: &str) -> Result<Exit> {
-    let name = names::hook(text)?;
+    let name = resource_names::hook(text)?;
     let request = DeleteHookRequest { name: name.clone() };
     let deleted = context.once("deleting the hook", request, async |channel, request| {
         HookServiceClient::new(channel).delete_hook(request).await
@@ -194,7 +194,7 @@ pub async fn deliveries(context: &Context, arguments: &Deliveries) -> Result<Exi
     let hook = arguments
         .hook
         .as_deref()
-        .map(names::hook)
+        .map(resource_names::hook)
         .transpose()?
         .unwrap_or_default();
     let mut deliveries = Vec::new();
@@ -231,7 +231,7 @@ pub async fn deliveries(context: &Context, arguments: &Deliveries) -> Result<Exi
 /// Has one sent again.
 pub async fn redeliver(context: &Context, text: &str) -> Result<Exit> {
     let request = RedeliverDeliveryRequest {
-        name: names::delivery(text)?,
+        name: resource_names::delivery(text)?,
     };
     let again = context.call("sending the delivery again", request, async |channel, request| {
         HookServiceClient::new(channel).redeliver_delivery(request).await

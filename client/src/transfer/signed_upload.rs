@@ -15,7 +15,7 @@ use tokio::io::AsyncReadExt;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout};
 
-use super::direct::{client, is_as_safe};
+use super::signed_download::{client, is_as_safe};
 use super::source::{CHUNK, Source};
 use super::upload::{AHEAD, LOOK, metadata};
 use crate::console::Unit;

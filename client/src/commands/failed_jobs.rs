@@ -13,7 +13,7 @@ use crate::report::{AttemptReport, outcome_word, word};
 
 /// Arguments of `jobs dead`.
 #[derive(Args)]
-pub struct Dead {
+pub struct FailedJobs {
     /// Only jobs that failed for this reason; may be given several times
     #[arg(long, value_enum)]
     reason: Vec<ReasonName>,
@@ -50,7 +50,7 @@ struct Attempts {
 }
 
 /// Lists jobs that failed.
-pub async fn list(context: &Context, arguments: &Dead) -> Result<Exit> {
+pub async fn list(context: &Context, arguments: &FailedJobs) -> Result<Exit> {
     let named = match arguments.reason.as_slice() {
         [] => ReasonName::value_variants(),
         some => some,
