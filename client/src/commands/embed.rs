@@ -8,17 +8,17 @@ use guardsplat_scene::Format;
 use serde::Serialize;
 
 use super::key;
-use crate::arguments::Submission;
 use crate::context::Context;
 use crate::distortion::{self, Distortion};
 use crate::error::{Error, Result};
 use crate::file_kind::FileKind;
 use crate::inputs;
-use crate::interrupt::Stage;
 use crate::job::create::{create_with, leave, missed_target, no_result, succeeded, wait};
+use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
 use crate::resource_names;
+use crate::stage::Stage;
 use crate::transfer::{Destination, download};
 
 /// How much work is spent.

@@ -8,11 +8,9 @@ use uuid::Uuid;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::output::{Exit, print_json, print_line, printable};
+use crate::pages;
 use crate::report::OwnerReport;
 use crate::resource_names;
-
-/// Owners asked for at a time.
-const PAGE: i32 = 1000;
 
 /// The commands on owners.
 #[derive(Subcommand)]
@@ -117,21 +115,13 @@ pub async fn find(context: &Context, text: &str) -> Result<Owner> {
 }
 
 async fn all(context: &Context) -> Result<Vec<Owner>> {
-    let mut owners = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = ListOwnersRequest {
-            page_size: PAGE,
-            page_token,
-        };
+    pages::all(async |page_size, page_token| {
+        let request = ListOwnersRequest { page_size, page_token };
         let sent = context.call("listing owners", request, async |channel, request| {
             RegistryServiceClient::new(channel).list_owners(request).await
         });
         let page = sent.await?;
-        owners.extend(page.owners);
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            return Ok(owners);
-        }
-    }
+        Ok((page.owners, page.next_page_token))
+    })
+    .await
 }

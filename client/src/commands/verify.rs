@@ -5,11 +5,11 @@ use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use serde::Serialize;
 
 use super::{key, owner};
-use crate::arguments::Submission;
 use crate::context::Context;
 use crate::error::Result;
 use crate::inputs;
 use crate::job::create::{create_with, leave, no_result, succeeded, wait};
+use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::VerifyReport;
 use crate::resource_names;

@@ -4,15 +4,15 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CreateJobRequest, Job, failure::Reason};
 use uuid::Uuid;
 
-use crate::arguments::{LONGEST_NAME, Submission};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::inputs::Inputs;
-use crate::interrupt::Stage;
 use crate::job::progress::ProgressView;
 use crate::job::watch::watch;
+use crate::options::{LONGEST_NAME, Submission};
 use crate::output::{print_json, print_line};
 use crate::report::{JobReport, word};
+use crate::stage::Stage;
 use crate::transfer::discard;
 
 /// Queues a job; `name` is what it is called unless the user says otherwise.

@@ -6,7 +6,7 @@ use guardsplat_proto::v1::download_artifact_response::Payload;
 use guardsplat_proto::v1::{Artifact, DownloadArtifactRequest};
 use tonic::{Code, Status};
 
-use super::destination::Destination;
+use super::destination::{Destination, size};
 use super::signed_download;
 use crate::console::Unit;
 use crate::context::{Context, refused};
@@ -105,9 +105,4 @@ async fn attempt(
         Some(artifact) if file.written() == size(&artifact) => Ok(Ok(artifact)),
         _ => Ok(Err(Status::unavailable("the server ended the stream before the file"))),
     }
-}
-
-/// Length of an artifact in bytes.
-pub(super) fn size(artifact: &Artifact) -> u64 {
-    u64::try_from(artifact.size_bytes).unwrap_or_default()
 }

@@ -14,7 +14,6 @@ use hyper::StatusCode;
 use sha2::{Digest, Sha256};
 use tonic::Code;
 
-use crate::arguments::{LONGEST_NAME, Submission};
 use crate::commands::embed::Preset;
 use crate::commands::key;
 use crate::context::Context;
@@ -22,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::file_kind::FileKind;
 use crate::inputs;
 use crate::job::create::create_with;
+use crate::options::{LONGEST_NAME, Submission};
 use crate::output::{Exit, print_line, printable, say};
 use crate::webhook::notification::{self, Object};
 use crate::webhook::object::{Fetched, Prefix};
