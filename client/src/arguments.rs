@@ -47,9 +47,9 @@ an argument, which everybody on the machine could see.";
 /// The commands.
 #[derive(Subcommand)]
 pub enum Command {
-    // Those that work with a server; a comment for the help stands with each of them.
+    // A doc comment would not be allowed here: each of them has its own.
     #[command(flatten)]
-    Server(commands::Command),
+    Server(Box<commands::Command>),
     /// Prints a script that completes commands and options in a shell
     Completions(completions::Arguments),
 }

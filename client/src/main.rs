@@ -57,7 +57,7 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments, name: &str) -> Result<Exit> {
     let Arguments { global, command } = arguments;
     let command = match command {
-        Command::Server(command) => command,
+        Command::Server(command) => *command,
         Command::Completions(which) => return Ok(commands::completions::run(&which, &mut Arguments::command())),
     };
     let mut context = Context::new(&global)?;

@@ -10,7 +10,7 @@ pub mod service;
 
 use std::path::PathBuf;
 
-pub use environment::Bench;
+pub use environment::TestEnvironment;
 pub use memory::Footprint;
 pub use process::Process;
 pub use readers::Reader;

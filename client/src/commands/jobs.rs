@@ -1,4 +1,4 @@
-//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `dead`.
+//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `failed_jobs`.
 use clap::{Args, Subcommand, ValueEnum};
 use guardsplat_proto::v1::job::{Result as Outcome, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
