@@ -1,11 +1,8 @@
 //! The command line: what there is to say.
-use std::path::PathBuf;
+use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use clap::builder::{OsStringValueParser, TypedValueParser};
-use clap::{ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
-use uuid::Uuid;
-
-use crate::commands;
+use crate::commands::{self, completions};
+use crate::options::Global;
 
 /// Marks 3D Gaussian Splatting scenes with a message and reads it back, through a GuardSplat server.
 ///
@@ -47,110 +44,14 @@ The configuration file may set `server`, `timeout`, `ca`, `cert`, `cert_key` and
 (GUARDSPLAT_SERVER, GUARDSPLAT_CA and so on) go before it. A token is taken from GUARDSPLAT_TOKEN or a file, and is never
 an argument, which everybody on the machine could see.";
 
-/// Longest display name of a job, in characters.
-pub const LONGEST_NAME: usize = 63;
-
-/// What every command understands.
-#[derive(Args, Default)]
-#[command(next_help_heading = "Options of every command")]
-pub struct Global {
-    /// Address of the server [default: http://127.0.0.1:50051]
-    #[arg(long, global = true, value_name = "URL", env = "GUARDSPLAT_SERVER")]
-    pub server: Option<String>,
-    /// Configuration file [default: ~/.config/guardsplat/client.toml, where there is one]
-    #[arg(long, global = true, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// How long a server that is silent or was lost is waited for, in seconds [default: 60]
-    #[arg(long, global = true, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
-    pub timeout: Option<u64>,
-    /// File of certificates (PEM) that an https server's is checked with, instead of those of public authorities
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CA", value_parser = file())]
-    pub ca: Option<PathBuf>,
-    /// File of the certificate (PEM) to show to a server that asks for one
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT", value_parser = file())]
-    pub cert: Option<PathBuf>,
-    /// File of that certificate's key (PEM)
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_CERT_KEY", value_parser = file())]
-    pub cert_key: Option<PathBuf>,
-    /// File of the token to show to a server that asks for one; GUARDSPLAT_TOKEN goes before it
-    #[arg(long, global = true, value_name = "FILE", env = "GUARDSPLAT_TOKEN_FILE", value_parser = file())]
-    pub token_file: Option<PathBuf>,
-    /// Prints JSON on standard output
-    #[arg(long, global = true)]
-    pub json: bool,
-}
-
 /// The commands.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Keys: secrets that messages are written and read with; they stay with the server
-    #[command(subcommand)]
-    Key(commands::key::Command),
-    /// Has a scene marked, with an asset's codeword or a raw message, and fetches it
-    ///
-    /// Exits with 3 when the mark misses what its preset promises; then nothing is written unless --force is given.
-    Embed(commands::embed::Arguments),
-    /// Tests a claim on a scene or on pictures of one: that they carry the mark of an asset, of an owner, or of anything
-    /// that is registered; or reads a raw message
-    ///
-    /// Exits with 0 for a match, 2 for no match, and 3 when nothing can be decided.
-    Verify(commands::verify::Arguments),
-    /// Work that is waiting, under way or over
-    #[command(subcommand)]
-    Jobs(commands::jobs::Command),
-    /// Scenes and pictures that the server keeps
-    #[command(subcommand)]
-    Artifact(commands::artifact::Command),
-    /// Whose originals are registered
-    #[command(subcommand)]
-    Owner(commands::owner::Command),
-    /// Originals that are registered
-    #[command(subcommand)]
-    Asset(commands::asset::Command),
-    /// Tokens of the project: who may call for it, and what
-    #[command(subcommand)]
-    Token(commands::token::Command),
-    /// URLs that the service calls when jobs are over; receivers for such calls, and for notifications of an S3 store
-    #[command(subcommand)]
-    Hook(commands::hook::Command),
-    /// Signed evidence that jobs with an asset or a claim leave
-    #[command(subcommand)]
-    Report(commands::report::Command),
+    // A doc comment would not be allowed here: each of them has its own.
+    #[command(flatten)]
+    Server(Box<commands::Command>),
     /// Prints a script that completes commands and options in a shell
-    Completions(commands::completions::Arguments),
-}
-
-/// What all commands understand that create a job.
-#[derive(Args)]
-pub struct Submission {
-    /// What people call the job, at most 63 characters; the name of the file unless given
-    #[arg(long, value_name = "TEXT", value_parser = display_name)]
-    pub display_name: Option<String>,
-    /// Names this request: the same command with the same id and the same files gives the same job, however often it is
-    /// run; drawn at random unless given
-    #[arg(long, value_name = "UUID")]
-    pub request_id: Option<Uuid>,
-    /// How urgent the job is, -10 to 10: workers are given jobs of a higher number first [default: 5 for verify, else 0]
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-10..=10))]
-    pub priority: Option<i32>,
-    /// Ends as soon as the job is queued, and prints it
-    #[arg(long)]
-    pub no_wait: bool,
-    /// Ctrl-C while waiting cancels the job; without this, it goes on
-    #[arg(long, conflicts_with = "no_wait")]
-    pub cancel_on_interrupt: bool,
-}
-
-/// Takes the name of a file, an empty one too: that is how a variable is unset in many places.
-fn file() -> impl TypedValueParser<Value = PathBuf> {
-    OsStringValueParser::new().map(PathBuf::from)
-}
-
-pub fn display_name(text: &str) -> Result<String, String> {
-    match text.chars().count() {
-        0..=LONGEST_NAME => Ok(text.to_owned()),
-        length => Err(format!("{length} characters, at most {LONGEST_NAME} are taken")),
-    }
+    Completions(completions::Arguments),
 }
 
 #[cfg(test)]

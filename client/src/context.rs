@@ -7,14 +7,14 @@ use tokio::time::timeout;
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::{Request, Response, Status};
 
-use crate::arguments::Global;
 use crate::backoff::Backoff;
 use crate::console::Console;
 use crate::details::retry_delay;
 use crate::error::{Error, Result, why_lost};
-use crate::interrupt::Stage;
+use crate::options::Global;
 use crate::server::{Server, is_lost};
 use crate::settings::Settings;
+use crate::stage::Stage;
 use crate::trace::{self, Trace};
 
 /// What the commands share.

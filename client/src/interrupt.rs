@@ -4,28 +4,7 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 
 use crate::context::Context;
 use crate::error::Error;
-
-/// How far a command is.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Stage {
-    /// Nothing of it outlives the command.
-    #[default]
-    Nothing,
-    /// A job is being created: nobody knows yet whether it is there.
-    Creating,
-    /// The job is waited for.
-    Waiting {
-        /// Its name.
-        job: String,
-        /// Whether an interrupt is to cancel it.
-        cancel: bool,
-    },
-    /// The job is done, and what it made is being fetched.
-    Fetching {
-        /// Its name.
-        job: String,
-    },
-}
+use crate::stage::Stage;
 
 /// Ends when the process is asked to end.
 pub async fn heard() {
@@ -53,7 +32,7 @@ pub async fn heard() {
 pub async fn answer(context: &Context) -> Error {
     let stage = context.stage.take();
     let Stage::Waiting { job, cancel: true } = &stage else {
-        return told(stage, "");
+        return interrupted(stage, "");
     };
     let request = CancelJobRequest { name: job.clone() };
     let cancelled = tokio::select! {
@@ -67,11 +46,11 @@ pub async fn answer(context: &Context) -> Error {
             after: format!("; the end of {job} was asked for"),
             job: Some(job.clone()),
         },
-        Err(error) => told(stage, &format!(" ({error})")),
+        Err(error) => interrupted(stage, &format!(" ({error})")),
     }
 }
 
-fn told(stage: Stage, why: &str) -> Error {
+fn interrupted(stage: Stage, why: &str) -> Error {
     let (job, after) = match stage {
         Stage::Nothing => (None, String::new()),
         Stage::Creating => (
@@ -106,10 +85,10 @@ mod tests {
             job: "jobs/7".into(),
             cancel: false,
         };
-        let text = told(stage, "").to_string();
+        let text = interrupted(stage, "").to_string();
         assert!(text.contains("goes on"), "{text}");
         assert!(text.contains("guardsplat jobs cancel jobs/7"), "{text}");
         assert!(text.contains("guardsplat jobs watch jobs/7"), "{text}");
-        assert_eq!(told(Stage::Nothing, "").to_string(), "interrupted");
+        assert_eq!(interrupted(Stage::Nothing, "").to_string(), "interrupted");
     }
 }

@@ -4,26 +4,30 @@ mod backoff;
 mod commands;
 mod console;
 mod context;
-mod create;
 mod details;
 mod distortion;
 mod error;
+mod file_kind;
+mod http_client;
+mod inputs;
 mod interrupt;
-mod kind;
-mod names;
+mod job;
+mod options;
 mod output;
+mod pages;
 mod report;
+mod resource_names;
 mod server;
 mod settings;
-mod show;
+mod stage;
 mod trace;
 mod transfer;
-mod watch;
 mod webhook;
 
 use std::process::ExitCode;
 
-use arguments::Arguments;
+use arguments::{Arguments, Command};
+use clap::CommandFactory as _;
 use context::Context;
 use error::{Error, Result};
 use output::Exit;
@@ -52,9 +56,10 @@ fn main() -> ExitCode {
 /// Carries out one command, which is called `name`; an interrupt ends it at any time.
 fn run(arguments: Arguments, name: &str) -> Result<Exit> {
     let Arguments { global, command } = arguments;
-    if let arguments::Command::Completions(which) = &command {
-        return Ok(commands::completions::run(which));
-    }
+    let command = match command {
+        Command::Server(command) => *command,
+        Command::Completions(which) => return Ok(commands::completions::run(&which, &mut Arguments::command())),
+    };
     let mut context = Context::new(&global)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()

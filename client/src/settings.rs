@@ -5,8 +5,8 @@ use std::time::Duration;
 use guardsplat_proto::connect::{TOKEN_VARIABLE, Target, Token};
 use serde::Deserialize;
 
-use crate::arguments::Global;
 use crate::error::{Error, Result};
+use crate::options::Global;
 
 /// Where the server listens unless told otherwise.
 pub const DEFAULT_SERVER: &str = "http://127.0.0.1:50051";

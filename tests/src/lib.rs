@@ -1,5 +1,5 @@
 //! Helpers of the end-to-end tests: the programs, a folder to run them in, and the scenes to run them on.
-pub mod bench;
+pub mod environment;
 mod installed;
 pub mod memory;
 pub mod ply;
@@ -10,7 +10,7 @@ pub mod service;
 
 use std::path::PathBuf;
 
-pub use bench::Bench;
+pub use environment::TestEnvironment;
 pub use memory::Footprint;
 pub use process::Process;
 pub use readers::Reader;

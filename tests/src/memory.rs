@@ -1,7 +1,7 @@
 //! What memory an embedding was predicted to need, and what it had in use at most.
 use serde_json::Value;
 
-use crate::Bench;
+use crate::TestEnvironment;
 
 /// Prediction and peak of one embedding, in bytes.
 #[derive(Clone, Debug)]
@@ -26,16 +26,16 @@ impl Footprint {
     /// When that fails.
     #[track_caller]
     pub fn of_sample(gaussians: u64, settings: &str) -> Self {
-        let bench = Bench::new();
-        bench.write("settings.json", settings);
-        bench.exits(
+        let environment = TestEnvironment::new();
+        environment.write("settings.json", settings);
+        environment.exits(
             &format!("sample in.ply --gaussians {gaussians} --sh-degree 3 --seed 5"),
             0,
         );
-        bench.exits("key create --bits 32 --seed 1 -o k.key --device cpu", 0);
+        environment.exits("key create --bits 32 --seed 1 -o k.key --device cpu", 0);
         let embed =
             "embed in.ply out.ply --key k.key --message 8f3a5c71 --settings settings.json --device cpu --force --json";
-        let output = bench.run(embed);
+        let output = environment.run(embed);
         // Whether it reached its target is of no interest here: that is code 3.
         assert!(matches!(output.status.code(), Some(0 | 3)), "{output:?}");
         let report: Value = serde_json::from_slice(&output.stdout).expect("a report");

@@ -8,12 +8,12 @@ use serde_json::Value;
 use tonic::transport::Channel;
 
 use crate::process::{SOON, until};
-use crate::{Bench, Process, program};
+use crate::{Process, TestEnvironment, program};
 
-/// A server on a port of its own, whose data lies in the folder of a bench.
+/// A server on a port of its own, whose data lies in the folder of a environment.
 pub struct Service {
     /// The folder.
-    pub bench: Bench,
+    pub environment: TestEnvironment,
     /// How long a run of the client may take.
     pub patience: Duration,
     /// Variables of the client: its token, a CA.
@@ -31,9 +31,9 @@ impl Service {
     ///
     /// # Panics
     /// When it does not come up.
-    pub fn start(bench: Bench, flags: &str) -> Self {
+    pub fn start(environment: TestEnvironment, flags: &str) -> Self {
         let mut service = Self {
-            bench,
+            environment,
             patience: SOON,
             client_variables: Vec::new(),
             worker_variables: Vec::new(),
@@ -52,13 +52,13 @@ impl Service {
     /// When it does not come up.
     #[track_caller]
     pub fn restart(&mut self) {
-        let mut command = self.bench.command(&program("guardsplat-server"));
+        let mut command = self.environment.command(&program("guardsplat-server"));
         command
             .args(["--listen", &self.address, "--data-dir", "data"])
             .args(["--embedded-worker", "false", "--worker-device", "cpu"])
             .args(&self.flags)
             .stdout(Stdio::piped());
-        let mut server = Process::start(&mut command, &self.bench.path("server.log"));
+        let mut server = Process::start(&mut command, &self.environment.path("server.log"));
         let mut line = String::new();
         let stdout = server.stdout().expect("a pipe, and it was not taken");
         BufReader::new(stdout).read_line(&mut line).expect("it prints text");
@@ -88,7 +88,7 @@ impl Service {
 
     /// What the server has logged.
     pub fn log(&self) -> String {
-        String::from_utf8_lossy(&self.bench.read("server.log")).into_owned()
+        String::from_utf8_lossy(&self.environment.read("server.log")).into_owned()
     }
 
     /// Address and port.
@@ -116,15 +116,15 @@ impl Service {
 
     /// Starts a worker, which logs to a file of its name.
     pub fn worker(&self, name: &str) -> Process {
-        let mut command = self.bench.command(&crate::worker());
+        let mut command = self.environment.command(&crate::worker());
         command.args(["run", "--device", "cpu", "--name", name, "--server"]);
         command.arg(self.url()).envs(self.worker_variables.iter().cloned());
-        Process::start(&mut command, &self.bench.path(format!("{name}.log")))
+        Process::start(&mut command, &self.environment.path(format!("{name}.log")))
     }
 
     /// The client, to be run with the words of `line`.
     pub fn client_command(&self, line: &str) -> Command {
-        let mut command = self.bench.command(&program("guardsplat"));
+        let mut command = self.environment.command(&program("guardsplat"));
         command
             .env("GUARDSPLAT_SERVER", self.url())
             .envs(self.client_variables.iter().cloned())
@@ -229,7 +229,7 @@ impl Service {
     /// Sizes of all files that the server keeps for artifacts and keys, also those that are half there.
     pub fn kept(&self) -> Vec<u64> {
         let mut sizes = Vec::new();
-        let mut folders = vec![self.bench.path("data/artifacts")];
+        let mut folders = vec![self.environment.path("data/artifacts")];
         while let Some(folder) = folders.pop() {
             // What is gone between two looks is not kept.
             for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -1,5 +1,5 @@
 //! Scene files that are none: whatever reads them says what is wrong, and leaves nothing behind.
-use guardsplat_tests::Bench;
+use guardsplat_tests::TestEnvironment;
 use guardsplat_tests::ply::Ply;
 
 /// Every kind of bad file, with what the message must name.
@@ -61,26 +61,26 @@ fn bad_scenes() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
 
 #[test]
 fn rendering_a_bad_scene_names_what_is_wrong() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     for (name, bytes, needles) in bad_scenes() {
-        bench.write(name, bytes);
-        bench.refuses(
+        environment.write(name, bytes);
+        environment.refuses(
             &format!("render {name} views --views 1 --size 32 --device cpu"),
             needles,
         );
     }
-    bench.refuses("render none.ply views --views 1", &["none.ply", "No such file"]);
-    bench.refuses("render . views --views 1", &["not a regular file"]);
+    environment.refuses("render none.ply views --views 1", &["none.ply", "No such file"]);
+    environment.refuses("render . views --views 1", &["not a regular file"]);
 }
 
 /// The files above are bad for one reason each: without it they are read.
 #[test]
 fn the_same_scene_without_a_fault_is_rendered() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     for rest in [0, 9, 24, 45, 72] {
         let name = format!("good{rest}.ply");
-        bench.write(&name, Ply::new(5, rest).bytes());
-        bench.exits(
+        environment.write(&name, Ply::new(5, rest).bytes());
+        environment.exits(
             &format!("render {name} views{rest} --views 1 --size 32 --device cpu"),
             0,
         );
@@ -90,25 +90,25 @@ fn the_same_scene_without_a_fault_is_rendered() {
 /// What embedding and verification read is refused by the same rules, before a result exists.
 #[test]
 fn embedding_and_verifying_a_bad_scene_names_what_is_wrong() {
-    let bench = Bench::new();
-    bench.exits("key create --bits 8 --seed 3 -o k.key --device cpu", 0);
-    bench.write("kept.ply", "an older result");
+    let environment = TestEnvironment::new();
+    environment.exits("key create --bits 8 --seed 3 -o k.key --device cpu", 0);
+    environment.write("kept.ply", "an older result");
     for (name, bytes, needles) in bad_scenes() {
-        bench.write(name, bytes);
+        environment.write(name, bytes);
         let named: Vec<&str> = if name == "empty.ply" {
             needles.to_vec()
         } else {
             needles.iter().copied().chain([name]).collect()
         };
-        bench.refuses(
+        environment.refuses(
             &format!("embed {name} out.ply --key k.key --message 5c --device cpu --preset draft"),
             &named,
         );
-        bench.refuses(
+        environment.refuses(
             &format!("embed {name} kept.ply --key k.key --message 5c --device cpu --preset draft"),
             &named,
         );
-        bench.refuses(&format!("verify {name} --key k.key --message 5c --device cpu"), &named);
+        environment.refuses(&format!("verify {name} --key k.key --message 5c --device cpu"), &named);
     }
 }
 
@@ -125,12 +125,12 @@ const TOLD: &str = "2 rows ignored, the first since property y of row 3 is NaN";
 
 #[test]
 fn bad_rows_are_left_out_of_pictures_when_that_is_asked_for() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let (scene, bad) = with_bad_rows();
-    bench.write("nan.ply", scene.bytes());
+    environment.write("nan.ply", scene.bytes());
     let line = |name: &str| format!("render {name}.ply {name} --views 2 --size 32 --device cpu");
-    bench.refuses(&line("nan"), &["nan.ply", "property y of row 3 is NaN"]);
-    let told = bench.exits(&(line("nan") + " --ignore-bad-rows"), 0);
+    environment.refuses(&line("nan"), &["nan.ply", "property y of row 3 is NaN"]);
+    let told = environment.exits(&(line("nan") + " --ignore-bad-rows"), 0);
     assert!(told.ends_with(&format!("{TOLD}\n")), "{told}");
 
     let mut without = scene.clone();
@@ -138,27 +138,27 @@ fn bad_rows_are_left_out_of_pictures_when_that_is_asked_for() {
         .filter(|row| !bad.contains(row))
         .map(|row| scene.rows[row].clone())
         .collect();
-    bench.write("good.ply", without.promise("38").bytes());
-    let told = bench.exits(&(line("good") + " --ignore-bad-rows"), 0);
+    environment.write("good.ply", without.promise("38").bytes());
+    let told = environment.exits(&(line("good") + " --ignore-bad-rows"), 0);
     assert!(!told.contains("ignored"), "{told}");
     for name in ["view_000.png", "view_001.png", "cameras.json"] {
-        let [nan, good] = ["nan", "good"].map(|folder| bench.read(&format!("{folder}/{name}")));
+        let [nan, good] = ["nan", "good"].map(|folder| environment.read(&format!("{folder}/{name}")));
         assert!(nan == good, "{name}");
     }
 
     let hopeless = (0..5).fold(Ply::new(5, 0), |scene, row| scene.set(row, "x", f32::NAN));
-    bench.write("none.ply", hopeless.bytes());
+    environment.write("none.ply", hopeless.bytes());
     let words = "none of 5 rows is left, the first since property x of row 0 is NaN";
-    bench.refuses(&(line("none") + " --ignore-bad-rows"), &["none.ply", words]);
+    environment.refuses(&(line("none") + " --ignore-bad-rows"), &["none.ply", words]);
 }
 
 #[test]
 fn bad_rows_are_written_as_they_were() {
-    let bench = Bench::new();
-    bench.exits("key create --bits 8 --seed 3 -o k.key --device cpu", 0);
+    let environment = TestEnvironment::new();
+    environment.exits("key create --bits 8 --seed 3 -o k.key --device cpu", 0);
     let (scene, bad) = with_bad_rows();
-    bench.write("in.ply", scene.bytes());
-    bench.write(
+    environment.write("in.ply", scene.bytes());
+    environment.write(
         "hasty.json",
         r#"{"steps": 3, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
             "verify": {"views": 3, "message_views": 2}, "target": {"bit_accuracy": 0, "psnr_db": 0, "message": false}}"#,
@@ -166,14 +166,14 @@ fn bad_rows_are_written_as_they_were() {
     let embed =
         "embed in.ply out.ply --key k.key --message 5c --settings hasty.json --size 32 --preset draft --device cpu";
     let reason = "property y of row 3 is NaN";
-    bench.refuses(embed, &["in.ply", reason]);
-    let report = bench.json(&format!("{embed} --ignore-bad-rows --json"), 0);
+    environment.refuses(embed, &["in.ply", reason]);
+    let report = environment.json(&format!("{embed} --ignore-bad-rows --json"), 0);
     assert_eq!((&report["ignored_rows"], &report["gaussians"]), (&2.into(), &38.into()));
     let changed = report["changed_gaussians"].as_u64().unwrap();
     assert!(changed > 0, "{report}");
 
     // Colours of good rows may differ, and nothing else: NaN by its bytes.
-    let (before, after) = (scene.bytes(), bench.read("out.ply"));
+    let (before, after) = (scene.bytes(), environment.read("out.ply"));
     assert_eq!(before.len(), after.len());
     let row = 4 * scene.properties.len();
     let header = before.len() - 40 * row;
@@ -191,12 +191,12 @@ fn bad_rows_are_written_as_they_were() {
     });
     assert_eq!(differ.count() as u64, changed);
 
-    bench.refuses(
+    environment.refuses(
         "verify out.ply --key k.key --message 5c --device cpu",
         &["out.ply", reason],
     );
     let verify = "verify out.ply --key k.key --message 5c --views 2 --device cpu --ignore-bad-rows";
     // Eight bits decide nothing.
-    assert_eq!(bench.json(&format!("{verify} --json"), 3)["ignored_rows"], 2);
-    assert!(bench.exits(verify, 3).contains(TOLD));
+    assert_eq!(environment.json(&format!("{verify} --json"), 3)["ignored_rows"], 2);
+    assert!(environment.exits(verify, 3).contains(TOLD));
 }

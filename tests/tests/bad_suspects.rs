@@ -1,15 +1,15 @@
 //! Pictures that no mark can be in, and files that are no pictures: clear answers, no crash, bounded memory.
-use guardsplat_tests::Bench;
-use guardsplat_tests::bench::check_refusal;
+use guardsplat_tests::TestEnvironment;
+use guardsplat_tests::environment::check_refusal;
 use image::{ImageFormat, Rgb, RgbImage};
 
 const VERIFY: &str = "--key k.key --message c0ffee42 --device cpu --json";
 
 /// A folder with a key of 32 bits.
-fn bench() -> Bench {
-    let bench = Bench::new();
-    bench.exits("key create --bits 32 --seed 5 -o k.key --device cpu", 0);
-    bench
+fn environment() -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    environment.exits("key create --bits 32 --seed 5 -o k.key --device cpu", 0);
+    environment
 }
 
 fn encoded(picture: &RgbImage, format: ImageFormat) -> Vec<u8> {
@@ -56,16 +56,16 @@ fn crc32(bytes: &[u8]) -> u32 {
 
 #[test]
 fn pictures_of_something_else_do_not_match() {
-    let bench = bench();
-    bench.write("waves.png", encoded(&waves(300, 200), ImageFormat::Png));
-    bench.write(
+    let environment = environment();
+    environment.write("waves.png", encoded(&waves(300, 200), ImageFormat::Png));
+    environment.write(
         "white.png",
         encoded(&RgbImage::from_pixel(64, 64, Rgb([255; 3])), ImageFormat::Png),
     );
-    bench.write("pixel.jpg", encoded(&RgbImage::new(1, 1), ImageFormat::Jpeg));
-    bench.write("line.webp", encoded(&waves(4000, 1), ImageFormat::WebP));
+    environment.write("pixel.jpg", encoded(&RgbImage::new(1, 1), ImageFormat::Jpeg));
+    environment.write("line.webp", encoded(&waves(4000, 1), ImageFormat::WebP));
     for picture in ["waves.png", "white.png", "pixel.jpg", "line.webp"] {
-        let report = bench.json(&format!("verify {picture} {VERIFY}"), 2);
+        let report = environment.json(&format!("verify {picture} {VERIFY}"), 2);
         assert_eq!(report["verdict"], "no_match", "{picture}: {report}");
         assert!(report["p_value"].as_f64().unwrap() > 1e-6, "{picture}: {report}");
     }
@@ -73,7 +73,7 @@ fn pictures_of_something_else_do_not_match() {
 
 #[test]
 fn files_that_are_no_pictures_are_told_by_name() {
-    let bench = bench();
+    let environment = environment();
     let png = encoded(&waves(300, 200), ImageFormat::Png);
     let jpeg = encoded(&waves(300, 200), ImageFormat::Jpeg);
     let webp = encoded(&waves(300, 200), ImageFormat::WebP);
@@ -90,19 +90,19 @@ fn files_that_are_no_pictures_are_told_by_name() {
         ("animated.png", animated(&png)),
         ("text.png", b"this is no picture".to_vec()),
     ] {
-        bench.write(name, bytes);
-        bench.refuses(&format!("verify {name} {VERIFY}"), &[name]);
+        environment.write(name, bytes);
+        environment.refuses(&format!("verify {name} {VERIFY}"), &[name]);
     }
 }
 
 #[test]
 fn pictures_that_promise_too_much_take_no_memory() {
-    let bench = bench();
-    bench.write("huge.png", promised(20_000, 20_000));
-    bench.write("wide.png", promised(2_000_000_000, 1));
+    let environment = environment();
+    environment.write("huge.png", promised(20_000, 20_000));
+    environment.write("wide.png", promised(2_000_000_000, 1));
     // 3 GiB: enough for the program and its models, and not for the pixels.
     let refuses = |name: &str, needles: &[&str]| {
-        let output = bench.run_in_little_memory(3 << 20, &format!("verify {name} {VERIFY}"));
+        let output = environment.run_in_little_memory(3 << 20, &format!("verify {name} {VERIFY}"));
         check_refusal(name, &output, needles);
     };
     refuses("huge.png", &["huge.png", "20000"]);

@@ -1,5 +1,5 @@
 //! `evaluate`: marks and readings are kept, not made twice, and told in reports.
-use guardsplat_tests::Bench;
+use guardsplat_tests::TestEnvironment;
 use serde_json::Value;
 
 /// Few steps and small views; how good the marks are is not tested here.
@@ -7,61 +7,64 @@ const SETTINGS: &str = r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1,
 const EVALUATE: &str = "evaluate results --scenes one.ply two.ply --experiments capacity,pruning,formats --bits 16,32 \
     --seeds 1 --settings hasty.json --size 48 --views 3 --device cpu";
 
-fn bench() -> Bench {
-    let bench = Bench::new();
-    bench.write("hasty.json", SETTINGS);
-    bench.exits("sample one.ply --gaussians 400 --sh-degree 1 --seed 1", 0);
-    bench.exits("sample two.ply --gaussians 400 --sh-degree 0 --seed 2", 0);
-    bench
+fn environment() -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    environment.write("hasty.json", SETTINGS);
+    environment.exits("sample one.ply --gaussians 400 --sh-degree 1 --seed 1", 0);
+    environment.exits("sample two.ply --gaussians 400 --sh-degree 0 --seed 2", 0);
+    environment
 }
 
-fn records(bench: &Bench) -> Vec<Value> {
-    let text = String::from_utf8(bench.read("results/results.jsonl")).unwrap();
+fn records(environment: &TestEnvironment) -> Vec<Value> {
+    let text = String::from_utf8(environment.read("results/results.jsonl")).unwrap();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[test]
 fn results_are_kept_and_what_is_there_is_not_done_again() {
-    let bench = bench();
-    bench.exits(EVALUATE, 0);
-    let first = records(&bench);
+    let environment = environment();
+    environment.exits(EVALUATE, 0);
+    let first = records(&environment);
     // Two scenes, 16 and 32 bits; nothing done, two prunings, degree 0 and five formats at 32 bits only.
     assert_eq!(first.len(), 2 * (2 + 1 + 1 + 2 + 6));
-    let text = String::from_utf8(bench.read("results/results.jsonl")).unwrap();
+    let text = String::from_utf8(environment.read("results/results.jsonl")).unwrap();
     for attack in ["prune-lowest:0.25", "format:spz", "format:sog", "sh-degree:0"] {
         assert_eq!(text.matches(attack).count(), 2, "{attack}");
     }
 
     // Cut off in the middle of a line, as a crash does: that reading alone is made again, to the same bytes.
-    let whole = bench.read("results/results.jsonl");
-    bench.write("results/results.jsonl", &whole[..whole.len() - 40]);
-    bench.exits(EVALUATE, 0);
-    assert_eq!(bench.read("results/results.jsonl"), whole);
+    let whole = environment.read("results/results.jsonl");
+    environment.write("results/results.jsonl", &whole[..whole.len() - 40]);
+    environment.exits(EVALUATE, 0);
+    assert_eq!(environment.read("results/results.jsonl"), whole);
 }
 
 #[test]
 fn reports_tell_what_was_measured_and_what_was_not() {
-    let bench = bench();
-    bench.write("page.md", "# Page\n\n<!-- BEGIN capacity -->\n<!-- END capacity -->\n");
-    bench.exits(
+    let environment = environment();
+    environment.write("page.md", "# Page\n\n<!-- BEGIN capacity -->\n<!-- END capacity -->\n");
+    environment.exits(
         "evaluate results --scenes one.ply --bits 16 --seeds 1 --settings hasty.json --size 48 --views 2 --device cpu \
          --document page.md",
         0,
     );
-    let page = String::from_utf8(bench.read("page.md")).unwrap();
-    let html = String::from_utf8(bench.read("results/report.html")).unwrap();
+    let page = String::from_utf8(environment.read("page.md")).unwrap();
+    let html = String::from_utf8(environment.read("results/report.html")).unwrap();
     for text in [&page, &html] {
         assert!(text.contains("one.ply") && text.contains("not measured"), "{text}");
     }
     assert!(html.contains("<svg") && html.contains("data:image/png;base64,"));
     assert!(!html.contains("src=\"http"));
-    let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&environment.read("results/report.json")).unwrap();
     assert_eq!(report[0]["name"], "capacity");
-    let readings = String::from_utf8(bench.read("results/readings.csv")).unwrap();
+    let readings = String::from_utf8(environment.read("results/readings.csv")).unwrap();
     assert_eq!(readings.lines().count(), 2); // a head and one reading
     // Without anything new, the same report.
-    bench.exits("evaluate results --report-only", 0);
-    assert_eq!(String::from_utf8(bench.read("results/report.html")).unwrap(), html);
+    environment.exits("evaluate results --report-only", 0);
+    assert_eq!(
+        String::from_utf8(environment.read("results/report.html")).unwrap(),
+        html
+    );
 }
 
 /// Random weights of the learned codec: as many as the published ones, and as small as those of a network.
@@ -104,36 +107,36 @@ fn codec() -> Vec<u8> {
 
 #[test]
 fn the_learned_codec_attacks_where_its_weights_are_given() {
-    let bench = bench();
+    let environment = environment();
     let line = "evaluate results --scenes one.ply --experiments robustness --only standard --bits 16 --seeds 1 \
         --settings hasty.json --size 32 --views 2 --device cpu";
     let missing = || {
-        let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+        let report: Value = serde_json::from_slice(&environment.read("results/report.json")).unwrap();
         report[0]["missing"].to_string()
     };
-    bench.exits(line, 0);
-    let before = records(&bench).len();
+    environment.exits(line, 0);
+    let before = records(&environment).len();
     assert!(missing().contains("vae:3: not measured: no weights"), "{}", missing());
 
-    bench.write("codec.safetensors", codec());
-    bench.exits(&format!("{line} --vae codec.safetensors"), 0);
-    let records = records(&bench);
+    environment.write("codec.safetensors", codec());
+    environment.exits(&format!("{line} --vae codec.safetensors"), 0);
+    let records = records(&environment);
     assert_eq!(records.len(), before + 1);
     let reading = records[before].to_string();
     assert!(reading.contains("vae:3"), "{reading}");
     assert!(!missing().contains("no weights"), "{}", missing());
 
-    bench.write("codec.safetensors", &codec()[..9000]);
-    bench.refuses(&format!("{line} --vae codec.safetensors"), &["vae", "safetensors"]);
-    bench.refuses(&format!("{line} --vae none"), &["none"]);
+    environment.write("codec.safetensors", &codec()[..9000]);
+    environment.refuses(&format!("{line} --vae codec.safetensors"), &["vae", "safetensors"]);
+    environment.refuses(&format!("{line} --vae none"), &["none"]);
 }
 
 const SECURITY: &str = "evaluate results --scenes one.ply two.ply --experiments security --bits 16 --seeds 1 \
     --settings hasty.json --size 48 --views 8 --device cpu";
 
 /// Detectors and areas of a folder's detections, in order.
-fn areas(bench: &Bench) -> Vec<(String, f64)> {
-    let detections = records(bench)
+fn areas(environment: &TestEnvironment) -> Vec<(String, f64)> {
+    let detections = records(environment)
         .into_iter()
         .map(|line| line["record"]["detection"].clone());
     let detections = detections.filter(|detection| !detection.is_null());
@@ -144,9 +147,9 @@ fn areas(bench: &Bench) -> Vec<(String, f64)> {
 
 #[test]
 fn detectors_judge_marks_once_and_find_replaced_bits() {
-    let bench = bench();
-    bench.exits(SECURITY, 0);
-    let areas = areas(&bench);
+    let environment = environment();
+    environment.exits(SECURITY, 0);
+    let areas = areas(&environment);
     let names: Vec<&str> = areas.iter().map(|(name, _)| name.as_str()).collect();
     let detectors = [
         "rs-analysis",
@@ -163,31 +166,31 @@ fn detectors_judge_marks_once_and_find_replaced_bits() {
         let fires = name.starts_with("control:") && !name.ends_with("chi-square");
         assert!((0.0..=1.0).contains(area) && (!fires || *area > 0.9), "{name}: {area}");
     }
-    let whole = bench.read("results/results.jsonl");
-    let detection = &records(&bench)[4]["record"]["detection"];
+    let whole = environment.read("results/results.jsonl");
+    let detection = &records(&environment)[4]["record"]["detection"];
     assert_eq!(detection["clean"].as_array().unwrap().len(), 16);
     assert_eq!((&detection["views"], &detection["clusters"]), (&8.into(), &2.into()));
-    bench.exits(SECURITY, 0);
-    assert_eq!(bench.read("results/results.jsonl"), whole);
+    environment.exits(SECURITY, 0);
+    assert_eq!(environment.read("results/results.jsonl"), whole);
     // The last two are lost: they alone are made again, to the same bytes.
     let lines: Vec<&[u8]> = whole.split_inclusive(|byte| *byte == b'\n').collect();
-    bench.write("results/results.jsonl", lines[..lines.len() - 2].concat());
-    bench.exits(SECURITY, 0);
-    assert_eq!(bench.read("results/results.jsonl"), whole);
-    let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+    environment.write("results/results.jsonl", lines[..lines.len() - 2].concat());
+    environment.exits(SECURITY, 0);
+    assert_eq!(environment.read("results/results.jsonl"), whole);
+    let report: Value = serde_json::from_slice(&environment.read("results/report.json")).unwrap();
     assert_eq!(report[0]["missing"], serde_json::json!([]));
-    let html = String::from_utf8(bench.read("results/report.html")).unwrap();
+    let html = String::from_utf8(environment.read("results/report.html")).unwrap();
     assert!(html.contains("Positive control"));
 }
 
 #[test]
 fn one_scene_has_no_learned_detector_and_the_report_says_so() {
-    let bench = bench();
-    bench.exits(&SECURITY.replace(" two.ply", ""), 0);
-    let areas = areas(&bench);
+    let environment = environment();
+    environment.exits(&SECURITY.replace(" two.ply", ""), 0);
+    let areas = areas(&environment);
     assert_eq!(areas.len(), 10);
     assert!(areas.iter().all(|(name, _)| !name.ends_with("learned")));
-    let report: Value = serde_json::from_slice(&bench.read("results/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&environment.read("results/report.json")).unwrap();
     let missing = report[0]["missing"][0].as_str().unwrap();
     assert!(missing.contains("learned: not measured; it judges"), "{missing}");
 }
@@ -197,11 +200,11 @@ const TRADE: &str = "evaluate results --scenes one.ply two.ply --experiments tra
 
 #[test]
 fn variants_are_timed_once_and_plotted() {
-    let bench = bench();
-    bench.write("own.json", r#"[{"name": "one-step", "settings": {"steps": 1}}]"#);
-    bench.write("page.md", "<!-- BEGIN trade -->\n<!-- END trade -->\n");
-    bench.exits(&format!("{TRADE} --document page.md --plot trade.svg"), 0);
-    let marks: Vec<Value> = records(&bench)
+    let environment = environment();
+    environment.write("own.json", r#"[{"name": "one-step", "settings": {"steps": 1}}]"#);
+    environment.write("page.md", "<!-- BEGIN trade -->\n<!-- END trade -->\n");
+    environment.exits(&format!("{TRADE} --document page.md --plot trade.svg"), 0);
+    let marks: Vec<Value> = records(&environment)
         .into_iter()
         .map(|line| line["record"]["mark"].clone())
         .filter(|mark| !mark.is_null())
@@ -221,42 +224,42 @@ fn variants_are_timed_once_and_plotted() {
         assert_eq!(timing["run"], marks[0]["timing"]["run"]);
     }
     assert_eq!((&marks[4]["steps"], &marks[0]["steps"]), (&1.into(), &2.into()));
-    let page = String::from_utf8(bench.read("page.md")).unwrap();
+    let page = String::from_utf8(environment.read("page.md")).unwrap();
     for text in ["| one-step |", "times base", "On the front", "Timed from"] {
         assert!(page.contains(text), "{text}: {page}");
     }
-    let plot = String::from_utf8(bench.read("trade.svg")).unwrap();
+    let plot = String::from_utf8(environment.read("trade.svg")).unwrap();
     assert!(plot.starts_with("<svg") && plot.contains("prefers-color-scheme"));
     assert_eq!(plot.matches("<circle").count() - plot.matches("r=\"8\"").count(), 3);
 
     // Nothing is timed twice; what is new is.
-    let whole = bench.read("results/results.jsonl");
-    bench.exits(TRADE, 0);
-    assert_eq!(bench.read("results/results.jsonl"), whole);
+    let whole = environment.read("results/results.jsonl");
+    environment.exits(TRADE, 0);
+    assert_eq!(environment.read("results/results.jsonl"), whole);
     let own = r#"[{"name": "one-step", "settings": {"steps": 1}}, {"name": "new", "settings": {"steps": 1}}]"#;
-    bench.write("own.json", own);
-    bench.exits(&format!("{TRADE},new --document page.md"), 0);
-    assert_eq!(records(&bench).len(), 2 * (3 + 1) * 2);
-    let page = String::from_utf8(bench.read("page.md")).unwrap();
+    environment.write("own.json", own);
+    environment.exits(&format!("{TRADE},new --document page.md"), 0);
+    assert_eq!(records(&environment).len(), 2 * (3 + 1) * 2);
+    let page = String::from_utf8(environment.read("page.md")).unwrap();
     assert!(page.contains("| new |"), "{page}");
 }
 
 #[test]
 fn what_cannot_be_evaluated_is_refused() {
-    let bench = bench();
-    bench.refuses("evaluate results --device cpu", &["scenes", "at least one"]);
-    bench.refuses("evaluate results --scenes no.ply --device cpu --bits 16", &["no.ply"]);
-    bench.refuses(
+    let environment = environment();
+    environment.refuses("evaluate results --device cpu", &["scenes", "at least one"]);
+    environment.refuses("evaluate results --scenes no.ply --device cpu --bits 16", &["no.ply"]);
+    environment.refuses(
         "evaluate results --experiments magic --scenes one.ply",
         &["magic", "capacity"],
     );
     let trade = "evaluate results --experiments trade --device cpu --scenes one.ply";
-    bench.refuses(&format!("{trade} --only magic"), &["magic", "draft", "half-weights"]);
-    bench.refuses(&format!("{trade} --variants no.json"), &["no.json"]);
+    environment.refuses(&format!("{trade} --only magic"), &["magic", "draft", "half-weights"]);
+    environment.refuses(&format!("{trade} --variants no.json"), &["no.json"]);
     let plot = "evaluate results --scenes one.ply --device cpu --plot a.svg";
-    bench.refuses(plot, &["plot", "trade"]);
-    bench.refuses("evaluate results --report-only", &["results", "no folder"]);
-    std::fs::create_dir(bench.path("results")).unwrap();
-    bench.write("results/results.jsonl", "nonsense\n");
-    bench.refuses("evaluate results --report-only", &["results.jsonl", "line 1"]);
+    environment.refuses(plot, &["plot", "trade"]);
+    environment.refuses("evaluate results --report-only", &["results", "no folder"]);
+    std::fs::create_dir(environment.path("results")).unwrap();
+    environment.write("results/results.jsonl", "nonsense\n");
+    environment.refuses("evaluate results --report-only", &["results.jsonl", "line 1"]);
 }

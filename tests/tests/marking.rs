@@ -2,7 +2,7 @@
 //! a mark is read is not tested here, only that what is said about it is true.
 use std::sync::LazyLock;
 
-use guardsplat_tests::{Bench, shipped_clip};
+use guardsplat_tests::{TestEnvironment, shipped_clip};
 use serde_json::Value;
 
 /// A scene, a key of 32 bits, a hasty embedding of it, and the report on that. Made once for all tests.
@@ -20,15 +20,15 @@ const EMBED: &str = "embed in.ply out.ply --key k.key --message c0ffee42 --setti
     --device cpu --json";
 
 static MARKED: LazyLock<Marked> = LazyLock::new(|| {
-    let bench = Bench::new();
-    bench.write("hasty.json", SETTINGS);
-    bench.exits("sample in.ply --gaussians 1000 --sh-degree 1 --seed 9", 0);
-    let key = bench.json("key create --bits 32 --seed 5 -o k.key --device cpu --json", 0);
+    let environment = TestEnvironment::new();
+    environment.write("hasty.json", SETTINGS);
+    environment.exits("sample in.ply --gaussians 1000 --sh-degree 1 --seed 9", 0);
+    let key = environment.json("key create --bits 32 --seed 5 -o k.key --device cpu --json", 0);
     assert_eq!((&key["bits"], &key["device"]), (&32.into(), &"cpu".into()));
     assert!(key["bit_accuracy_unseen"].as_f64().unwrap() > 0.9, "{key}");
-    let report = bench.json(EMBED, 0);
+    let report = environment.json(EMBED, 0);
     // Only the bytes: a folder in a static would never be removed.
-    let files = ["in.ply", "k.key", "hasty.json", "out.ply"].map(|name| (name, bench.read(name)));
+    let files = ["in.ply", "k.key", "hasty.json", "out.ply"].map(|name| (name, environment.read(name)));
     Marked { files, report }
 });
 
@@ -38,12 +38,12 @@ fn marked(name: &str) -> &[u8] {
 }
 
 /// A folder with some of the files.
-fn bench_with(names: &[&str]) -> Bench {
-    let bench = Bench::new();
+fn environment_with(names: &[&str]) -> TestEnvironment {
+    let environment = TestEnvironment::new();
     for name in names {
-        bench.write(name, marked(name));
+        environment.write(name, marked(name));
     }
-    bench
+    environment
 }
 
 #[test]
@@ -71,10 +71,10 @@ fn the_report_of_an_embedding_has_every_field() {
 
 #[test]
 fn marking_changes_colours_only_and_is_reproducible() {
-    let bench = bench_with(&["in.ply", "k.key", "hasty.json"]);
-    bench.exits(EMBED, 0);
-    assert!(bench.read("out.ply") == marked("out.ply"));
-    let (before, after) = (bench.read("in.ply"), bench.read("out.ply"));
+    let environment = environment_with(&["in.ply", "k.key", "hasty.json"]);
+    environment.exits(EMBED, 0);
+    assert!(environment.read("out.ply") == marked("out.ply"));
+    let (before, after) = (environment.read("in.ply"), environment.read("out.ply"));
     assert_eq!(before.len(), after.len());
     // x y z and normals, then 3 + 9 colours, then opacity, scales and rotation, four bytes each.
     let row = 4 * (6 + 12 + 8);
@@ -91,10 +91,10 @@ fn marking_changes_colours_only_and_is_reproducible() {
 
 #[test]
 fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict() {
-    let bench = bench_with(&["out.ply", "k.key"]);
+    let environment = environment_with(&["out.ply", "k.key"]);
     let verify = "verify out.ply --key k.key --device cpu --views 3 --size 32 --json";
     // Without a message there is nothing to decide.
-    let reading = bench.json(verify, 3);
+    let reading = environment.json(verify, 3);
     assert_eq!(reading["verdict"], "inconclusive");
     assert!(
         reading["p_value"].is_null() && reading["reason"].is_string(),
@@ -102,7 +102,7 @@ fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict
     );
     let read = reading["message"].as_str().unwrap().to_owned();
 
-    let report = bench.json(&format!("{verify} --message {read}"), 0);
+    let report = environment.json(&format!("{verify} --message {read}"), 0);
     assert_eq!(report["verdict"], "match");
     assert_eq!((&report["matched_bits"], &report["bits"]), (&32.into(), &32.into()));
     assert_eq!(
@@ -127,7 +127,7 @@ fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict
     );
 
     let opposite = !u32::from_str_radix(&read, 16).unwrap();
-    let report = bench.json(&format!("{verify} --message {opposite:08x}"), 2);
+    let report = environment.json(&format!("{verify} --message {opposite:08x}"), 2);
     assert_eq!(
         (&report["verdict"], &report["matched_bits"]),
         (&"no_match".into(), &0.into())
@@ -136,47 +136,47 @@ fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict
 
 #[test]
 fn pictures_are_read_whatever_their_format() {
-    let bench = bench_with(&["out.ply", "k.key"]);
-    bench.exits("render out.ply views --views 2 --size 64 --device cpu", 0);
-    let picture = image::load_from_memory(&bench.read("views/view_000.png")).unwrap();
-    picture.save(bench.path("views/view_002.jpg")).unwrap();
-    picture.save(bench.path("views/view_003.webp")).unwrap();
-    let report = bench.json("verify views --key k.key --device cpu --json", 3);
+    let environment = environment_with(&["out.ply", "k.key"]);
+    environment.exits("render out.ply views --views 2 --size 64 --device cpu", 0);
+    let picture = image::load_from_memory(&environment.read("views/view_000.png")).unwrap();
+    picture.save(environment.path("views/view_002.jpg")).unwrap();
+    picture.save(environment.path("views/view_003.webp")).unwrap();
+    let report = environment.json("verify views --key k.key --device cpu --json", 3);
     assert_eq!(report["views"], 4);
-    let one = bench.json("verify views/view_000.png --key k.key --device cpu --json", 3);
+    let one = environment.json("verify views/view_000.png --key k.key --device cpu --json", 3);
     assert_eq!(one["views"], 1);
     // WebP is lossless here: the same picture, the same reading.
-    let same = bench.json("verify views/view_003.webp --key k.key --device cpu --json", 3);
+    let same = environment.json("verify views/view_003.webp --key k.key --device cpu --json", 3);
     assert_eq!(same["message"], one["message"]);
     assert_eq!(same["mean_abs_logit"], one["mean_abs_logit"]);
 }
 
 #[test]
 fn a_missed_target_exits_with_3_and_writes_nothing_unless_forced() {
-    let bench = bench_with(&["in.ply", "k.key"]);
-    bench.write("hasty.json", SETTINGS.replace("\"psnr_db\": 0", "\"psnr_db\": 200"));
-    let before = bench.contents();
-    let report = bench.json(EMBED, 3);
+    let environment = environment_with(&["in.ply", "k.key"]);
+    environment.write("hasty.json", SETTINGS.replace("\"psnr_db\": 0", "\"psnr_db\": 200"));
+    let before = environment.contents();
+    let report = environment.json(EMBED, 3);
     assert_eq!(report["written"], false);
     assert!(
         report["target_missed"][0].as_str().unwrap().contains("PSNR"),
         "{report}"
     );
-    assert!(bench.contents() == before);
-    let report = bench.json(&format!("{EMBED} --force --report pictures"), 3);
+    assert!(environment.contents() == before);
+    let report = environment.json(&format!("{EMBED} --force --report pictures"), 3);
     assert_eq!(report["written"], true);
-    assert!(bench.read("out.ply") == marked("out.ply"));
-    assert_eq!(bench.names("pictures"), ["comparison.png"]);
+    assert!(environment.read("out.ply") == marked("out.ply"));
+    assert_eq!(environment.names("pictures"), ["comparison.png"]);
 }
 
 #[test]
 fn what_does_not_fit_the_key_is_refused() {
-    let bench = bench_with(&["in.ply", "k.key"]);
-    bench.write("text.key", "not a key\n");
-    let key = bench.read("k.key");
-    bench.write("short.key", &key[..key.len() / 2]);
-    bench.write("bad.png", b"\x89PNG\r\n\x1a\nbut no more");
-    bench.write("text.jpg", "not a picture");
+    let environment = environment_with(&["in.ply", "k.key"]);
+    environment.write("text.key", "not a key\n");
+    let key = environment.read("k.key");
+    environment.write("short.key", &key[..key.len() / 2]);
+    environment.write("bad.png", b"\x89PNG\r\n\x1a\nbut no more");
+    environment.write("text.jpg", "not a picture");
     let embed = |rest: &str| format!("embed in.ply out.ply --device cpu {rest}");
     let verify = |rest: &str| format!("verify --device cpu {rest}");
     for (line, needles) in [
@@ -238,15 +238,15 @@ fn what_does_not_fit_the_key_is_refused() {
             &["tpu", "auto, wgpu or cpu"],
         ),
     ] {
-        bench.refuses(&line, needles);
+        environment.refuses(&line, needles);
     }
 }
 
 #[test]
 fn a_key_belongs_to_one_clip() {
-    let mut bench = bench_with(&["in.ply", "k.key"]);
+    let mut environment = environment_with(&["in.ply", "k.key"]);
     // The same CLIP but for the last bit of one of its weights.
-    std::fs::create_dir(bench.path("clip")).unwrap();
+    std::fs::create_dir(environment.path("clip")).unwrap();
     for entry in std::fs::read_dir(shipped_clip()).unwrap() {
         let path = entry.unwrap().path();
         if !path.is_file() {
@@ -257,12 +257,12 @@ fn a_key_belongs_to_one_clip() {
             let last = bytes.len() - 2;
             bytes[last] ^= 1;
         }
-        std::fs::write(bench.path("clip").join(path.file_name().unwrap()), bytes).unwrap();
+        std::fs::write(environment.path("clip").join(path.file_name().unwrap()), bytes).unwrap();
     }
-    bench.set("GUARDSPLAT_CLIP", bench.path("clip"));
+    environment.set("GUARDSPLAT_CLIP", environment.path("clip"));
     let needles = &["key k.key", "belongs to the CLIP"];
-    bench.refuses("verify in.ply --key k.key --message c0ffee42 --device cpu", needles);
-    bench.refuses(
+    environment.refuses("verify in.ply --key k.key --message c0ffee42 --device cpu", needles);
+    environment.refuses(
         "embed in.ply out.ply --key k.key --message c0ffee42 --device cpu",
         needles,
     );
@@ -271,14 +271,14 @@ fn a_key_belongs_to_one_clip() {
 #[test]
 #[cfg(unix)]
 fn a_full_disk_is_known_before_the_work() {
-    let bench = bench_with(&["in.ply", "k.key", "hasty.json"]);
-    bench.write("out.ply", "an older result");
-    let before = bench.contents();
-    let output = bench.run_on_a_full_disk(64, EMBED);
-    guardsplat_tests::bench::check_refusal(EMBED, &output, &["out.ply", "File too large"]);
+    let environment = environment_with(&["in.ply", "k.key", "hasty.json"]);
+    environment.write("out.ply", "an older result");
+    let before = environment.contents();
+    let output = environment.run_on_a_full_disk(64, EMBED);
+    guardsplat_tests::environment::check_refusal(EMBED, &output, &["out.ply", "File too large"]);
     assert!(
         !String::from_utf8_lossy(&output.stderr).contains("embedding "),
         "steps were taken"
     );
-    assert!(bench.contents() == before);
+    assert!(environment.contents() == before);
 }

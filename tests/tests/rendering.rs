@@ -1,5 +1,5 @@
 //! `sample` and `render`: what they write, and that they write the same again.
-use guardsplat_tests::{Bench, real_scene};
+use guardsplat_tests::{TestEnvironment, real_scene};
 
 fn size_of(bytes: &[u8]) -> (u32, u32) {
     let picture = image::load_from_memory(bytes).unwrap();
@@ -8,13 +8,13 @@ fn size_of(bytes: &[u8]) -> (u32, u32) {
 
 #[test]
 fn samples_are_reproducible_and_as_asked_for() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     for (name, seed) in [("a.ply", 4), ("b.ply", 4), ("c.ply", 5)] {
-        bench.exits(&format!("sample {name} --gaussians 700 --sh-degree 2 --seed {seed}"), 0);
+        environment.exits(&format!("sample {name} --gaussians 700 --sh-degree 2 --seed {seed}"), 0);
     }
-    assert!(bench.read("a.ply") == bench.read("b.ply"));
-    assert!(bench.read("a.ply") != bench.read("c.ply"));
-    let scene = bench.read("a.ply");
+    assert!(environment.read("a.ply") == environment.read("b.ply"));
+    assert!(environment.read("a.ply") != environment.read("c.ply"));
+    let scene = environment.read("a.ply");
     let end = b"end_header\n";
     let at = scene.windows(end.len()).position(|w| w == end).unwrap();
     let header = std::str::from_utf8(&scene[..at]).unwrap();
@@ -26,34 +26,34 @@ fn samples_are_reproducible_and_as_asked_for() {
 
 #[test]
 fn views_come_with_their_cameras_and_are_reproducible() {
-    let bench = Bench::new();
-    bench.exits("sample s.ply --gaussians 2000 --seed 1", 0);
+    let environment = TestEnvironment::new();
+    environment.exits("sample s.ply --gaussians 2000 --seed 1", 0);
     for (folder, seed) in [("a", 2), ("b", 2), ("c", 3)] {
-        bench.exits(
+        environment.exits(
             &format!("render s.ply {folder} --views 3 --size 48 --seed {seed} --device cpu"),
             0,
         );
     }
     let names = ["cameras.json", "view_000.png", "view_001.png", "view_002.png"];
-    assert_eq!(bench.names("a"), names);
+    assert_eq!(environment.names("a"), names);
     for name in names {
         assert!(
-            bench.read(&format!("a/{name}")) == bench.read(&format!("b/{name}")),
+            environment.read(&format!("a/{name}")) == environment.read(&format!("b/{name}")),
             "{name}"
         );
         assert!(
-            bench.read(&format!("a/{name}")) != bench.read(&format!("c/{name}")),
+            environment.read(&format!("a/{name}")) != environment.read(&format!("c/{name}")),
             "{name}"
         );
     }
-    let picture = bench.read("a/view_000.png");
+    let picture = environment.read("a/view_000.png");
     assert_eq!(size_of(&picture), (48, 48));
     // Something is seen, and not everywhere: white is the background.
     let pixels = image::load_from_memory(&picture).unwrap().to_rgb8();
     let white = pixels.pixels().filter(|p| p.0 == [255; 3]).count();
     assert!((100..48 * 48 - 100).contains(&white), "{white} white pixels");
 
-    let cameras: serde_json::Value = serde_json::from_slice(&bench.read("a/cameras.json")).unwrap();
+    let cameras: serde_json::Value = serde_json::from_slice(&environment.read("a/cameras.json")).unwrap();
     assert_eq!(cameras.as_array().unwrap().len(), 3);
     for field in ["position", "rotation", "width", "height", "fx", "fy"] {
         assert!(!cameras[0][field].is_null(), "{field}: {cameras}");
@@ -62,46 +62,46 @@ fn views_come_with_their_cameras_and_are_reproducible() {
 
 #[test]
 fn cameras_from_a_file_see_the_same() {
-    let bench = Bench::new();
-    bench.exits("sample s.ply --gaussians 2000 --seed 1", 0);
-    bench.exits("render s.ply a --views 3 --size 48 --device cpu", 0);
-    bench.exits("render s.ply b --cameras a/cameras.json --device cpu", 0);
-    assert_eq!(bench.names("b"), bench.names("a"));
+    let environment = TestEnvironment::new();
+    environment.exits("sample s.ply --gaussians 2000 --seed 1", 0);
+    environment.exits("render s.ply a --views 3 --size 48 --device cpu", 0);
+    environment.exits("render s.ply b --cameras a/cameras.json --device cpu", 0);
+    assert_eq!(environment.names("b"), environment.names("a"));
     for view in 0..3 {
         let [a, b] = ["a", "b"].map(|folder| {
-            let bytes = bench.read(&format!("{folder}/view_{view:03}.png"));
+            let bytes = environment.read(&format!("{folder}/view_{view:03}.png"));
             image::load_from_memory(&bytes).unwrap().to_rgb8().into_raw()
         });
         // Poses are inverted twice on the way, so a value may fall to the other side of a rounding.
         let worst = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(worst <= Some(2), "view {view}: {worst:?}");
     }
-    bench.exits(
+    environment.exits(
         "render s.ply few --cameras a/cameras.json --views 1 --size 24 --format exr --background black --device cpu",
         0,
     );
-    assert_eq!(bench.names("few"), ["cameras.json", "view_000.exr"]);
+    assert_eq!(environment.names("few"), ["cameras.json", "view_000.exr"]);
 
     // NeRF's transforms.json: the camera's axes are OpenGL's, sizes are in the file.
-    bench.write(
+    environment.write(
         "transforms.json",
         r#"{"camera_angle_x": 0.8, "w": 40, "h": 30, "frames": [{"file_path": "x",
             "transform_matrix": [[1,0,0,0],[0,-1,0,0],[0,0,-1,-6],[0,0,0,1]]}]}"#,
     );
-    bench.exits("render s.ply nerf --cameras transforms.json --device cpu", 0);
-    assert_eq!(size_of(&bench.read("nerf/view_000.png")), (40, 30));
+    environment.exits("render s.ply nerf --cameras transforms.json --device cpu", 0);
+    assert_eq!(size_of(&environment.read("nerf/view_000.png")), (40, 30));
 }
 
 #[test]
 fn real_scenes_are_rendered() {
     for (name, degree) in [("pod.ply", 3), ("donut.ply", 0)] {
         let Some(scene) = real_scene(name) else { return };
-        let bench = Bench::new();
+        let environment = TestEnvironment::new();
         let scene = scene.display();
-        bench.exits(&format!("render {scene} views --views 2 --size 96 --device cpu"), 0);
-        assert_eq!(bench.names("views").len(), 3, "{name} of degree {degree}");
+        environment.exits(&format!("render {scene} views --views 2 --size 96 --device cpu"), 0);
+        assert_eq!(environment.names("views").len(), 3, "{name} of degree {degree}");
         for view in ["views/view_000.png", "views/view_001.png"] {
-            let pixels = image::load_from_memory(&bench.read(view)).unwrap().to_rgb8();
+            let pixels = image::load_from_memory(&environment.read(view)).unwrap().to_rgb8();
             let seen = pixels.pixels().filter(|p| p.0 != [255; 3]).count();
             assert!(seen > 96 * 96 / 10, "{name}: {seen} pixels of {view} show anything");
         }
@@ -110,11 +110,11 @@ fn real_scenes_are_rendered() {
 
 #[test]
 fn options_and_camera_files_that_make_no_sense_are_refused() {
-    let bench = Bench::new();
-    bench.exits("sample s.ply --gaussians 50 --sh-degree 0", 0);
-    bench.write("text.json", "no cameras\n");
-    bench.write("none.json", "[]");
-    bench.write(
+    let environment = TestEnvironment::new();
+    environment.exits("sample s.ply --gaussians 50 --sh-degree 0", 0);
+    environment.write("text.json", "no cameras\n");
+    environment.write("none.json", "[]");
+    environment.write(
         "flat.json",
         r#"[{"id": 0, "img_name": "a", "width": 0, "height": 9, "position": [0,0,0],
             "rotation": [[1,0,0],[0,1,0],[0,0,1]], "fx": 9, "fy": 9}]"#,
@@ -142,20 +142,20 @@ fn options_and_camera_files_that_make_no_sense_are_refused() {
         ("sample t.ply --sh-degree 5", &["--sh-degree", "4"]),
         ("sample no/t.ply", &["no/t.ply"]),
     ] {
-        bench.refuses(line, needles);
+        environment.refuses(line, needles);
     }
 }
 
 #[test]
 #[cfg(unix)]
 fn a_full_disk_leaves_the_older_file_as_it_was() {
-    let bench = Bench::new();
-    bench.write("s.ply", "an older scene");
-    let before = bench.contents();
+    let environment = TestEnvironment::new();
+    environment.write("s.ply", "an older scene");
+    let before = environment.contents();
     let line = "sample s.ply --gaussians 2000";
-    let output = bench.run_on_a_full_disk(64, line);
-    guardsplat_tests::bench::check_refusal(line, &output, &["s.ply", "File too large"]);
-    assert!(bench.contents() == before);
+    let output = environment.run_on_a_full_disk(64, line);
+    guardsplat_tests::environment::check_refusal(line, &output, &["s.ply", "File too large"]);
+    assert!(environment.contents() == before);
     // It is the limit that made it fail.
-    bench.exits(line, 0);
+    environment.exits(line, 0);
 }

@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::names;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::ArtifactReport;
+use crate::resource_names;
 use crate::transfer::{Source, download, upload};
 
 /// The commands on artifacts.
@@ -63,7 +63,7 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
             }
         }
         Command::Get { artifact, output } => {
-            let artifact = download(context, &names::artifact(artifact)?, output).await?;
+            let artifact = download(context, &resource_names::artifact(artifact)?, output).await?;
             context.console.clear();
             if context.json {
                 print_json(&Fetched {
@@ -75,7 +75,7 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
             }
         }
         Command::Delete { artifact } => {
-            let name = names::artifact(artifact)?;
+            let name = resource_names::artifact(artifact)?;
             let request = DeleteArtifactRequest { name: name.clone() };
             let sent = context.once("deleting the artifact", request, async |channel, request| {
                 ArtifactServiceClient::new(channel).delete_artifact(request).await

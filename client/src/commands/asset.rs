@@ -8,17 +8,16 @@ use guardsplat_proto::v1::{Asset, CreateAssetRequest, GetAssetRequest, ListAsset
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::{key, owner, suspects};
-use crate::arguments::LONGEST_NAME;
+use super::{key, owner};
 use crate::context::Context;
 use crate::error::Result;
-use crate::names;
+use crate::inputs;
+use crate::options::LONGEST_NAME;
 use crate::output::{Exit, print_json, print_line, printable};
+use crate::pages;
 use crate::report::AssetReport;
+use crate::resource_names;
 use crate::transfer::Source;
-
-/// Assets asked for at a time.
-const PAGE: u32 = 1000;
 
 /// The commands on assets.
 #[derive(Subcommand)]
@@ -85,7 +84,7 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
         Command::List(arguments) => list(context, arguments).await?,
         Command::Show { asset } => {
             let request = GetAssetRequest {
-                name: names::asset(asset)?,
+                name: resource_names::asset(asset)?,
             };
             let sent = context.call("reading the asset", request, async |channel, request| {
                 RegistryServiceClient::new(channel).get_asset(request).await
@@ -98,9 +97,9 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
 }
 
 async fn create(context: &Context, arguments: &Create) -> Result<Asset> {
-    let (original, title) = match suspects::Input::scene(&arguments.original) {
-        suspects::Input::Artifact(name) => (Original::Artifact(name), String::new()),
-        suspects::Input::File(path) => hashed(path).await?,
+    let (original, title) = match inputs::Input::scene(&arguments.original) {
+        inputs::Input::Artifact(name) => (Original::Artifact(name), String::new()),
+        inputs::Input::File(path) => hashed(path).await?,
     };
     let owner = owner::find(context, &arguments.owner).await?.name;
     let key = key::find(context, &arguments.key).await?.name;
@@ -136,13 +135,9 @@ async fn list(context: &Context, arguments: &List) -> Result<()> {
         Some(key) => key::find(context, key).await?.name,
         None => String::new(),
     };
-    let limit = arguments.limit as usize;
-    let mut assets = Vec::new();
-    let mut page_token = String::new();
-    let more = loop {
+    let listed = pages::up_to(arguments.limit as usize, async |page_size, page_token| {
         let request = ListAssetsRequest {
-            // Every page of a list is asked for in the same way.
-            page_size: i32::try_from(arguments.limit.min(PAGE)).unwrap_or(i32::MAX),
+            page_size,
             page_token,
             owner: owner.clone(),
             key: key.clone(),
@@ -151,13 +146,9 @@ async fn list(context: &Context, arguments: &List) -> Result<()> {
             RegistryServiceClient::new(channel).list_assets(request).await
         });
         let page = sent.await?;
-        assets.extend(page.assets);
-        page_token = page.next_page_token;
-        if page_token.is_empty() || assets.len() >= limit {
-            break assets.len() > limit || !page_token.is_empty();
-        }
-    };
-    assets.truncate(limit);
+        Ok((page.assets, page.next_page_token))
+    });
+    let (assets, more) = listed.await?;
     if context.json {
         print_json(&Listed {
             assets: assets.iter().map(Into::into).collect(),

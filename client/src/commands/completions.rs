@@ -1,5 +1,5 @@
 //! `completions`.
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
 use crate::output::Exit;
@@ -12,15 +12,10 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script.
-pub fn run(arguments: &Arguments) -> Exit {
+/// Prints the script for the whole command line.
+pub fn run(arguments: &Arguments, command_line: &mut clap::Command) -> Exit {
     let mut script = Vec::new();
-    clap_complete::generate(
-        arguments.shell,
-        &mut crate::arguments::Arguments::command(),
-        "guardsplat",
-        &mut script,
-    );
+    clap_complete::generate(arguments.shell, command_line, "guardsplat", &mut script);
     // That nobody listens any more is no error.
     let _ = std::io::Write::write_all(&mut std::io::stdout(), &script);
     Exit::Done

@@ -7,17 +7,18 @@ use guardsplat_proto::v1::{EmbedSpec, Job, Key, embed_spec};
 use guardsplat_scene::Format;
 use serde::Serialize;
 
-use super::{key, suspects};
-use crate::arguments::Submission;
+use super::key;
 use crate::context::Context;
-use crate::create::{create_with, leave, missed_target, no_result, succeeded, wait};
 use crate::distortion::{self, Distortion};
 use crate::error::{Error, Result};
-use crate::interrupt::Stage;
-use crate::kind::Kind;
-use crate::names;
+use crate::file_kind::FileKind;
+use crate::inputs;
+use crate::job::create::{create_with, leave, missed_target, no_result, succeeded, wait};
+use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
+use crate::resource_names;
+use crate::stage::Stage;
 use crate::transfer::{Destination, download};
 
 /// How much work is spent.
@@ -125,15 +126,15 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
             Destination::check(path)?;
         }
     }
-    let input = suspects::Input::scene(&arguments.input);
-    if let suspects::Input::File(path) = &input {
+    let input = inputs::Input::scene(&arguments.input);
+    if let inputs::Input::File(path) = &input {
         check_format(path, arguments.output.as_deref())?;
     }
     let key = key::find(context, &arguments.key).await?;
-    let asset = arguments.asset.as_deref().map(names::asset).transpose()?;
+    let asset = arguments.asset.as_deref().map(resource_names::asset).transpose()?;
     let message = arguments.message.as_deref().map(|given| key::message(&key, given));
     let message = message.transpose()?;
-    let inputs = suspects::send(context, &[input]).await?;
+    let inputs = inputs::send(context, &[input]).await?;
     let spec = spec(
         arguments,
         &key,
@@ -155,7 +156,7 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
 
 /// Whether the file is a scene, and what comes of it may be called so.
 fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
-    let Kind::Scene(format) = Kind::of(input)? else {
+    let FileKind::Scene(format) = FileKind::of(input)? else {
         return Err(Error::io(input)(std::io::Error::other("a picture, and no scene")));
     };
     let suits = output.map_or(Ok(()), |output| format.check_name(output));
@@ -165,7 +166,7 @@ fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
     })
 }
 
-fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs: &suspects::Inputs) -> Spec {
+fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs: &inputs::Inputs) -> Spec {
     let mut spec = EmbedSpec {
         // One input was given, and one name came back.
         scene: inputs.names.first().cloned().unwrap_or_default(),

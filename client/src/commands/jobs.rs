@@ -1,23 +1,21 @@
-//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `dead`.
+//! `jobs list`, `jobs get`, `jobs watch` and `jobs cancel`; those for jobs that failed are in `failed_jobs`.
 use clap::{Args, Subcommand, ValueEnum};
 use guardsplat_proto::v1::job::{Result as Outcome, State};
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
-use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job, ListJobsRequest};
+use guardsplat_proto::v1::{CancelJobRequest, GetJobRequest, Job};
 use serde::Serialize;
 
-use super::dead;
+use super::failed_jobs;
+use super::job_list::{line, print_list, read, tell};
 use crate::context::Context;
-use crate::create::{missed_target, no_result, succeeded};
 use crate::error::{Error, Result};
-use crate::interrupt::Stage;
-use crate::names;
-use crate::output::{Exit, print_json, print_json_line, print_line, printable, say};
-use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport, kind, word};
-use crate::show::Show;
-use crate::watch::watch;
-
-/// Jobs asked for at a time.
-const PAGE: u32 = 1000;
+use crate::job::create::{missed_target, no_result, succeeded};
+use crate::job::progress::ProgressView;
+use crate::job::watch::watch;
+use crate::output::{Exit, print_json_line, print_line, printable, say};
+use crate::report::{EmbedReport, JobReport, KeyResultReport, VerifyReport};
+use crate::resource_names;
+use crate::stage::Stage;
 
 /// The commands on jobs.
 #[derive(Subcommand)]
@@ -43,7 +41,7 @@ pub enum Command {
         job: String,
     },
     /// Jobs that failed, newest first, with what went wrong
-    Dead(dead::Dead),
+    Dead(failed_jobs::FailedJobs),
     /// The attempts of a job, newest first: when, by which worker, and how each ended
     Attempts {
         /// jobs/ID, or the id alone
@@ -90,13 +88,6 @@ impl From<StateName> for State {
 }
 
 #[derive(Serialize)]
-struct Listed {
-    jobs: Vec<JobReport>,
-    /// Whether there are more than were asked for.
-    more: bool,
-}
-
-#[derive(Serialize)]
 struct Watched<'a> {
     cursor: &'a str,
     job: JobReport,
@@ -107,84 +98,37 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
     match command {
         Command::List(arguments) => list(context, arguments).await,
         Command::Get { job } => {
-            let request = GetJobRequest { name: names::job(job)? };
+            let request = GetJobRequest {
+                name: resource_names::job(job)?,
+            };
             let sent = context.call("reading the job", request, async |channel, request| {
                 JobServiceClient::new(channel).get_job(request).await
             });
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
-        Command::Watch { job, cursor } => follow(context, names::job(job)?, cursor.clone()).await,
+        Command::Watch { job, cursor } => follow(context, resource_names::job(job)?, cursor.clone()).await,
         Command::Cancel { job } => {
-            let request = CancelJobRequest { name: names::job(job)? };
+            let request = CancelJobRequest {
+                name: resource_names::job(job)?,
+            };
             let sent = context.once("cancelling the job", request, async |channel, request| {
                 JobServiceClient::new(channel).cancel_job(request).await
             });
             tell(context, &sent.await?);
             Ok(Exit::Done)
         }
-        Command::Dead(arguments) => dead::list(context, arguments).await,
-        Command::Attempts { job } => dead::attempts(context, names::job(job)?).await,
-        Command::Requeue { job } => dead::requeue(context, names::job(job)?).await,
+        Command::Dead(arguments) => failed_jobs::list(context, arguments).await,
+        Command::Attempts { job } => failed_jobs::attempts(context, resource_names::job(job)?).await,
+        Command::Requeue { job } => failed_jobs::requeue(context, resource_names::job(job)?).await,
     }
 }
 
 async fn list(context: &Context, arguments: &List) -> Result<Exit> {
     let states: Vec<i32> = arguments.state.iter().map(|&name| State::from(name).into()).collect();
-    let (jobs, more) = pages(context, states, Vec::new(), arguments.limit).await?;
+    let (jobs, more) = read(context, states, Vec::new(), arguments.limit).await?;
     print_list(context, &jobs, more, line);
     Ok(Exit::Done)
-}
-
-/// Jobs of all pages, at most so many, and whether there are more.
-pub(super) async fn pages(
-    context: &Context,
-    states: Vec<i32>,
-    reasons: Vec<i32>,
-    most: u32,
-) -> Result<(Vec<Job>, bool)> {
-    let limit = most as usize;
-    let mut jobs = Vec::new();
-    let mut page_token = String::new();
-    let more = loop {
-        let request = ListJobsRequest {
-            // Every page of a list is asked for in the same way.
-            page_size: i32::try_from(most.min(PAGE)).unwrap_or(i32::MAX),
-            page_token,
-            states: states.clone(),
-            reasons: reasons.clone(),
-        };
-        let sent = context.call("listing jobs", request, async |channel, request| {
-            JobServiceClient::new(channel).list_jobs(request).await
-        });
-        let page = sent.await?;
-        jobs.extend(page.jobs);
-        page_token = page.next_page_token;
-        if page_token.is_empty() || jobs.len() >= limit {
-            break jobs.len() > limit || !page_token.is_empty();
-        }
-    };
-    jobs.truncate(limit);
-    Ok((jobs, more))
-}
-
-/// Tells of jobs.
-pub(super) fn print_list(context: &Context, jobs: &[Job], more: bool, text: impl Fn(&Job) -> String) {
-    if context.json {
-        print_json(&Listed {
-            jobs: jobs.iter().map(Into::into).collect(),
-            more,
-        });
-        return;
-    }
-    for job in jobs {
-        print_line(&text(job));
-    }
-    if jobs.is_empty() {
-        context.console.say("no jobs");
-    } else if more {
-        context.console.say("there are more; --limit shows them");
-    }
 }
 
 async fn follow(context: &Context, name: String, cursor: Option<String>) -> Result<Exit> {
@@ -192,7 +136,7 @@ async fn follow(context: &Context, name: String, cursor: Option<String>) -> Resu
         job: name.clone(),
         cancel: false,
     });
-    let mut show = Show::default();
+    let mut show = ProgressView::default();
     let over = watch(context, &name, cursor.unwrap_or_default(), |job, cursor| {
         show.job(&context.console, job);
         if context.json {
@@ -242,51 +186,4 @@ fn outcome(context: &Context, job: Job) -> Result<Exit> {
         print_line(&text);
     }
     Ok(exit)
-}
-
-/// Tells of a job.
-pub(super) fn tell(context: &Context, job: &Job) {
-    if context.json {
-        print_json(&JobReport::from(job));
-        return;
-    }
-    print_line(&line(job));
-    if let Some(priority) = job.priority {
-        print_line(&format!("priority: {priority}"));
-    }
-    if let Some(position) = job.queue_position {
-        print_line(&format!("jobs before it: {position}"));
-    }
-    if !job.waiting_reason.is_empty() {
-        print_line(&format!("it waits: {}", printable(&job.waiting_reason)));
-    }
-    if job.cancel_requested && job.state() == State::Running {
-        print_line("its end was asked for");
-    }
-    if let Some(failure) = &job.failure {
-        let reason = word(failure.reason().as_str_name(), "REASON_");
-        print_line(&format!("failure: {} ({reason})", printable(&failure.message)));
-    }
-    match &job.result {
-        Some(Outcome::EmbedResult(result)) => {
-            print_line(&EmbedReport::from(result).line());
-            print_line(&format!("scene:      {}", result.scene));
-            print_line(&format!("comparison: {}", result.comparison));
-        }
-        Some(Outcome::VerifyResult(result)) => print_line(&VerifyReport::from(result).lines()),
-        Some(Outcome::KeyResult(result)) => print_line(&KeyResultReport::from(result).line()),
-        None => {}
-    }
-}
-
-/// A job on one line.
-pub(super) fn line(job: &Job) -> String {
-    let created = job.create_time.map(|time| time.to_string()).unwrap_or_default();
-    format!(
-        "{}  {:9}  {:10}  {created}  {}",
-        job.name,
-        word(job.state().as_str_name(), "STATE_"),
-        kind(job).unwrap_or("unknown"),
-        printable(&job.display_name)
-    )
 }

@@ -5,16 +5,14 @@ use guardsplat_proto::v1::key_service_client::KeyServiceClient;
 use guardsplat_proto::v1::{GetKeyRequest, Key, KeySpec, ListKeysRequest};
 use serde::Serialize;
 
-use crate::arguments::Submission;
 use crate::context::Context;
-use crate::create::{create, leave, no_result, succeeded, wait};
 use crate::error::{Error, Result};
-use crate::names;
+use crate::job::create::{create, leave, no_result, succeeded, wait};
+use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line, printable};
+use crate::pages;
 use crate::report::{KeyReport, KeyResultReport};
-
-/// Keys asked for at a time.
-const PAGE: i32 = 1000;
+use crate::resource_names;
 
 /// The commands on keys.
 #[derive(Subcommand)]
@@ -121,7 +119,7 @@ async fn list(context: &Context) -> Result<Exit> {
 
 /// The key that `text` means: its name, its id, or a display name that only one key has.
 pub async fn find(context: &Context, text: &str) -> Result<Key> {
-    if let Some(name) = names::key(text) {
+    if let Some(name) = resource_names::key(text) {
         return get(context, name).await;
     }
     let mut found = all(context).await?;
@@ -168,23 +166,15 @@ async fn get(context: &Context, name: String) -> Result<Key> {
 }
 
 async fn all(context: &Context) -> Result<Vec<Key>> {
-    let mut keys = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = ListKeysRequest {
-            page_size: PAGE,
-            page_token,
-        };
+    pages::all(async |page_size, page_token| {
+        let request = ListKeysRequest { page_size, page_token };
         let sent = context.call("listing keys", request, async |channel, request| {
             KeyServiceClient::new(channel).list_keys(request).await
         });
         let page = sent.await?;
-        keys.extend(page.keys);
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            return Ok(keys);
-        }
-    }
+        Ok((page.keys, page.next_page_token))
+    })
+    .await
 }
 
 #[cfg(test)]

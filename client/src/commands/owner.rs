@@ -7,12 +7,10 @@ use uuid::Uuid;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_json, print_line, printable};
+use crate::pages;
 use crate::report::OwnerReport;
-
-/// Owners asked for at a time.
-const PAGE: i32 = 1000;
+use crate::resource_names;
 
 /// The commands on owners.
 #[derive(Subcommand)]
@@ -93,7 +91,7 @@ async fn create(context: &Context, display_name: &str) -> Result<Owner> {
 
 /// The owner that `text` means: its name, its id, or a display name that only one owner has.
 pub async fn find(context: &Context, text: &str) -> Result<Owner> {
-    if let Some(name) = names::owner(text) {
+    if let Some(name) = resource_names::owner(text) {
         let sent = context.call(
             "reading the owner",
             GetOwnerRequest { name },
@@ -117,21 +115,13 @@ pub async fn find(context: &Context, text: &str) -> Result<Owner> {
 }
 
 async fn all(context: &Context) -> Result<Vec<Owner>> {
-    let mut owners = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = ListOwnersRequest {
-            page_size: PAGE,
-            page_token,
-        };
+    pages::all(async |page_size, page_token| {
+        let request = ListOwnersRequest { page_size, page_token };
         let sent = context.call("listing owners", request, async |channel, request| {
             RegistryServiceClient::new(channel).list_owners(request).await
         });
         let page = sent.await?;
-        owners.extend(page.owners);
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            return Ok(owners);
-        }
-    }
+        Ok((page.owners, page.next_page_token))
+    })
+    .await
 }

@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_json, print_line, printable};
+use crate::resource_names;
 use crate::transfer::download;
 
 /// Bytes of a key's file; PEM takes 113.
@@ -74,7 +74,7 @@ struct Finding {
 /// Carries out one of them.
 pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
     match command {
-        Command::Open { job, output } => open(context, names::job(job)?, output).await,
+        Command::Open { job, output } => open(context, resource_names::job(job)?, output).await,
         Command::Check { file, public_key } => {
             let document = read(file, HTML_BYTES as u64)?;
             let key = match public_key {

@@ -7,15 +7,13 @@ use guardsplat_proto::v1::token_service_client::TokenServiceClient;
 use guardsplat_proto::v1::{CreateTokenRequest, ListTokensRequest, RevokeTokenRequest, Token};
 use serde::Serialize;
 
-use crate::arguments::display_name;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
+use crate::options::display_name;
 use crate::output::{Exit, print_json, print_line};
+use crate::pages;
 use crate::report::TokenReport;
-
-/// Tokens asked for at a time.
-const PAGE: i32 = 1000;
+use crate::resource_names;
 
 /// The commands on tokens; a token with the scope admin is needed for them.
 #[derive(Subcommand)]
@@ -119,23 +117,16 @@ async fn create(context: &Context, arguments: &Create) -> Result<Exit> {
 }
 
 async fn list(context: &Context) -> Result<Exit> {
-    let mut tokens: Vec<TokenReport> = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = ListTokensRequest {
-            page_size: PAGE,
-            page_token,
-        };
+    let tokens = pages::all(async |page_size, page_token| {
+        let request = ListTokensRequest { page_size, page_token };
         let sent = context.call("listing tokens", request, async |channel, request| {
             TokenServiceClient::new(channel).list_tokens(request).await
         });
         let page = sent.await?;
-        tokens.extend(page.tokens.iter().map(TokenReport::from));
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            break;
-        }
-    }
+        Ok((page.tokens, page.next_page_token))
+    })
+    .await?;
+    let tokens: Vec<_> = tokens.iter().map(TokenReport::from).collect();
     if context.json {
         print_json(&Listed { tokens });
         return Ok(Exit::Done);
@@ -153,7 +144,7 @@ async fn list(context: &Context) -> Result<Exit> {
 
 async fn revoke(context: &Context, token: &str) -> Result<Exit> {
     let request = RevokeTokenRequest {
-        name: names::token(token)?,
+        name: resource_names::token(token)?,
     };
     let sent = context.call("revoking the token", request, async |channel, request| {
         TokenServiceClient::new(channel).revoke_token(request).await

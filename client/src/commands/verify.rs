@@ -4,14 +4,15 @@ use guardsplat_proto::v1::VerifySpec;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use serde::Serialize;
 
-use super::{key, owner, suspects};
-use crate::arguments::Submission;
+use super::{key, owner};
 use crate::context::Context;
-use crate::create::{create_with, leave, no_result, succeeded, wait};
 use crate::error::Result;
-use crate::names;
+use crate::inputs;
+use crate::job::create::{create_with, leave, no_result, succeeded, wait};
+use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::VerifyReport;
+use crate::resource_names;
 
 /// Arguments of `verify`.
 #[derive(Args)]
@@ -69,17 +70,17 @@ struct Report<'a> {
 
 /// Reads a suspect.
 pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
-    let found = suspects::find(&arguments.paths)?;
+    let found = inputs::find(&arguments.paths)?;
     let key = key::find(context, &arguments.key).await?;
     let claim = &arguments.claim;
     let message = claim.message.as_deref().map(|given| key::message(&key, given));
     let message = message.transpose()?;
-    let asset = claim.asset.as_deref().map(names::asset).transpose()?;
+    let asset = claim.asset.as_deref().map(resource_names::asset).transpose()?;
     let owner = match &claim.owner {
         Some(given) => owner::find(context, given).await?.name,
         None => String::new(),
     };
-    let inputs = suspects::send(context, &found).await?;
+    let inputs = inputs::send(context, &found).await?;
     let spec = Spec::Verify(VerifySpec {
         suspects: inputs.names.clone(),
         key: key.name.clone(),

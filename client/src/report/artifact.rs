@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::Artifact;
 use serde::Serialize;
 
-use super::{some, time};
+use super::text::{some, time};
 
 /// What is known of an artifact.
 #[derive(Debug, Serialize)]

@@ -3,7 +3,8 @@ use guardsplat_proto::v1::JobAttempt;
 use guardsplat_proto::v1::job_attempt::Outcome;
 use serde::Serialize;
 
-use super::{FailureReport, time, word};
+use super::job::FailureReport;
+use super::text::{time, word};
 
 /// One time that a worker was given a job.
 #[derive(Debug, Serialize)]

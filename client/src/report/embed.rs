@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 use serde::Serialize;
 
-use super::{rows_ignored, seconds, some};
+use super::text::{rows_ignored, seconds, some};
 use crate::output::printable;
 
 /// What came of a job that marked a scene.

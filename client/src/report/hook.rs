@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::{Delivery, Hook};
 use serde::Serialize;
 
-use super::{some, time, word};
+use super::text::{some, time, word};
 use crate::output::printable;
 
 /// What is known of a hook.

@@ -3,7 +3,10 @@ use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use guardsplat_proto::v1::{EmbedSpec, Failure, Job, KeySpec, Progress, VerifySpec};
 use serde::Serialize;
 
-use super::{EmbedReport, KeyResultReport, VerifyReport, some, time, word};
+use super::embed::EmbedReport;
+use super::key::KeyResultReport;
+use super::text::{some, time, word};
+use super::verify::VerifyReport;
 use crate::distortion;
 
 /// A job as it stands.

@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::{Key, KeyResult};
 use serde::Serialize;
 
-use super::{seconds, some, time};
+use super::text::{seconds, some, time};
 
 /// What is known of a key.
 #[derive(Debug, Serialize)]

@@ -3,7 +3,7 @@ use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::{Asset, Owner};
 use serde::Serialize;
 
-use super::time;
+use super::text::time;
 
 /// What is known of an owner.
 #[derive(Debug, Serialize)]

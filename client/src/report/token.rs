@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::Token;
 use serde::Serialize;
 
-use super::{time, word};
+use super::text::{time, word};
 use crate::output::printable;
 
 /// What is known of a token.

@@ -3,7 +3,7 @@ use guardsplat_proto::v1::VerifyResult;
 use guardsplat_proto::v1::verify_result::Verdict;
 use serde::Serialize;
 
-use super::{rows_ignored, seconds, some, word};
+use super::text::{rows_ignored, seconds, some, word};
 use crate::output::{Exit, printable};
 
 /// What came of a job that verified a suspect.

@@ -2,6 +2,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use guardsplat_proto::v1::Artifact;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
@@ -99,6 +100,11 @@ impl Destination {
             Err(error) => Err(Error::io(&self.path)(error.error)),
         }
     }
+}
+
+/// Length of an artifact in bytes.
+pub fn size(artifact: &Artifact) -> u64 {
+    u64::try_from(artifact.size_bytes).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use guardsplat_proto::v1::download_artifact_response::Payload;
 use guardsplat_proto::v1::{Artifact, DownloadArtifactRequest};
 use tonic::{Code, Status};
 
-use super::destination::Destination;
-use super::direct;
+use super::destination::{Destination, size};
+use super::signed_download;
 use crate::console::Unit;
 use crate::context::{Context, refused};
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ const DOING: &str = "fetching the artifact";
 
 /// Fetches the artifact called `name` into the file `path`: from the store where the server says how, else from the server.
 pub async fn download(context: &Context, name: &str, path: &Path) -> Result<Artifact> {
-    match direct::download(context, name, path).await? {
+    match signed_download::download(context, name, path).await? {
         Some(artifact) => Ok(artifact),
         None => streamed(context, name, path).await,
     }
@@ -105,9 +105,4 @@ async fn attempt(
         Some(artifact) if file.written() == size(&artifact) => Ok(Ok(artifact)),
         _ => Ok(Err(Status::unavailable("the server ended the stream before the file"))),
     }
-}
-
-/// Length of an artifact in bytes.
-pub(super) fn size(artifact: &Artifact) -> u64 {
-    u64::try_from(artifact.size_bytes).unwrap_or_default()
 }

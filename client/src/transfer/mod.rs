@@ -1,8 +1,9 @@
 //! Bytes on their way: to the server in chunks, and back into files that are whole or not there.
 mod destination;
-mod direct;
 mod download;
-mod put;
+mod signed_address;
+mod signed_download;
+mod signed_upload;
 mod source;
 mod upload;
 

@@ -1,6 +1,8 @@
 //! Files to be sent, hashed first.
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use guardsplat_proto::v1::UploadMetadata;
 use sha2::{Digest, Sha256};
 use tokio::fs::File;
 use tokio::io::AsyncReadExt;
@@ -9,6 +11,10 @@ use crate::error::{Error, Result};
 
 /// Bytes that are read, hashed and sent at a time.
 pub const CHUNK: usize = 256 * 1024;
+/// Chunks read ahead of the network.
+pub const AHEAD: usize = 4;
+/// Between two looks at how far it is.
+pub const LOOK: Duration = Duration::from_millis(200);
 /// Longest display name of an artifact, in bytes.
 const LONGEST_NAME: usize = 255;
 
@@ -53,6 +59,16 @@ impl Source {
             size,
             sha256: hex::encode(hasher.finalize()),
         })
+    }
+
+    /// What is announced of it.
+    pub fn metadata(&self) -> UploadMetadata {
+        UploadMetadata {
+            display_name: self.display_name.clone(),
+            // No file is longer than this.
+            size_bytes: i64::try_from(self.size).unwrap_or(i64::MAX),
+            sha256: self.sha256.clone(),
+        }
     }
 }
 

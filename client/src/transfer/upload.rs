@@ -1,11 +1,10 @@
 //! Sends files, to the store where the server says how, else to the server in chunks.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
 use guardsplat_proto::v1::upload_artifact_request::Payload;
-use guardsplat_proto::v1::{Artifact, DeleteArtifactRequest, UploadArtifactRequest, UploadMetadata};
+use guardsplat_proto::v1::{Artifact, DeleteArtifactRequest, UploadArtifactRequest};
 use tokio::fs::File;
 use tokio::io::AsyncReadExt;
 use tokio::sync::mpsc;
@@ -13,22 +12,18 @@ use tokio::time::Instant;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
-use super::put;
-use super::source::{CHUNK, Source};
+use super::signed_upload;
+use super::source::{AHEAD, CHUNK, LOOK, Source};
 use crate::console::Unit;
 use crate::context::{Context, refused, silent};
 use crate::error::{Error, Result};
 use crate::server::is_lost;
 
 const DOING: &str = "sending the file";
-/// Chunks read ahead of the network.
-pub(super) const AHEAD: usize = 4;
-/// Between two looks at how far it is.
-pub(super) const LOOK: Duration = Duration::from_millis(200);
 
 /// Sends a file; `before` of `total` bytes went with other files.
 pub async fn upload(context: &Context, source: &Source, before: u64, total: u64) -> Result<Artifact> {
-    match put::upload(context, source, before, total).await? {
+    match signed_upload::upload(context, source, before, total).await? {
         Some(artifact) => Ok(artifact),
         None => streamed(context, source, before, total).await,
     }
@@ -65,7 +60,7 @@ async fn attempt(context: &Context, source: &Source, before: u64, total: u64) ->
     let sent = Arc::new(AtomicU64::new(0));
     let (sender, receiver) = mpsc::channel(AHEAD);
     let first = UploadArtifactRequest {
-        payload: Some(Payload::Metadata(metadata(source))),
+        payload: Some(Payload::Metadata(source.metadata())),
     };
     let reading = tokio::spawn(read(file, first, sender, Arc::clone(&sent)));
     let answer = client.upload_artifact(context.request(ReceiverStream::new(receiver)));
@@ -101,16 +96,6 @@ async fn attempt(context: &Context, source: &Source, before: u64, total: u64) ->
                 _ => Ok(Err(status)),
             }
         }
-    }
-}
-
-/// What is announced of a file.
-pub(super) fn metadata(source: &Source) -> UploadMetadata {
-    UploadMetadata {
-        display_name: source.display_name.clone(),
-        // No file is longer than this.
-        size_bytes: i64::try_from(source.size).unwrap_or(i64::MAX),
-        sha256: source.sha256.clone(),
     }
 }
 

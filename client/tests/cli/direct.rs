@@ -3,7 +3,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex};
 
-use super::run::Bench;
+use super::run::TestEnvironment;
 
 /// What a store has, how it answers, and what it was asked.
 #[derive(Clone, Default)]
@@ -60,19 +60,19 @@ fn bytes() -> Vec<u8> {
 
 /// Has the client fetch an artifact, with an address for it; the offsets at which the server itself was asked then.
 fn fetch(address: &str) -> Vec<i64> {
-    let bench = Bench::new();
-    let name = bench.fake.store("scene.ply", &bytes());
-    bench.fake.state().addresses = Some(address.to_owned());
-    let ran = bench.run(&format!("artifact get {name} -o out.ply --json"));
+    let environment = TestEnvironment::new();
+    let name = environment.fake.store("scene.ply", &bytes());
+    environment.fake.state().addresses = Some(address.to_owned());
+    let ran = environment.run(&format!("artifact get {name} -o out.ply --json"));
     assert_eq!(ran.code, 0, "{}", ran.err);
-    assert!(std::fs::read(bench.path("out.ply")).unwrap() == bytes());
+    assert!(std::fs::read(environment.path("out.ply")).unwrap() == bytes());
     assert_eq!(ran.json()["size_bytes"], 300_000);
     assert!(
         !format!("{}{}", ran.out, ran.err).contains(address),
         "an address is a secret"
     );
-    assert_eq!(bench.files(), ["out.ply"]);
-    bench.fake.state().offsets.clone()
+    assert_eq!(environment.files(), ["out.ply"]);
+    environment.fake.state().offsets.clone()
 }
 
 #[test]

@@ -8,7 +8,7 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
 use super::fake::{KEY, failure, figures, job, send, success};
-use super::run::{Bench, PICTURE};
+use super::run::{PICTURE, TestEnvironment};
 
 const LINE: &str = "embed in.ply -o out.ply --key website --message C0FFEE42";
 
@@ -18,8 +18,8 @@ fn scene() -> Vec<u8> {
     b"ply\n".iter().copied().chain(body).collect()
 }
 
-fn spec_of(bench: &Bench) -> EmbedSpec {
-    match bench
+fn spec_of(environment: &TestEnvironment) -> EmbedSpec {
+    match environment
         .fake
         .state()
         .created
@@ -36,12 +36,12 @@ fn spec_of(bench: &Bench) -> EmbedSpec {
     }
 }
 
-/// A bench with a scene to mark, whose job will end like this with a marked scene.
-fn bench(missed: &[&str]) -> Bench {
-    let bench = Bench::new();
-    bench.file("in.ply", &scene());
-    let marked = bench.fake.store("marked.ply", &[7; 300_000]);
-    let comparison = bench.fake.store("comparison.png", b"png");
+/// A environment with a scene to mark, whose job will end like this with a marked scene.
+fn environment(missed: &[&str]) -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", &scene());
+    let marked = environment.fake.store("marked.ply", &[7; 300_000]);
+    let comparison = environment.fake.store("comparison.png", b"png");
     let mut result = figures(&marked, &comparison);
     result.target_missed = missed.iter().map(|&text| text.to_owned()).collect();
     let mut progress = Progress {
@@ -61,22 +61,22 @@ fn bench(missed: &[&str]) -> Bench {
         progress: Some(progress),
         ..job(State::Running)
     };
-    bench
+    environment
         .fake
         .plan([send(queued), send(running), success(Outcome::EmbedResult(result))]);
-    bench
+    environment
 }
 
 #[test]
 fn a_scene_goes_there_and_comes_back_marked() {
-    let bench = bench(&[]);
-    let ran = bench.run(&format!(
+    let environment = environment(&[]);
+    let ran = environment.run(&format!(
         "{LINE} --preset draft --robust-to jpeg,8bit --seed 9 --size 128 --priority -2 --ignore-bad-rows --comparison c.png --json"
     ));
     assert_eq!(ran.code, 0, "{}", ran.err);
-    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
-    assert_eq!(std::fs::read(bench.path("c.png")).unwrap(), b"png");
-    assert_eq!(bench.files(), ["c.png", "in.ply", "out.ply"]);
+    assert_eq!(std::fs::read(environment.path("out.ply")).unwrap(), [7; 300_000]);
+    assert_eq!(std::fs::read(environment.path("c.png")).unwrap(), b"png");
+    assert_eq!(environment.files(), ["c.png", "in.ply", "out.ply"]);
 
     let json = ran.json();
     for (field, value) in [
@@ -102,8 +102,8 @@ fn a_scene_goes_there_and_comes_back_marked() {
     assert!(json["lpips"].is_null() && json["failure"].is_null());
     assert_eq!(json["target_missed"], serde_json::json!([]));
 
-    let spec = spec_of(&bench);
-    let state = bench.fake.state();
+    let spec = spec_of(&environment);
+    let state = environment.fake.state();
     let (artifact, bytes) = &state.artifacts[&spec.scene];
     assert_eq!((bytes, artifact.display_name.as_str()), (&scene(), "in.ply"));
     assert_eq!(state.chunks, [262_144, 262_144, 75_717]);
@@ -125,7 +125,7 @@ fn a_scene_goes_there_and_comes_back_marked() {
 
 #[test]
 fn progress_goes_to_standard_error_as_lines() {
-    let ran = bench(&[]).run(LINE);
+    let ran = environment(&[]).run(LINE);
     assert_eq!(ran.code, 0, "{}", ran.err);
     let expected = "bits 97.50 % (worst view 93.75 %), message c0ffee42 recovered, PSNR 36.50 dB, SSIM 0.9700; 600 \
                     steps, 12 s on cpu\n2 rows ignored\nwritten to out.ply\n";
@@ -146,22 +146,22 @@ fn progress_goes_to_standard_error_as_lines() {
 #[test]
 fn the_scene_is_as_readable_as_any_new_file() {
     use std::os::unix::fs::PermissionsExt;
-    let bench = bench(&[]);
-    assert_eq!(bench.run(LINE).code, 0);
-    let mode = |name| std::fs::metadata(bench.path(name)).unwrap().permissions().mode();
+    let environment = environment(&[]);
+    assert_eq!(environment.run(LINE).code, 0);
+    let mode = |name| std::fs::metadata(environment.path(name)).unwrap().permissions().mode();
     assert_eq!(mode("out.ply"), mode("in.ply"));
 }
 
 #[test]
 fn a_missed_target_writes_nothing_and_exits_with_3() {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
-    bench
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
+    environment
         .fake
         .plan([failure(Reason::TargetMissed, "bits 91.0 % of 97.0 %")]);
-    let ran = bench.run(&format!("{LINE} --json"));
+    let ran = environment.run(&format!("{LINE} --json"));
     assert_eq!(ran.code, 3, "{}", ran.err);
-    assert_eq!(bench.files(), ["in.ply"]);
+    assert_eq!(environment.files(), ["in.ply"]);
     let json = ran.json();
     assert_eq!(json["written"], false);
     assert_eq!(json["target_missed"], serde_json::json!(["bits 91.0 % of 97.0 %"]));
@@ -171,11 +171,11 @@ fn a_missed_target_writes_nothing_and_exits_with_3() {
 
 #[test]
 fn a_forced_scene_is_written_and_exits_with_3() {
-    let bench = bench(&["PSNR 33.0 dB of 36.0 dB"]);
-    let ran = bench.run(&format!("{LINE} --force --json"));
+    let environment = environment(&["PSNR 33.0 dB of 36.0 dB"]);
+    let ran = environment.run(&format!("{LINE} --force --json"));
     assert_eq!(ran.code, 3, "{}", ran.err);
-    assert!(bench.path("out.ply").is_file());
-    assert!(spec_of(&bench).force);
+    assert!(environment.path("out.ply").is_file());
+    assert!(spec_of(&environment).force);
     assert_eq!(
         ran.json()["target_missed"],
         serde_json::json!(["PSNR 33.0 dB of 36.0 dB"])
@@ -184,12 +184,12 @@ fn a_forced_scene_is_written_and_exits_with_3() {
 
 #[test]
 fn a_failed_job_is_an_error_with_its_reason() {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
-    bench
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
+    environment
         .fake
         .plan([failure(Reason::InvalidInput, "row 7: opacity is not a number")]);
-    let ran = bench.run(&format!("{LINE} --json"));
+    let ran = environment.run(&format!("{LINE} --json"));
     assert_eq!(ran.code, 1);
     let error = &ran.json()["error"];
     assert_eq!(error["reason"], "invalid_input");
@@ -200,46 +200,48 @@ fn a_failed_job_is_an_error_with_its_reason() {
         "{}",
         ran.err
     );
-    assert_eq!(bench.files(), ["in.ply"]);
+    assert_eq!(environment.files(), ["in.ply"]);
 }
 
 #[test]
 fn without_waiting_the_job_is_printed() {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
     let id = "5f0c54a6-6b0d-4d6f-9a80-6a7a0b1f4f11";
     let line = format!("embed in.ply --key {KEY} --message c0ffee42 --no-wait --request-id {id} --json");
-    let ran = bench.run(&line);
+    let ran = environment.run(&line);
     assert_eq!(ran.code, 0, "{}", ran.err);
     let json = ran.json();
     assert_eq!((&json["state"], &json["kind"]), (&"queued".into(), &"embed".into()));
-    assert_eq!(bench.fake.state().created[0].request_id, id);
-    assert!(bench.fake.state().watched.is_empty());
+    assert_eq!(environment.fake.state().created[0].request_id, id);
+    assert!(environment.fake.state().watched.is_empty());
 }
 
 #[test]
 fn it_goes_on_when_nobody_hears_of_its_progress() {
-    let bench = bench(&[]);
-    let mut child = bench.start(LINE);
+    let environment = environment(&[]);
+    let mut child = environment.start(LINE);
     drop((child.stderr.take(), child.stdout.take()));
     assert_eq!(child.wait().unwrap().code(), Some(0));
-    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), [7; 300_000]);
+    assert_eq!(std::fs::read(environment.path("out.ply")).unwrap(), [7; 300_000]);
 }
 
 #[test]
 fn the_same_request_sent_again_is_the_same_job() {
-    let bench = bench(&[]);
+    let environment = environment(&[]);
     let line = format!("{LINE} --request-id 5f0c54a6-6b0d-4d6f-9a80-6a7a0b1f4f11");
-    assert_eq!(bench.run(&line).code, 0);
-    let first = spec_of(&bench).scene;
-    let marked = bench.fake.store("marked.ply", b"marked");
-    bench.fake.plan([success(Outcome::EmbedResult(figures(&marked, "")))]);
-    let ran = bench.run(&line);
+    assert_eq!(environment.run(&line).code, 0);
+    let first = spec_of(&environment).scene;
+    let marked = environment.fake.store("marked.ply", b"marked");
+    environment
+        .fake
+        .plan([success(Outcome::EmbedResult(figures(&marked, "")))]);
+    let ran = environment.run(&line);
     assert_eq!(ran.code, 0, "{}", ran.err);
-    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), b"marked");
+    assert_eq!(std::fs::read(environment.path("out.ply")).unwrap(), b"marked");
     // What was sent again is deleted, what the job has is not.
-    let again = spec_of(&bench).scene;
-    let state = bench.fake.state();
+    let again = spec_of(&environment).scene;
+    let state = environment.fake.state();
     assert_eq!((state.jobs.len(), state.created.len(), state.uploads), (1, 2, 2));
     assert_eq!(state.deleted, [again]);
     assert!(state.artifacts.contains_key(&first));
@@ -247,36 +249,36 @@ fn the_same_request_sent_again_is_the_same_job() {
 
 #[test]
 fn a_scene_that_is_there_already_is_not_sent() {
-    let bench = bench(&[]);
-    let name = bench.fake.store("in.ply", b"ply");
-    let ran = bench.run(&format!("embed {name} -o out.ply --key website --message c0ffee42"));
+    let environment = environment(&[]);
+    let name = environment.fake.store("in.ply", b"ply");
+    let ran = environment.run(&format!("embed {name} -o out.ply --key website --message c0ffee42"));
     assert_eq!(ran.code, 0, "{}", ran.err);
-    assert_eq!(spec_of(&bench).scene, name);
-    assert_eq!(bench.fake.state().uploads, 0);
+    assert_eq!(spec_of(&environment).scene, name);
+    assert_eq!(environment.fake.state().uploads, 0);
     assert!(!ran.err.contains("note"), "{}", ran.err);
 }
 
 /// What is in an artifact is not known before; the worker names what it made of it.
 #[test]
 fn a_name_of_another_format_is_told_of() {
-    let bench = bench(&[]);
-    let name = bench.fake.store("in.ply", b"ply");
-    let ran = bench.run(&format!("embed {name} -o out.spz --key website --message c0ffee42"));
+    let environment = environment(&[]);
+    let name = environment.fake.store("in.ply", b"ply");
+    let ran = environment.run(&format!("embed {name} -o out.spz --key website --message c0ffee42"));
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert!(
         ran.err.contains("note: out.spz would pass for SPZ") && ran.err.contains("name it *.ply"),
         "{}",
         ran.err
     );
-    assert!(bench.path("out.spz").is_file());
+    assert!(environment.path("out.spz").is_file());
 }
 
 #[test]
 fn mistakes_are_found_before_anything_is_sent() {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
-    bench.file("photo.ply", PICTURE);
-    bench.file("notes.ply", b"Dear diary");
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
+    environment.file("photo.ply", PICTURE);
+    environment.file("notes.ply", b"Dear diary");
     for (line, told) in [
         (
             "embed in.ply -o out.ply --key website --message c0ffee",
@@ -308,25 +310,25 @@ fn mistakes_are_found_before_anything_is_sent() {
             "notes.ply: not a PNG, JPEG or WebP picture, and not a scene: neither a PLY",
         ),
     ] {
-        let ran = bench.run(line);
+        let ran = environment.run(line);
         assert_eq!(ran.code, 1, "{line}");
         assert!(ran.err.contains(told), "{line}: {}", ran.err);
     }
-    assert_eq!(bench.fake.state().uploads, 0);
-    assert_eq!(bench.files(), ["in.ply", "notes.ply", "photo.ply"]);
+    assert_eq!(environment.fake.state().uploads, 0);
+    assert_eq!(environment.files(), ["in.ply", "notes.ply", "photo.ply"]);
 }
 
 #[test]
 fn what_a_refused_job_would_have_used_is_deleted() {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
     let mut details = ErrorDetails::new();
     details
         .set_error_info("INVALID_FIELD", "guardsplat", [("limit".to_owned(), "4096".to_owned())])
         .add_bad_request_violation("job.embed.size", "must be 16 to 4096");
     let status = Status::with_error_details(Code::InvalidArgument, "the job is not valid", details);
-    bench.fake.state().create_errors.push_back(status);
-    let ran = bench.run(&format!("{LINE} --json"));
+    environment.fake.state().create_errors.push_back(status);
+    let ran = environment.run(&format!("{LINE} --json"));
     assert_eq!(ran.code, 1);
     let error = &ran.json()["error"];
     assert_eq!(
@@ -340,7 +342,7 @@ fn what_a_refused_job_would_have_used_is_deleted() {
         "{}",
         ran.err
     );
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     assert_eq!(state.created.len(), 1);
     assert_eq!(state.deleted.len(), 1);
     assert!(state.artifacts.is_empty());

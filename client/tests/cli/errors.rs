@@ -1,14 +1,14 @@
 //! What goes wrong before or without a job, settings, and the exit code 1.
 use std::net::TcpListener;
 
-use super::run::{Bench, finish};
+use super::run::{TestEnvironment, finish};
 
 #[test]
 fn no_server_is_told_at_once_with_what_to_do() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let ran = finish(
-        bench
+        environment
             .command(&format!("key list --json --server http://{free}"))
             .spawn()
             .unwrap(),
@@ -29,12 +29,12 @@ fn no_server_is_told_at_once_with_what_to_do() {
 
 #[test]
 fn a_server_that_says_nothing_is_not_waited_for_forever() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     // It takes the connection, and never says a word.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", silent.local_addr().unwrap());
     let ran = finish(
-        bench
+        environment
             .command(&format!("key list --timeout 1 --server {url}"))
             .spawn()
             .unwrap(),
@@ -46,7 +46,7 @@ fn a_server_that_says_nothing_is_not_waited_for_forever() {
 
 #[test]
 fn wrong_usage_exits_with_1_and_help_with_0() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     for line in [
         "embed",
         "verify --key K",
@@ -55,18 +55,18 @@ fn wrong_usage_exits_with_1_and_help_with_0() {
         "jobs get 7",
         "",
     ] {
-        assert_eq!(bench.run(line).code, 1, "{line}");
+        assert_eq!(environment.run(line).code, 1, "{line}");
     }
     for line in ["--help", "--version", "embed --help"] {
-        assert_eq!(bench.run(line).code, 0, "{line}");
+        assert_eq!(environment.run(line).code, 0, "{line}");
     }
 }
 
 #[test]
 fn what_is_not_there_is_told_with_details() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let id = "00000000-0000-7000-8000-000000000001";
-    let ran = bench.run(&format!("jobs get {id} --json"));
+    let ran = environment.run(&format!("jobs get {id} --json"));
     assert_eq!(ran.code, 1);
     let error = &ran.json()["error"];
     assert_eq!(
@@ -76,20 +76,20 @@ fn what_is_not_there_is_told_with_details() {
     assert_eq!(error["resource"], format!("jobs/{id}"));
     let expected = format!("error: reading the job failed: jobs/{id} does not exist (NOT_FOUND)\n");
     assert_eq!(ran.err, expected);
-    assert_eq!(bench.run(&format!("artifact get {id} -o out")).code, 1);
-    assert!(!bench.path("out").exists());
+    assert_eq!(environment.run(&format!("artifact get {id} -o out")).code, 1);
+    assert!(!environment.path("out").exists());
 }
 
 #[test]
 fn the_server_may_be_named_in_a_file() {
-    let bench = Bench::new();
-    let text = format!("server = \"{}\"\n", bench.fake.url());
-    std::fs::create_dir_all(bench.path("config/guardsplat")).unwrap();
-    bench.file("config/guardsplat/client.toml", text.as_bytes());
-    let ran = finish(bench.command("key list").spawn().unwrap());
+    let environment = TestEnvironment::new();
+    let text = format!("server = \"{}\"\n", environment.fake.url());
+    std::fs::create_dir_all(environment.path("config/guardsplat")).unwrap();
+    environment.file("config/guardsplat/client.toml", text.as_bytes());
+    let ran = finish(environment.command("key list").spawn().unwrap());
     assert_eq!(ran.code, 0, "{}", ran.err);
-    bench.file("config/guardsplat/client.toml", b"sever = 1");
-    let ran = finish(bench.command("key list").spawn().unwrap());
+    environment.file("config/guardsplat/client.toml", b"sever = 1");
+    let ran = finish(environment.command("key list").spawn().unwrap());
     assert_eq!(ran.code, 1);
     assert!(
         ran.err.contains("client.toml") && ran.err.contains("sever"),
@@ -100,9 +100,9 @@ fn the_server_may_be_named_in_a_file() {
 
 #[test]
 fn shells_get_their_completions_without_a_server() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let ran = finish(bench.command(&format!("completions {shell}")).spawn().unwrap());
+        let ran = finish(environment.command(&format!("completions {shell}")).spawn().unwrap());
         assert_eq!(ran.code, 0, "{}", ran.err);
         assert!(ran.out.contains("guardsplat") && ran.out.contains("embed"), "{shell}");
     }

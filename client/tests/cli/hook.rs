@@ -7,9 +7,9 @@ use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::job::Result as Outcome;
 
 use super::fake::{KEY, failure, figures, success};
-use super::run::{Bench, Ran, finish};
+use super::run::{Ran, TestEnvironment, finish};
 
-fn start(bench: &Bench, asset: &str, settings: &[(&str, &str)]) -> Child {
+fn start(environment: &TestEnvironment, asset: &str, settings: &[(&str, &str)]) -> Child {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/hooks/upload.sh");
     let client = Path::new(env!("CARGO_BIN_EXE_guardsplat")).parent().unwrap();
     let path = format!("{}:{}", client.display(), std::env::var("PATH").unwrap());
@@ -17,9 +17,9 @@ fn start(bench: &Bench, asset: &str, settings: &[(&str, &str)]) -> Child {
     command
         .arg(script)
         .args([asset, "in.ply", "out.ply", "c0ffee42"])
-        .current_dir(bench.folder.path())
+        .current_dir(environment.folder.path())
         .env("PATH", path)
-        .env("GUARDSPLAT_SERVER", bench.fake.url())
+        .env("GUARDSPLAT_SERVER", environment.fake.url())
         .env("GUARDSPLAT_KEY", KEY)
         .envs(settings.iter().copied())
         .stdout(Stdio::piped())
@@ -27,35 +27,37 @@ fn start(bench: &Bench, asset: &str, settings: &[(&str, &str)]) -> Child {
     command.spawn().unwrap()
 }
 
-fn call(bench: &Bench, asset: &str, settings: &[(&str, &str)]) -> Ran {
-    finish(start(bench, asset, settings))
+fn call(environment: &TestEnvironment, asset: &str, settings: &[(&str, &str)]) -> Ran {
+    finish(start(environment, asset, settings))
 }
 
-fn bench() -> Bench {
-    let bench = Bench::new();
-    bench.file("in.ply", b"ply");
-    bench
+fn environment() -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    environment.file("in.ply", b"ply");
+    environment
 }
 
-fn plan_success(bench: &Bench) {
-    let marked = bench.fake.store("marked.ply", b"marked");
-    bench.fake.plan([success(Outcome::EmbedResult(figures(&marked, "")))]);
+fn plan_success(environment: &TestEnvironment) {
+    let marked = environment.fake.store("marked.ply", b"marked");
+    environment
+        .fake
+        .plan([success(Outcome::EmbedResult(figures(&marked, "")))]);
 }
 
 #[test]
 fn called_twice_it_marks_once_and_keeps_one_copy() {
-    let bench = bench();
-    plan_success(&bench);
-    plan_success(&bench);
-    let both = [start(&bench, "asset 7", &[]), start(&bench, "asset 7", &[])].map(finish);
+    let environment = environment();
+    plan_success(&environment);
+    plan_success(&environment);
+    let both = [start(&environment, "asset 7", &[]), start(&environment, "asset 7", &[])].map(finish);
     for ran in both {
         assert_eq!(ran.code, 0, "{}", ran.err);
     }
-    assert_eq!(std::fs::read(bench.path("out.ply")).unwrap(), b"marked");
-    let report = std::fs::read_to_string(bench.path("out.ply.json")).unwrap();
+    assert_eq!(std::fs::read(environment.path("out.ply")).unwrap(), b"marked");
+    let report = std::fs::read_to_string(environment.path("out.ply.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["written"], true);
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     // Both send the scene; whoever comes second finds the other's job, and deletes what it sent.
     assert_eq!((state.uploads, state.jobs.len(), state.created.len()), (2, 1, 2));
     let job = state.jobs.values().next().unwrap();
@@ -68,44 +70,44 @@ fn called_twice_it_marks_once_and_keeps_one_copy() {
 
 #[test]
 fn other_assets_and_other_tries_are_other_requests() {
-    let bench = bench();
+    let environment = environment();
     for (asset, settings) in [("7", &[][..]), ("8", &[]), ("7", &[("GUARDSPLAT_HOOK_TRY", "2")])] {
-        plan_success(&bench);
-        let ran = call(&bench, asset, settings);
+        plan_success(&environment);
+        let ran = call(&environment, asset, settings);
         assert_eq!(ran.code, 0, "{}", ran.err);
     }
-    assert_eq!(bench.fake.state().jobs.len(), 3);
+    assert_eq!(environment.fake.state().jobs.len(), 3);
 }
 
 #[test]
 fn its_exit_code_is_the_client_s() {
-    let bench = bench();
-    bench.fake.plan([failure(Reason::TargetMissed, "bits 91 %")]);
-    let ran = call(&bench, "7", &[]);
+    let environment = environment();
+    environment.fake.plan([failure(Reason::TargetMissed, "bits 91 %")]);
+    let ran = call(&environment, "7", &[]);
     assert_eq!(ran.code, 3, "{}", ran.err);
-    assert!(!bench.path("out.ply").exists() && bench.path("out.ply.json").exists());
+    assert!(!environment.path("out.ply").exists() && environment.path("out.ply.json").exists());
 }
 
 #[test]
 fn one_name_with_other_bytes_is_refused() {
-    let bench = bench();
-    plan_success(&bench);
-    assert_eq!(call(&bench, "7", &[]).code, 0);
-    bench.file("in.ply", b"ply of another");
-    let ran = call(&bench, "7", &[]);
+    let environment = environment();
+    plan_success(&environment);
+    assert_eq!(call(&environment, "7", &[]).code, 0);
+    environment.file("in.ply", b"ply of another");
+    let ran = call(&environment, "7", &[]);
     assert_eq!(ran.code, 1);
-    let report = std::fs::read_to_string(bench.path("out.ply.json")).unwrap();
+    let report = std::fs::read_to_string(environment.path("out.ply.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["error"]["reason"], "REQUEST_ID_REUSED");
     assert!(ran.err.contains("sent before with other bytes"), "{}", ran.err);
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     assert_eq!((state.jobs.len(), state.deleted.len()), (1, 1));
 }
 
 #[test]
 fn it_leaves_nothing_but_what_it_promises() {
-    let bench = bench();
-    plan_success(&bench);
-    assert_eq!(call(&bench, "-7", &[]).code, 0);
-    assert_eq!(bench.files(), ["in.ply", "out.ply", "out.ply.json"]);
+    let environment = environment();
+    plan_success(&environment);
+    assert_eq!(call(&environment, "-7", &[]).code, 0);
+    assert_eq!(environment.files(), ["in.ply", "out.ply", "out.ply.json"]);
 }

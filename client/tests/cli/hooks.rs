@@ -7,7 +7,7 @@ use guardsplat_proto::v1::{
 use tonic::{Request, Response, Status};
 
 use super::fake::Fake;
-use super::run::Bench;
+use super::run::TestEnvironment;
 use super::services::not_found;
 
 const NAME: &str = "hooks/0190a5d0-0000-7000-8000-00000000000c";
@@ -81,8 +81,8 @@ impl HookService for Fake {
 
 #[test]
 fn a_hook_is_made_shown_once_and_deleted() {
-    let bench = Bench::new();
-    let ran = bench.run("hook create https://shop.example/hook --kind embed --state succeeded --state failed");
+    let environment = TestEnvironment::new();
+    let ran = environment.run("hook create https://shop.example/hook --kind embed --state succeeded --state failed");
     assert_eq!(ran.code, 0, "{}", ran.err);
     // Alone on standard output, so that it can go straight into a file.
     assert_eq!(ran.out, format!("{SECRET}\n"));
@@ -91,23 +91,23 @@ fn a_hook_is_made_shown_once_and_deleted() {
         "{}",
         ran.err
     );
-    let made = bench.fake.state().hooks[0].clone();
+    let made = environment.fake.state().hooks[0].clone();
     assert_eq!(made.kinds().collect::<Vec<_>>(), [hook::Kind::Embed]);
     assert_eq!(
         made.states().collect::<Vec<_>>(),
         [job::State::Succeeded, job::State::Failed]
     );
-    let listed = bench.run("hook list --json").json();
+    let listed = environment.run("hook list --json").json();
     assert_eq!(listed["hooks"][0]["url"], "https://shop.example/hook");
-    assert_eq!(bench.run(&format!("hook delete {}", &NAME[6..])).code, 0);
-    assert_eq!(bench.run(&format!("hook delete {NAME}")).code, 1);
-    assert_eq!(bench.run("hook list").out, "");
-    assert_eq!(bench.run("hook delete 7").code, 1);
+    assert_eq!(environment.run(&format!("hook delete {}", &NAME[6..])).code, 0);
+    assert_eq!(environment.run(&format!("hook delete {NAME}")).code, 1);
+    assert_eq!(environment.run("hook list").out, "");
+    assert_eq!(environment.run("hook delete 7").code, 1);
 }
 
 #[test]
 fn deliveries_are_listed_and_sent_again() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let mut dead = Delivery {
         name: DELIVERY.into(),
         hook: NAME.into(),
@@ -124,16 +124,16 @@ fn deliveries_are_listed_and_sent_again() {
         last_error: String::new(),
         ..dead.clone()
     };
-    bench.fake.state().deliveries = vec![dead, done];
-    let all = bench.run("hook deliveries");
+    environment.fake.state().deliveries = vec![dead, done];
+    let all = environment.run("hook deliveries");
     assert_eq!(all.out.lines().count(), 2, "{}", all.err);
     assert!(all.out.contains("dead  guardsplat.job.failed.v1") && all.out.contains("9 attempts  answered 500"));
-    assert_eq!(bench.run("hook deliveries --limit 1").out.lines().count(), 1);
-    let dead = bench
+    assert_eq!(environment.run("hook deliveries --limit 1").out.lines().count(), 1);
+    let dead = environment
         .run(&format!("hook deliveries --state dead --hook {NAME} --json"))
         .json();
     assert_eq!(dead["deliveries"].as_array().unwrap().len(), 1);
     assert_eq!(dead["deliveries"][0]["name"], DELIVERY);
-    let again = bench.run(&format!("hook redeliver {DELIVERY} --json")).json();
+    let again = environment.run(&format!("hook redeliver {DELIVERY} --json")).json();
     assert_eq!(again["state"], "pending");
 }

@@ -4,11 +4,11 @@ use guardsplat_proto::v1::job::State;
 use serde_json::Value;
 
 use super::fake::{failure, job, send};
-use super::run::Bench;
+use super::run::TestEnvironment;
 
-/// A bench with jobs 1 to 5 of which the odd ones are running.
-fn bench() -> Bench {
-    let bench = Bench::new();
+/// A environment with jobs 1 to 5 of which the odd ones are running.
+fn environment() -> TestEnvironment {
+    let environment = TestEnvironment::new();
     for n in 1..=5 {
         let name = name(n);
         let state = if n % 2 == 1 { State::Running } else { State::Queued };
@@ -16,9 +16,9 @@ fn bench() -> Bench {
             name: name.clone(),
             ..job(state)
         };
-        bench.fake.state().jobs.insert(name, job);
+        environment.fake.state().jobs.insert(name, job);
     }
-    bench
+    environment
 }
 
 fn name(n: u32) -> String {
@@ -36,15 +36,15 @@ fn listed(json: &Value) -> Vec<&str> {
 
 #[test]
 fn lists_go_over_pages() {
-    let bench = bench();
-    let json = bench.run("jobs list --json").json();
+    let environment = environment();
+    let json = environment.run("jobs list --json").json();
     assert_eq!(listed(&json), [5, 4, 3, 2, 1].map(name));
     assert_eq!(json["more"], false);
-    let json = bench.run("jobs list --limit 3 --json").json();
+    let json = environment.run("jobs list --limit 3 --json").json();
     assert_eq!((listed(&json).len(), &json["more"]), (3, &true.into()));
-    let json = bench.run("jobs list --state running --json").json();
+    let json = environment.run("jobs list --state running --json").json();
     assert_eq!(listed(&json), [5, 3, 1].map(name));
-    let text = bench.run("jobs list").out;
+    let text = environment.run("jobs list").out;
     assert_eq!(text.lines().count(), 5);
     assert!(
         text.lines()
@@ -57,10 +57,10 @@ fn lists_go_over_pages() {
 
 #[test]
 fn one_job_is_told_by_name_or_id() {
-    let bench = bench();
+    let environment = environment();
     let name = name(2);
     for text in [name.as_str(), name.strip_prefix("jobs/").unwrap()] {
-        let json = bench.run(&format!("jobs get {text} --json")).json();
+        let json = environment.run(&format!("jobs get {text} --json")).json();
         assert_eq!(
             (&json["name"], &json["state"]),
             (&name.clone().into(), &"queued".into())
@@ -70,17 +70,17 @@ fn one_job_is_told_by_name_or_id() {
 
 #[test]
 fn a_job_is_cancelled() {
-    let bench = bench();
-    let ran = bench.run(&format!("jobs cancel {} --json", name(1)));
+    let environment = environment();
+    let ran = environment.run(&format!("jobs cancel {} --json", name(1)));
     assert_eq!((ran.code, &ran.json()["state"]), (0, &"cancelled".into()));
-    assert_eq!(bench.fake.state().cancelled, [name(1)]);
+    assert_eq!(environment.fake.state().cancelled, [name(1)]);
 }
 
 #[test]
 fn dead_letters_are_listed_looked_at_and_tried_again() {
-    let bench = bench();
+    let environment = environment();
     for (n, reason) in [(1, Reason::Internal), (2, Reason::TargetMissed), (4, Reason::Internal)] {
-        let mut state = bench.fake.state();
+        let mut state = environment.fake.state();
         let job = state.jobs.get_mut(&name(n)).unwrap();
         job.set_state(State::Failed);
         job.failure = Some(guardsplat_proto::v1::Failure {
@@ -88,35 +88,35 @@ fn dead_letters_are_listed_looked_at_and_tried_again() {
             message: "out of\u{1b}[31m memory".into(),
         });
     }
-    assert_eq!(listed(&bench.run("jobs dead --json").json()), [4, 2, 1].map(name));
+    assert_eq!(listed(&environment.run("jobs dead --json").json()), [4, 2, 1].map(name));
     assert_eq!(
-        listed(&bench.run("jobs dead --reason internal --json").json()),
+        listed(&environment.run("jobs dead --reason internal --json").json()),
         [4, 1].map(name)
     );
-    let text = bench.run("jobs dead --reason target-missed").out;
+    let text = environment.run("jobs dead --reason target-missed").out;
     assert!(text.contains("memory (target_missed)"), "{text}");
     // What a worker says moves no terminal.
     assert!(!text.contains('\u{1b}'), "{text}");
-    let json = bench.run(&format!("jobs attempts {} --json", name(4))).json();
+    let json = environment.run(&format!("jobs attempts {} --json", name(4))).json();
     let attempt = &json["attempts"][0];
     assert_eq!((&attempt["number"], &attempt["outcome"]), (&1.into(), &"failed".into()));
     assert_eq!(attempt["failure"]["reason"], "internal");
-    let text = bench.run(&format!("jobs attempts {}", name(4))).out;
+    let text = environment.run(&format!("jobs attempts {}", name(4))).out;
     assert!(text.contains("failed") && text.contains("a worker"), "{text}");
-    let ran = bench.run(&format!("jobs requeue {} --json", name(4)));
+    let ran = environment.run(&format!("jobs requeue {} --json", name(4)));
     assert_eq!((ran.code, &ran.json()["state"]), (0, &"queued".into()));
-    assert_eq!(listed(&bench.run("jobs dead --json").json()), [2, 1].map(name));
+    assert_eq!(listed(&environment.run("jobs dead --json").json()), [2, 1].map(name));
 }
 
 #[test]
 fn a_watch_prints_one_line_a_message_and_exits_as_the_job() {
-    let bench = bench();
-    bench.fake.plan([
+    let environment = environment();
+    environment.fake.plan([
         send(job(State::Queued)),
         send(job(State::Running)),
         failure(Reason::Internal, "broken"),
     ]);
-    let ran = bench.run(&format!("jobs watch {} --cursor 7 --json", name(1)));
+    let ran = environment.run(&format!("jobs watch {} --cursor 7 --json", name(1)));
     assert_eq!(ran.code, 1);
     let lines: Vec<Value> = ran
         .out
@@ -127,33 +127,33 @@ fn a_watch_prints_one_line_a_message_and_exits_as_the_job() {
     assert_eq!(states, ["queued", "running", "failed"]);
     assert_eq!(lines[1]["cursor"], "0.1");
     assert_eq!(lines[2]["job"]["failure"]["reason"], "internal");
-    assert_eq!(bench.fake.state().watched[0].cursor, "7");
+    assert_eq!(environment.fake.state().watched[0].cursor, "7");
     assert!(ran.err.contains("failed: broken (internal)"), "{}", ran.err);
 }
 
 #[test]
 fn a_watched_job_that_missed_its_target_exits_with_3() {
-    let bench = bench();
-    bench.fake.plan([failure(Reason::TargetMissed, "bits 91 %")]);
-    let ran = bench.run(&format!("jobs watch {}", name(1)));
+    let environment = environment();
+    environment.fake.plan([failure(Reason::TargetMissed, "bits 91 %")]);
+    let ran = environment.run(&format!("jobs watch {}", name(1)));
     assert_eq!(ran.code, 3, "{}", ran.err);
-    bench.fake.plan([send(job(State::Cancelled))]);
-    let ran = bench.run(&format!("jobs watch {}", name(1)));
+    environment.fake.plan([send(job(State::Cancelled))]);
+    let ran = environment.run(&format!("jobs watch {}", name(1)));
     assert_eq!(ran.code, 1);
     assert!(ran.err.contains("was cancelled"), "{}", ran.err);
 }
 
 #[test]
 fn artifacts_are_put_and_deleted() {
-    let bench = Bench::new();
-    bench.file("a.ply", b"ply");
-    let json = bench.run("artifact put a.ply --json").json();
+    let environment = TestEnvironment::new();
+    environment.file("a.ply", b"ply");
+    let json = environment.run("artifact put a.ply --json").json();
     assert_eq!(
         (&json["display_name"], &json["size_bytes"]),
         (&"a.ply".into(), &3.into())
     );
     let name = json["name"].as_str().unwrap();
-    let json = bench.run(&format!("artifact delete {name} --json")).json();
+    let json = environment.run(&format!("artifact delete {name} --json")).json();
     assert_eq!((&json["name"], &json["deleted"]), (&name.into(), &true.into()));
-    assert!(bench.fake.state().artifacts.is_empty());
+    assert!(environment.fake.state().artifacts.is_empty());
 }

@@ -9,7 +9,7 @@ use serde_json::json;
 use sha2::{Digest, Sha256};
 
 use super::posts::Receiver;
-use super::run::Bench;
+use super::run::TestEnvironment;
 
 const SECRET: [u8; 32] = [7; 32];
 const JOB: &str = "0190a5d0-0000-7000-8000-00000000000e";
@@ -57,40 +57,46 @@ fn send(receiver: &Receiver, id: &str, body: &[u8]) -> u16 {
 
 #[test]
 fn a_marked_scene_is_fetched_and_a_program_told() {
-    let bench = Bench::new();
-    bench.file("secret", format!("{}\n", secret()).as_bytes());
-    std::fs::create_dir(bench.path("out")).unwrap();
+    let environment = TestEnvironment::new();
+    environment.file("secret", format!("{}\n", secret()).as_bytes());
+    std::fs::create_dir(environment.path("out")).unwrap();
     // It fails the first time.
-    bench.file(
+    environment.file(
         "publish.sh",
         b"cat >last.json; echo \"$GUARDSPLAT_STATE $GUARDSPLAT_REQUEST_ID $GUARDSPLAT_SCENE\" >>log\n\
           [ -e again ] || { touch again; exit 7; }\n",
     );
     let line = "hook listen --listen 127.0.0.1:0 --secret-file secret --folder out -- sh publish.sh";
-    let receiver = Receiver::start(&bench, line, &[]);
-    let scene = bench.fake.store("marked.ply", b"marked");
+    let receiver = Receiver::start(&environment, line, &[]);
+    let scene = environment.fake.store("marked.ply", b"marked");
     let body = event("e-1", "succeeded", Some((&scene, b"marked")));
     assert_eq!(send(&receiver, "e-1", &body), 500, "the program failed");
-    assert_eq!(std::fs::read(bench.path(&format!("out/{JOB}.ply"))).unwrap(), b"marked");
+    assert_eq!(
+        std::fs::read(environment.path(&format!("out/{JOB}.ply"))).unwrap(),
+        b"marked"
+    );
     for _ in 0..2 {
         assert_eq!(send(&receiver, "e-1", &body), 204);
     }
-    assert_eq!(std::fs::read(bench.path("last.json")).unwrap(), body);
-    assert_eq!(std::fs::read(bench.path(&format!("out/{JOB}.json"))).unwrap(), body);
-    let log = std::fs::read_to_string(bench.path("log")).unwrap();
+    assert_eq!(std::fs::read(environment.path("last.json")).unwrap(), body);
+    assert_eq!(
+        std::fs::read(environment.path(&format!("out/{JOB}.json"))).unwrap(),
+        body
+    );
+    let log = std::fs::read_to_string(environment.path("log")).unwrap();
     let expected = format!("succeeded r-7 out/{JOB}.ply\n");
     assert_eq!(
         log,
         expected.repeat(2),
         "once for each call but the last, which was done already"
     );
-    assert_eq!(bench.fake.state().offsets.len(), 1, "fetched once");
+    assert_eq!(environment.fake.state().offsets.len(), 1, "fetched once");
 
     // What failed has no scene.
     let failed = event("e-2", "failed", None);
     assert_eq!(send(&receiver, "e-2", &failed), 204);
     assert!(
-        std::fs::read_to_string(bench.path("log"))
+        std::fs::read_to_string(environment.path("log"))
             .unwrap()
             .ends_with("failed r-7 \n")
     );
@@ -104,10 +110,10 @@ fn a_marked_scene_is_fetched_and_a_program_told() {
 
 #[test]
 fn what_is_not_the_service_s_is_refused() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let variables = [("GUARDSPLAT_HOOK_SECRET", secret())];
     let variables = variables.each_ref().map(|(name, value)| (*name, value.as_str()));
-    let receiver = Receiver::start(&bench, "hook listen --listen 127.0.0.1:0", &variables);
+    let receiver = Receiver::start(&environment, "hook listen --listen 127.0.0.1:0", &variables);
     let body = event("e-1", "cancelled", None);
     for (headers, why) in [
         (Vec::new(), "nothing is signed"),
@@ -140,14 +146,14 @@ fn what_is_not_the_service_s_is_refused() {
 
 #[test]
 fn a_scene_that_is_not_the_one_told_of_is_not_acknowledged() {
-    let bench = Bench::new();
-    bench.file("secret", secret().as_bytes());
+    let environment = TestEnvironment::new();
+    environment.file("secret", secret().as_bytes());
     let line = "hook listen --listen 127.0.0.1:0 --secret-file secret --folder .";
-    let receiver = Receiver::start(&bench, line, &[]);
-    let scene = bench.fake.store("marked.ply", b"other bytes");
+    let receiver = Receiver::start(&environment, line, &[]);
+    let scene = environment.fake.store("marked.ply", b"other bytes");
     let body = event("e-1", "succeeded", Some((&scene, b"marked")));
     assert_eq!(send(&receiver, "e-1", &body), 500);
-    assert!(!bench.path(&format!("{JOB}.json")).exists());
+    assert!(!environment.path(&format!("{JOB}.json")).exists());
     // Names in an event lead nowhere else.
     let text = String::from_utf8(body).unwrap();
     for (from, to) in [(JOB, "../../x"), (scene.as_str(), "artifacts/../x")] {
@@ -155,7 +161,7 @@ fn a_scene_that_is_not_the_one_told_of_is_not_acknowledged() {
         assert_eq!(send(&receiver, "e-1", &body), 500, "{to}");
     }
     receiver.end();
-    let ran = bench.run("hook listen --listen 127.0.0.1:0");
+    let ran = environment.run("hook listen --listen 127.0.0.1:0");
     assert!(
         ran.code == 1 && ran.err.contains("GUARDSPLAT_HOOK_SECRET"),
         "{}",
@@ -166,18 +172,18 @@ fn a_scene_that_is_not_the_one_told_of_is_not_acknowledged() {
 /// The example of a program.
 #[test]
 fn the_example_publishes_marked_scenes_only() {
-    let bench = Bench::new();
-    bench.file("secret", secret().as_bytes());
+    let environment = TestEnvironment::new();
+    environment.file("secret", secret().as_bytes());
     for folder in ["marked", "public"] {
-        std::fs::create_dir(bench.path(folder)).unwrap();
+        std::fs::create_dir(environment.path(folder)).unwrap();
     }
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/hooks/publish.sh");
     let line = format!(
         "hook listen --listen 127.0.0.1:0 --secret-file secret --folder marked -- bash {} public",
         script.display()
     );
-    let receiver = Receiver::start(&bench, &line, &[]);
-    let scene = bench.fake.store("marked.ply", b"marked");
+    let receiver = Receiver::start(&environment, &line, &[]);
+    let scene = environment.fake.store("marked.ply", b"marked");
     for (id, state, scene) in [
         ("e-1", "failed", None),
         ("e-2", "succeeded", Some((scene.as_str(), &b"marked"[..]))),
@@ -187,13 +193,13 @@ fn the_example_publishes_marked_scenes_only() {
     }
     let said = receiver.end();
     assert!(said.contains("has failed; asset: asset 7"), "{said}");
-    let public: Vec<_> = std::fs::read_dir(bench.path("public"))
+    let public: Vec<_> = std::fs::read_dir(environment.path("public"))
         .unwrap()
         .map(|e| e.unwrap().file_name())
         .collect();
     assert_eq!(public, [format!("{JOB}.ply").as_str()]);
     assert_eq!(
-        std::fs::read(bench.path(&format!("public/{JOB}.ply"))).unwrap(),
+        std::fs::read(environment.path(&format!("public/{JOB}.ply"))).unwrap(),
         b"marked"
     );
 }

@@ -5,7 +5,7 @@ use std::process::Child;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-use super::run::Bench;
+use super::run::TestEnvironment;
 
 /// A receiver that runs; it is ended with this.
 pub struct Receiver {
@@ -17,12 +17,12 @@ pub struct Receiver {
 
 impl Receiver {
     /// Starts a line that listens, and waits until it does.
-    pub fn start(bench: &Bench, line: &str, variables: &[(&str, &str)]) -> Self {
-        let mut command = bench.command(line);
+    pub fn start(environment: &TestEnvironment, line: &str, variables: &[(&str, &str)]) -> Self {
+        let mut command = environment.command(line);
         for name in ["GUARDSPLAT_HOOK_SECRET", "GUARDSPLAT_HOOK_TOKEN"] {
             command.env_remove(name);
         }
-        command.env("GUARDSPLAT_SERVER", bench.fake.url());
+        command.env("GUARDSPLAT_SERVER", environment.fake.url());
         let mut child = command.envs(variables.iter().copied()).spawn().unwrap();
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
         let mut first = String::new();

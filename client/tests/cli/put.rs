@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use tonic::Status;
 
 use super::fake::Fake;
-use super::run::Bench;
+use super::run::TestEnvironment;
 
 /// What a store does with what it is sent.
 #[derive(Clone)]
@@ -72,17 +72,17 @@ fn bytes() -> Vec<u8> {
 
 /// Has the client send a file, with an address for it: how often it went to the server itself, and how often that was
 /// to finish what went to the store.
-fn send(bench: &Bench, address: &str) -> (usize, usize) {
-    bench.fake.state().addresses_to_write = Some(address.to_owned());
-    bench.file("scene.ply", &bytes());
-    let ran = bench.run("artifact put scene.ply --json");
+fn send(environment: &TestEnvironment, address: &str) -> (usize, usize) {
+    environment.fake.state().addresses_to_write = Some(address.to_owned());
+    environment.file("scene.ply", &bytes());
+    let ran = environment.run("artifact put scene.ply --json");
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert!(
         !format!("{}{}", ran.out, ran.err).contains(address),
         "an address is a secret"
     );
     let name = ran.json()["name"].as_str().unwrap_or_default().to_owned();
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     let (artifact, stored) = &state.artifacts[&name];
     assert_eq!(artifact.display_name, "scene.ply");
     assert!(*stored == bytes());
@@ -92,9 +92,9 @@ fn send(bench: &Bench, address: &str) -> (usize, usize) {
 
 #[test]
 fn bytes_go_to_the_store_and_not_through_the_server() {
-    let bench = Bench::new();
-    let (address, heads) = store(&bench.fake, How::Takes);
-    assert_eq!(send(&bench, &address), (0, 1));
+    let environment = TestEnvironment::new();
+    let (address, heads) = store(&environment.fake, How::Takes);
+    assert_eq!(send(&environment, &address), (0, 1));
     let heads = heads.lock().unwrap();
     assert_eq!(heads.len(), 1);
     assert!(heads[0].starts_with("put /uploads/"), "{}", heads[0]);
@@ -107,11 +107,11 @@ fn bytes_go_to_the_store_and_not_through_the_server() {
 
 #[test]
 fn a_lost_answer_is_asked_for_again() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let lost = Status::unavailable("going down");
-    bench.fake.state().finish_errors.push_back(lost);
-    let (address, heads) = store(&bench.fake, How::Takes);
-    assert_eq!(send(&bench, &address), (0, 2));
+    environment.fake.state().finish_errors.push_back(lost);
+    let (address, heads) = store(&environment.fake, How::Takes);
+    assert_eq!(send(&environment, &address), (0, 2));
     assert_eq!(heads.lock().unwrap().len(), 1);
 }
 
@@ -123,24 +123,24 @@ fn where_the_store_does_not_take_it_the_server_does() {
         (How::Answers("403 Forbidden", true), 0),
         (How::Answers("403 Forbidden", false), 0),
     ] {
-        let bench = Bench::new();
-        let (address, heads) = store(&bench.fake, how);
-        assert_eq!(send(&bench, &address), (1, finishes));
+        let environment = TestEnvironment::new();
+        let (address, heads) = store(&environment.fake, how);
+        assert_eq!(send(&environment, &address), (1, finishes));
         assert_eq!(heads.lock().unwrap().len(), 1);
     }
     // Nobody is there; and what is no address of a store.
     for address in ["http://127.0.0.1:1", "file:///etc"] {
-        assert_eq!(send(&Bench::new(), address), (1, 0));
+        assert_eq!(send(&TestEnvironment::new(), address), (1, 0));
     }
 }
 
 /// What the server named as the store is the only place that bytes go to.
 #[test]
 fn nobody_sends_it_elsewhere() {
-    let bench = Bench::new();
-    let (elsewhere, heads) = store(&bench.fake, How::Takes);
+    let environment = TestEnvironment::new();
+    let (elsewhere, heads) = store(&environment.fake, How::Takes);
     let status = format!("307 Temporary Redirect\r\nlocation: {elsewhere}/uploads/1");
-    let (address, _) = store(&bench.fake, How::Answers(status.leak(), true));
-    assert_eq!(send(&bench, &address), (1, 0));
+    let (address, _) = store(&environment.fake, How::Answers(status.leak(), true));
+    assert_eq!(send(&environment, &address), (1, 0));
     assert!(heads.lock().unwrap().is_empty());
 }

@@ -12,7 +12,7 @@ use super::fake::Fake;
 pub const PICTURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// A folder to run in, and the server to talk to.
-pub struct Bench {
+pub struct TestEnvironment {
     /// The server.
     pub fake: Fake,
     /// The folder.
@@ -37,7 +37,7 @@ impl Ran {
     }
 }
 
-impl Bench {
+impl TestEnvironment {
     /// A new one.
     pub fn new() -> Self {
         let fake = Fake::start();

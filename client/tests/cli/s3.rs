@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::fake::KEY;
 use super::posts::Receiver;
-use super::run::Bench;
+use super::run::TestEnvironment;
 
 const TOKEN: &str = "a token of the store's own";
 
@@ -23,26 +23,26 @@ fn send(receiver: &Receiver, body: &[u8]) -> u16 {
     receiver.post(&[("authorization", token)], body)
 }
 
-fn start(bench: &Bench, more: &str) -> Receiver {
-    std::fs::create_dir_all(bench.path("uploads/red flower")).unwrap();
-    bench.file("uploads/red flower/a.ply", b"ply");
-    bench.file("token", format!("{}\n", TOKEN.replace(' ', "-")).as_bytes());
+fn start(environment: &TestEnvironment, more: &str) -> Receiver {
+    std::fs::create_dir_all(environment.path("uploads/red flower")).unwrap();
+    environment.file("uploads/red flower/a.ply", b"ply");
+    environment.file("token", format!("{}\n", TOKEN.replace(' ', "-")).as_bytes());
     let line = format!(
         "hook s3 --listen 127.0.0.1:0 --store-token-file token --bucket uploads --folder uploads --key {KEY} {more}"
     );
-    Receiver::start(bench, &line, &[])
+    Receiver::start(environment, &line, &[])
 }
 
 #[test]
 fn an_upload_is_one_job_however_often_it_is_told_of() {
-    let bench = Bench::new();
-    let receiver = start(&bench, "--message c0ffee42 --preset draft");
+    let environment = TestEnvironment::new();
+    let receiver = start(&environment, "--message c0ffee42 --preset draft");
     let body = notification("s3:ObjectCreated:Put", "uploads", &[("red+flower%2Fa.ply", "1")]);
     for _ in 0..3 {
         assert_eq!(send(&receiver, &body), 204);
     }
     {
-        let state = bench.fake.state();
+        let state = environment.fake.state();
         assert_eq!((state.jobs.len(), state.created.len(), state.deleted.len()), (1, 3, 2));
         let job = state.created[0].job.as_ref().unwrap();
         assert_eq!(job.display_name, "red flower/a.ply");
@@ -60,7 +60,7 @@ fn an_upload_is_one_job_however_often_it_is_told_of() {
     // Another version is another job.
     let next = notification("ObjectCreated:Copy", "uploads", &[("red+flower/a.ply", "2")]);
     assert_eq!(send(&receiver, &next), 204);
-    assert_eq!(bench.fake.state().jobs.len(), 2);
+    assert_eq!(environment.fake.state().jobs.len(), 2);
     let said = receiver.end();
     assert_eq!(
         said.lines()
@@ -102,21 +102,21 @@ fn store(path: &'static str, bytes: &'static [u8]) -> std::net::SocketAddr {
 
 #[test]
 fn objects_are_fetched_from_a_store() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let store = store("/uploads/red%20flower/a%2B1.ply", b"ply of a store");
-    bench.file("token", TOKEN.replace(' ', "-").as_bytes());
+    environment.file("token", TOKEN.replace(' ', "-").as_bytes());
     let line = format!(
         "hook s3 --listen 127.0.0.1:0 --store-token-file token --bucket uploads --prefix http://{store}/uploads/ \
          --key {KEY} --message c0ffee42"
     );
-    let receiver = Receiver::start(&bench, &line, &[]);
+    let receiver = Receiver::start(&environment, &line, &[]);
     let body = notification("ObjectCreated:Put", "uploads", &[("red+flower/a%2B1.ply", "1")]);
     assert_eq!(send(&receiver, &body), 204);
     let missing = notification("ObjectCreated:Put", "uploads", &[("b.ply", "1")]);
     assert_eq!(send(&receiver, &missing), 500);
     let said = receiver.end();
     assert!(said.contains("/uploads/b.ply: the store answered 404"), "{said}");
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     let (artifact, bytes) = state.artifacts.values().next().unwrap();
     assert_eq!(
         (artifact.display_name.as_str(), bytes.as_slice()),
@@ -127,12 +127,12 @@ fn objects_are_fetched_from_a_store() {
 
 #[test]
 fn what_is_no_upload_of_a_scene_is_left_alone() {
-    let bench = Bench::new();
-    let receiver = start(&bench, "--message c0ffee42");
-    bench.file("outside.ply", b"ply");
-    bench.file("uploads/diary.ply", b"Dear diary");
-    bench.file("uploads/notes.txt", b"ply");
-    std::os::unix::fs::symlink(bench.path("outside.ply"), bench.path("uploads/link.ply")).unwrap();
+    let environment = TestEnvironment::new();
+    let receiver = start(&environment, "--message c0ffee42");
+    environment.file("outside.ply", b"ply");
+    environment.file("uploads/diary.ply", b"Dear diary");
+    environment.file("uploads/notes.txt", b"ply");
+    std::os::unix::fs::symlink(environment.path("outside.ply"), environment.path("uploads/link.ply")).unwrap();
     for key in [
         "..%2Foutside.ply",
         "/etc/passwd.ply",
@@ -151,7 +151,7 @@ fn what_is_no_upload_of_a_scene_is_left_alone() {
     ] {
         assert_eq!(send(&receiver, &body), 204);
     }
-    assert_eq!(bench.fake.state().created.len(), 0);
+    assert_eq!(environment.fake.state().created.len(), 0);
     // A folder that is behind, and what is no notification: the store is to try again.
     let missing = notification(
         "ObjectCreated:Put",
@@ -159,7 +159,7 @@ fn what_is_no_upload_of_a_scene_is_left_alone() {
         &[("red+flower/a.ply", "1"), ("late.ply", "1")],
     );
     assert_eq!(send(&receiver, &missing), 500);
-    assert_eq!(bench.fake.state().jobs.len(), 1, "the other one has its job");
+    assert_eq!(environment.fake.state().jobs.len(), 1, "the other one has its job");
     assert_eq!(send(&receiver, b"nonsense"), 500);
     let said = receiver.end();
     assert!(
@@ -170,8 +170,8 @@ fn what_is_no_upload_of_a_scene_is_left_alone() {
 
 #[test]
 fn only_the_store_may_tell() {
-    let bench = Bench::new();
-    let receiver = start(&bench, "--message c0ffee42");
+    let environment = TestEnvironment::new();
+    let receiver = start(&environment, "--message c0ffee42");
     let body = notification("ObjectCreated:Put", "uploads", &[("red+flower/a.ply", "1")]);
     for shown in ["", "Bearer ", "Bearer another", "Basic a-token-of-the-store's-own"] {
         let headers = match shown {
@@ -180,10 +180,10 @@ fn only_the_store_may_tell() {
         };
         assert_eq!(receiver.post(&headers, &body), 401, "{shown}");
     }
-    assert_eq!(bench.fake.state().created.len(), 0);
+    assert_eq!(environment.fake.state().created.len(), 0);
     receiver.end();
     let line = format!("hook s3 --bucket b --folder . --key {KEY} --message c0ffee42");
-    let ran = bench.run(&line);
+    let ran = environment.run(&line);
     assert!(
         ran.code == 1 && ran.err.contains("GUARDSPLAT_HOOK_TOKEN"),
         "{}",
@@ -193,30 +193,30 @@ fn only_the_store_may_tell() {
 
 #[test]
 fn a_program_says_what_an_object_is_marked_with() {
-    let bench = Bench::new();
-    bench.file(
+    let environment = TestEnvironment::new();
+    environment.file(
         "message.sh",
         b"read -r line; case $line in *'\"size\":3'*) echo C0FFEE07 ;; esac\n",
     );
-    let receiver = start(&bench, "-- sh message.sh");
+    let receiver = start(&environment, "-- sh message.sh");
     let body = notification("ObjectCreated:Put", "uploads", &[("red+flower/a.ply", "1")]);
     assert_eq!(send(&receiver, &body), 204);
     {
-        let state = bench.fake.state();
+        let state = environment.fake.state();
         let Some(Spec::Embed(spec)) = &state.created[0].job.as_ref().unwrap().spec else {
             panic!()
         };
         assert_eq!(spec.message, "c0ffee07");
     }
     // Another answer for the same object is refused by the server, and telling again would not help.
-    bench.file("message.sh", b"cat >/dev/null; echo 00000000\n");
+    environment.file("message.sh", b"cat >/dev/null; echo 00000000\n");
     assert_eq!(send(&receiver, &body), 204);
-    assert_eq!(bench.fake.state().jobs.len(), 1);
+    assert_eq!(environment.fake.state().jobs.len(), 1);
     // What it says nothing of is left alone.
-    bench.file("message.sh", b"cat >/dev/null\n");
+    environment.file("message.sh", b"cat >/dev/null\n");
     assert_eq!(send(&receiver, &body), 204);
     // One that fails is asked again.
-    bench.file("message.sh", b"exit 1\n");
+    environment.file("message.sh", b"exit 1\n");
     assert_eq!(send(&receiver, &body), 500);
     let said = receiver.end();
     assert!(
@@ -228,12 +228,12 @@ fn a_program_says_what_an_object_is_marked_with() {
 /// The example of a program.
 #[test]
 fn the_example_reads_the_owner_from_the_key() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/hooks/message.sh");
-    let receiver = start(&bench, &format!("-- bash {}", script.display()));
+    let receiver = start(&environment, &format!("-- bash {}", script.display()));
     for folder in ["0004711", "99999999999", "4294967296"] {
-        std::fs::create_dir(bench.path(&format!("uploads/{folder}"))).unwrap();
-        bench.file(&format!("uploads/{folder}/a.ply"), b"ply");
+        std::fs::create_dir(environment.path(&format!("uploads/{folder}"))).unwrap();
+        environment.file(&format!("uploads/{folder}/a.ply"), b"ply");
         let key = format!("{folder}%2Fa.ply");
         let body = notification(
             "ObjectCreated:Put",
@@ -243,7 +243,7 @@ fn the_example_reads_the_owner_from_the_key() {
         assert_eq!(send(&receiver, &body), 204);
     }
     let said = receiver.end();
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     assert_eq!(state.created.len(), 1, "{said}");
     let Some(Spec::Embed(spec)) = &state.created[0].job.as_ref().unwrap().spec else {
         panic!()

@@ -7,7 +7,7 @@ use guardsplat_proto::v1::{
 use tonic::{Request, Response, Status};
 
 use super::fake::Fake;
-use super::run::{Bench, finish};
+use super::run::{TestEnvironment, finish};
 use super::services::not_found;
 
 const NAME: &str = "tokens/0190a5d0-0000-7000-8000-00000000000b";
@@ -49,8 +49,8 @@ impl TokenService for Fake {
 
 #[test]
 fn a_token_is_made_shown_once_and_revoked() {
-    let bench = Bench::new();
-    let ran = bench.run("token create --scope embed --scope verify --expires 90d --display-name shop");
+    let environment = TestEnvironment::new();
+    let ran = environment.run("token create --scope embed --scope verify --expires 90d --display-name shop");
     assert_eq!(ran.code, 0, "{}", ran.err);
     // Alone on standard output, so that it can go straight into a file.
     assert_eq!(ran.out, format!("{SECRET}\n"));
@@ -59,36 +59,36 @@ fn a_token_is_made_shown_once_and_revoked() {
         "{}",
         ran.err
     );
-    let made = bench.fake.state().tokens[0].clone();
+    let made = environment.fake.state().tokens[0].clone();
     assert_eq!(made.scopes().collect::<Vec<_>>(), [Scope::Embed, Scope::Verify]);
 
-    let listed = bench.run("token list");
+    let listed = environment.run("token list");
     assert_eq!(listed.out.lines().count(), 1);
     assert!(
         listed.out.starts_with(NAME) && listed.out.contains("shop"),
         "{}",
         listed.out
     );
-    let revoked = bench.run(&format!("token revoke {} --json", &NAME[7..])).json();
+    let revoked = environment.run(&format!("token revoke {} --json", &NAME[7..])).json();
     assert_eq!(revoked["revoke_time"], "1970-01-01T00:00:00Z");
     assert_eq!(revoked["scopes"], serde_json::json!(["embed", "verify"]));
-    assert_eq!(bench.run("token revoke 7").code, 1);
+    assert_eq!(environment.run("token revoke 7").code, 1);
 }
 
 #[test]
 fn the_client_shows_its_token_and_says_it_nowhere() {
-    let bench = Bench::new();
-    bench.file("token", b"gst_1_file\n");
+    let environment = TestEnvironment::new();
+    environment.file("token", b"gst_1_file\n");
     let command = |line: &str| {
-        let mut command = bench.command(line);
-        command.env("GUARDSPLAT_SERVER", bench.fake.url());
+        let mut command = environment.command(line);
+        command.env("GUARDSPLAT_SERVER", environment.fake.url());
         command
     };
     let from_file = finish(command("key list --token-file token").spawn().unwrap());
     let mut variable = command("key list --token-file token");
     let from_variable = finish(variable.env("GUARDSPLAT_TOKEN", "gst_2_variable").spawn().unwrap());
     let none = finish(command("key list").spawn().unwrap());
-    let shown = bench.fake.state().shown.clone();
+    let shown = environment.fake.state().shown.clone();
     assert_eq!(
         shown,
         [
@@ -121,6 +121,6 @@ fn the_client_shows_its_token_and_says_it_nowhere() {
         "{}",
         bad.err
     );
-    let missing = bench.run("key list --token-file nowhere");
+    let missing = environment.run("key list --token-file nowhere");
     assert!(missing.err.contains("--token-file: nowhere: "), "{}", missing.err);
 }

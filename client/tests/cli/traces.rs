@@ -12,7 +12,7 @@ use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
 use tonic::{Request, Response, Status};
 
-use super::run::{Bench, PICTURE, Ran, finish};
+use super::run::{PICTURE, Ran, TestEnvironment, finish};
 
 const TRACE: &str = "0af7651916cd43dd8448eb211c80319c";
 const CALLER: &str = "b7ad6b7169203331";
@@ -64,10 +64,10 @@ impl Collector {
     }
 }
 
-fn run(bench: &Bench, line: &str, collector: SocketAddr, parent: &str) -> Ran {
-    let child = bench
+fn run(environment: &TestEnvironment, line: &str, collector: SocketAddr, parent: &str) -> Ran {
+    let child = environment
         .command(line)
-        .env("GUARDSPLAT_SERVER", bench.fake.url())
+        .env("GUARDSPLAT_SERVER", environment.fake.url())
         .env("GUARDSPLAT_TOKEN", "gst_0_5ec2e75ec2e7")
         .env("OTEL_EXPORTER_OTLP_ENDPOINT", format!("http://{collector}"))
         .env("TRACEPARENT", parent)
@@ -84,8 +84,8 @@ fn attribute<'a>(attributes: &'a [KeyValue], key: &str) -> Option<&'a Value> {
 fn a_command_is_a_span_that_its_calls_are_below() {
     let collector = Collector::default();
     let address = collector.start();
-    let bench = Bench::new();
-    let ran = run(&bench, "key list", address, &format!("00-{TRACE}-{CALLER}-01"));
+    let environment = TestEnvironment::new();
+    let ran = run(&environment, "key list", address, &format!("00-{TRACE}-{CALLER}-01"));
     assert_eq!(ran.code, 0, "{}", ran.err);
     let (span, text) = collector.span();
     assert_eq!(span.name, "guardsplat key list");
@@ -102,12 +102,17 @@ fn a_command_is_a_span_that_its_calls_are_below() {
         "{text}"
     );
     let said = format!("00-{TRACE}-{}-01", hex::encode(&span.span_id));
-    let traced = std::mem::take(&mut bench.fake.state().traced);
+    let traced = std::mem::take(&mut environment.fake.state().traced);
     assert_eq!(traced, [Some(said)]);
 
     // Nobody above: a trace of its own. It fails, and nothing that it was given is told.
-    bench.file("in.png", PICTURE);
-    let ran = run(&bench, "verify in.png --key secretkey --message c0ffee42", address, "");
+    environment.file("in.png", PICTURE);
+    let ran = run(
+        &environment,
+        "verify in.png --key secretkey --message c0ffee42",
+        address,
+        "",
+    );
     assert_eq!(ran.code, 1, "{}", ran.err);
     let (span, text) = collector.span();
     assert_eq!(span.name, "guardsplat verify");
@@ -128,11 +133,11 @@ fn a_command_is_a_span_that_its_calls_are_below() {
 fn who_is_not_sampled_sends_nothing_and_says_so() {
     let collector = Collector::default();
     let address = collector.start();
-    let bench = Bench::new();
-    let ran = run(&bench, "key list", address, &format!("00-{TRACE}-{CALLER}-00"));
+    let environment = TestEnvironment::new();
+    let ran = run(&environment, "key list", address, &format!("00-{TRACE}-{CALLER}-00"));
     assert_eq!(ran.code, 0, "{}", ran.err);
     assert!(collector.0.lock().unwrap().is_empty());
-    let said = bench.fake.state().traced[0].clone().unwrap();
+    let said = environment.fake.state().traced[0].clone().unwrap();
     assert!(
         said.starts_with(&format!("00-{TRACE}-")) && said.ends_with("-00"),
         "{said}"
@@ -141,13 +146,13 @@ fn who_is_not_sampled_sends_nothing_and_says_so() {
 
 #[test]
 fn a_collector_that_is_away_breaks_nothing() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     // One that takes connections and says nothing, and one that is not there.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let gone = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     for collector in [silent.local_addr().unwrap(), gone] {
         let begun = Instant::now();
-        let ran = run(&bench, "key list --json", collector, "");
+        let ran = run(&environment, "key list --json", collector, "");
         assert_eq!(ran.code, 0, "{}", ran.err);
         assert!(ran.json().is_object() || ran.json().is_array());
         assert_eq!(ran.err, "");
@@ -158,18 +163,18 @@ fn a_collector_that_is_away_breaks_nothing() {
 
 #[test]
 fn what_it_is_a_part_of_is_passed_on_without_a_collector() {
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let parent = format!("00-{TRACE}-{CALLER}-01");
     let mut traced = Vec::new();
     for given in [parent.as_str(), "00-nonsense"] {
-        let child = bench
+        let child = environment
             .command("key list")
-            .env("GUARDSPLAT_SERVER", bench.fake.url())
+            .env("GUARDSPLAT_SERVER", environment.fake.url())
             .env_remove("OTEL_EXPORTER_OTLP_ENDPOINT")
             .env("TRACEPARENT", given)
             .spawn();
         assert_eq!(finish(child.unwrap()).code, 0);
-        traced.append(&mut bench.fake.state().traced);
+        traced.append(&mut environment.fake.state().traced);
     }
     assert_eq!(traced, [Some(parent), None]);
 }

@@ -4,7 +4,7 @@ use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use guardsplat_proto::v1::verify_result::Verdict;
 
 use super::fake::{KEY, success};
-use super::run::{Bench, PICTURE};
+use super::run::{PICTURE, TestEnvironment};
 
 fn result(verdict: Verdict) -> VerifyResult {
     let mut result = VerifyResult {
@@ -31,21 +31,21 @@ fn result(verdict: Verdict) -> VerifyResult {
     result
 }
 
-fn bench(verdict: Verdict) -> Bench {
-    let bench = Bench::new();
-    bench.fake.plan([success(Outcome::VerifyResult(result(verdict)))]);
-    std::fs::create_dir(bench.path("views")).unwrap();
+fn environment(verdict: Verdict) -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    environment.fake.plan([success(Outcome::VerifyResult(result(verdict)))]);
+    std::fs::create_dir(environment.path("views")).unwrap();
     for name in ["b.png", "a.jpg", "notes.txt"] {
-        bench.file(&format!("views/{name}"), name.as_bytes());
+        environment.file(&format!("views/{name}"), name.as_bytes());
     }
-    bench.file("c.webp", PICTURE);
-    bench
+    environment.file("c.webp", PICTURE);
+    environment
 }
 
 #[test]
 fn a_match_exits_with_0_and_tells_the_figures() {
-    let bench = bench(Verdict::Match);
-    let ran = bench.run("verify views c.webp --key website --message c0ffee42 --json");
+    let environment = environment(Verdict::Match);
+    let ran = environment.run("verify views c.webp --key website --message c0ffee42 --json");
     assert_eq!(ran.code, 0, "{}", ran.err);
     let json = ran.json();
     assert_eq!((&json["verdict"], &json["key"]), (&"match".into(), &KEY.into()));
@@ -57,7 +57,7 @@ fn a_match_exits_with_0_and_tells_the_figures() {
     );
     assert!(json["reason"].is_null());
 
-    let state = bench.fake.state();
+    let state = environment.fake.state();
     let Some(Spec::Verify(spec)) = state.created[0].job.as_ref().unwrap().spec.clone() else {
         panic!("{:?}", state.created);
     };
@@ -68,7 +68,7 @@ fn a_match_exits_with_0_and_tells_the_figures() {
 
 #[test]
 fn no_match_exits_with_2() {
-    let ran = bench(Verdict::NoMatch).run("verify c.webp --key website --message c0ffee42");
+    let ran = environment(Verdict::NoMatch).run("verify c.webp --key website --message c0ffee42");
     assert_eq!(ran.code, 2, "{}", ran.err);
     let expected = "no match: 31 of 32 bits, p = 7.50e-9 (threshold 1e-6); 87.50 % of bits a view, worst 75.00 %; \
                     read c0ffee43 from 3 views; views agree on 90.0 % of bits, mean logit 1.50\n";
@@ -77,8 +77,8 @@ fn no_match_exits_with_2() {
 
 #[test]
 fn nothing_decided_exits_with_3() {
-    let bench = bench(Verdict::Inconclusive);
-    let ran = bench.run("verify c.webp --key website --json");
+    let environment = environment(Verdict::Inconclusive);
+    let ran = environment.run("verify c.webp --key website --json");
     assert_eq!(ran.code, 3, "{}", ran.err);
     let json = ran.json();
     assert_eq!(
@@ -90,12 +90,12 @@ fn nothing_decided_exits_with_3() {
 
 #[test]
 fn views_of_a_scene_can_be_chosen() {
-    let bench = bench(Verdict::Match);
+    let environment = environment(Verdict::Match);
     // By its first bytes a scene; names say nothing.
-    bench.file("s.png", b"NGSP and so on");
-    let ran = bench.run("verify s.png --key website --message c0ffee42 --views 5 --size 64 --seed 3");
+    environment.file("s.png", b"NGSP and so on");
+    let ran = environment.run("verify s.png --key website --message c0ffee42 --views 5 --size 64 --seed 3");
     assert_eq!(ran.code, 0, "{}", ran.err);
-    let created = bench.fake.state().created[0].job.clone().unwrap();
+    let created = environment.fake.state().created[0].job.clone().unwrap();
     let Some(Spec::Verify(spec)) = created.spec else {
         panic!()
     };

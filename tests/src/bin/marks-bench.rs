@@ -5,14 +5,14 @@
 //! the same: 32 bits, seed 1, 8f3a5c71.
 use std::path::Path;
 
-use guardsplat_tests::Bench;
+use guardsplat_tests::TestEnvironment;
 use serde_json::Value;
 
 const MESSAGE: &str = "8f3a5c71";
 
 fn main() {
-    let bench = Bench::new();
-    bench.exits("key create --bits 32 --seed 1 -o k.key --device cpu", 0);
+    let environment = TestEnvironment::new();
+    environment.exits("key create --bits 32 --seed 1 -o k.key --device cpu", 0);
     println!(
         "| scene | preset | Gaussians | seen | bits of a picture | worst picture | message | PSNR | SSIM | view-steps | seconds | \
          peak, predicted MB | unmarked |\n|{}",
@@ -20,15 +20,15 @@ fn main() {
     );
     for argument in std::env::args().skip(1) {
         let (scene, preset) = argument.split_once('@').unwrap_or((&argument, "standard"));
-        println!("{}", row(&bench, scene, preset));
+        println!("{}", row(&environment, scene, preset));
     }
 }
 
 /// Marks one scene; the unmarked one is read first.
-fn row(bench: &Bench, scene: &str, preset: &str) -> String {
+fn row(environment: &TestEnvironment, scene: &str, preset: &str) -> String {
     let (name, input) = match scene.strip_prefix("sample:") {
         Some(seed) => {
-            bench.exits(&format!("sample in.ply --gaussians 50000 --seed {seed}"), 0);
+            environment.exits(&format!("sample in.ply --gaussians 50000 --seed {seed}"), 0);
             (format!("sample of seed {seed}"), "in.ply".to_owned())
         }
         None => {
@@ -45,11 +45,11 @@ fn row(bench: &Bench, scene: &str, preset: &str) -> String {
         output
     };
     let before = json(
-        bench,
+        environment,
         &format!("verify {input} --key k.key --message {MESSAGE} --device cpu --json"),
     );
     let report = json(
-        bench,
+        environment,
         &format!(
             "embed {input} {output} --key k.key --message {MESSAGE} --preset {preset} --device cpu --json --force"
         ),
@@ -77,8 +77,8 @@ fn row(bench: &Bench, scene: &str, preset: &str) -> String {
 }
 
 /// What a command prints that may also end with a verdict or a missed target.
-fn json(bench: &Bench, line: &str) -> Value {
-    let output = bench.run(line);
+fn json(environment: &TestEnvironment, line: &str) -> Value {
+    let output = environment.run(line);
     assert!(
         matches!(output.status.code(), Some(0 | 2 | 3)),
         "{line}: {}",

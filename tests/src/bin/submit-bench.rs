@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CreateJobRequest, Job, KeySpec};
-use guardsplat_tests::{Bench, Service};
+use guardsplat_tests::{Service, TestEnvironment};
 use uuid::Uuid;
 
 const P99: Duration = Duration::from_millis(50);
@@ -27,7 +27,7 @@ async fn main() -> ExitCode {
         eprintln!("error: wants the number of jobs, and of callers at once");
         return ExitCode::FAILURE;
     };
-    let mut service = Service::start(Bench::new(), "");
+    let mut service = Service::start(TestEnvironment::new(), "");
     let start = Instant::now();
     let mut tasks = Vec::new();
     for caller in 0..callers {

@@ -1,6 +1,6 @@
 //! Compares scenes as different programs read them.
 use guardsplat_scene::{Format, Gaussians, Scene};
-use guardsplat_tests::Bench;
+use guardsplat_tests::TestEnvironment;
 use guardsplat_tests::ply::Ply;
 
 /// Numbers that two programs compute from the same bytes differ by rounding.
@@ -153,10 +153,10 @@ fn sign(harmonic: usize) -> f32 {
 
 /// Checks that the pictures of two folders are the same but for one step of 8 bits.
 #[track_caller]
-pub fn pictures_agree(bench: &Bench, a: &str, b: &str, views: usize) {
+pub fn pictures_agree(environment: &TestEnvironment, a: &str, b: &str, views: usize) {
     for view in 0..views {
         let [a, b] = [a, b].map(|folder| {
-            let bytes = bench.read(&format!("{folder}/view_{view:03}.png"));
+            let bytes = environment.read(&format!("{folder}/view_{view:03}.png"));
             image::load_from_memory(&bytes).unwrap().to_rgb8().into_raw()
         });
         let differences: Vec<u8> = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).collect();

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use guardsplat_engine::testing::tiny;
 use guardsplat_scene::{Format, Scene};
-use guardsplat_tests::{Bench, Reader, real_scene};
+use guardsplat_tests::{Reader, TestEnvironment, real_scene};
 
 /// Few and small views, steps that files of 8 bits see, and a target that any result reaches.
 const SETTINGS: &str = r#"{"steps": 4, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
@@ -15,40 +15,40 @@ const SETTINGS: &str = r#"{"steps": 4, "views_per_step": 2, "fresh_per_step": 1,
 
 /// A key for a tiny CLIP with random weights: marks are made with it, whatever they are worth.
 static KEY: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let bench = bench_without_key();
-    bench.exits("key create --bits 32 --seed 5 -o k.key --device cpu", 0);
-    bench.read("k.key")
+    let environment = environment_without_key();
+    environment.exits("key create --bits 32 --seed 5 -o k.key --device cpu", 0);
+    environment.read("k.key")
 });
 
-fn bench_without_key() -> Bench {
-    let mut bench = Bench::new();
-    tiny::write(&bench.path("clip"));
-    bench.set("GUARDSPLAT_CLIP", bench.path("clip"));
-    bench
+fn environment_without_key() -> TestEnvironment {
+    let mut environment = TestEnvironment::new();
+    tiny::write(&environment.path("clip"));
+    environment.set("GUARDSPLAT_CLIP", environment.path("clip"));
+    environment
 }
 
-fn bench() -> Bench {
-    let bench = bench_without_key();
-    bench.write("k.key", &*KEY);
-    bench.write("hasty.json", SETTINGS);
-    bench
+fn environment() -> TestEnvironment {
+    let environment = environment_without_key();
+    environment.write("k.key", &*KEY);
+    environment.write("hasty.json", SETTINGS);
+    environment
 }
 
 /// Draws a scene, marks it, and has the marked file read by other programs.
 fn check(scene: &Path, format: Format, readers: &[Reader]) {
-    let bench = bench();
+    let environment = environment();
     let extension = format.extension();
     let (input, output) = (format!("in.{extension}"), format!("out.{extension}"));
-    std::fs::copy(scene, bench.path(&input)).unwrap();
-    bench.exits(&format!("render {input} views --views 1 --size 48 --device cpu"), 0);
-    let report = bench.json(
+    std::fs::copy(scene, environment.path(&input)).unwrap();
+    environment.exits(&format!("render {input} views --views 1 --size 48 --device cpu"), 0);
+    let report = environment.json(
         &format!(
             "embed {input} {output} --key k.key --message c0ffee42 --settings hasty.json --size 32 --force --preset \
              draft --device cpu --json"
         ),
         0,
     );
-    let [before, after] = [&input, &output].map(|name| Scene::read(&bench.path(name)).unwrap());
+    let [before, after] = [&input, &output].map(|name| Scene::read(&environment.path(name)).unwrap());
     assert_eq!([before.format(), after.format()], [format; 2]);
     let changed = compare::changed(&before.gaussians, &after.gaussians);
     // New ranges of a compressed PLY move colours of Gaussians that nobody sees, too.
@@ -61,9 +61,9 @@ fn check(scene: &Path, format: Format, readers: &[Reader]) {
 
     for reader in readers {
         let [original, marked] = [&input, &output].map(|name| {
-            let found = reader.read(&bench.path(name), &bench.path(format!("{name}.read.ply")));
+            let found = reader.read(&environment.path(name), &environment.path(format!("{name}.read.ply")));
             let turned = reader.turns(name.as_ref());
-            compare::agrees(&Scene::read(&bench.path(name)).unwrap(), &found, turned);
+            compare::agrees(&Scene::read(&environment.path(name)).unwrap(), &found, turned);
             found
         });
         assert_eq!(compare::marked_rows(&original, &marked), changed, "{reader:?}");
@@ -129,13 +129,13 @@ fn spz_and_ply_of_a_scene_look_alike() {
     let (Some(spz), Some(ply)) = (real_scene("pod.spz"), real_scene("pod.ply")) else {
         return;
     };
-    let bench = Bench::new();
+    let environment = TestEnvironment::new();
     let [spz, ply] = [spz, ply].map(|path| path.display().to_string());
-    bench.exits(&format!("render {spz} spz --views 3 --size 256 --device cpu"), 0);
-    bench.exits(&format!("render {ply} ply --cameras spz/cameras.json --device cpu"), 0);
-    bench.exits(
+    environment.exits(&format!("render {spz} spz --views 3 --size 256 --device cpu"), 0);
+    environment.exits(&format!("render {ply} ply --cameras spz/cameras.json --device cpu"), 0);
+    environment.exits(
         &format!("render {spz} again --cameras spz/cameras.json --device cpu"),
         0,
     );
-    compare::pictures_agree(&bench, "again", "ply", 3);
+    compare::pictures_agree(&environment, "again", "ply", 3);
 }

@@ -10,7 +10,7 @@ use guardsplat_proto::v1::{
     GetArtifactRequest, LeaseJobRequest, ListJobsRequest, UploadArtifactRequest, UploadMetadata,
 };
 use guardsplat_tests::process::until;
-use guardsplat_tests::{Bench, Service};
+use guardsplat_tests::{Service, TestEnvironment};
 use sha2::{Digest, Sha256};
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Request, Status};
@@ -41,7 +41,7 @@ fn field(status: &Status) -> String {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn wrong_calls_are_told_what_is_wrong() {
-    let service = Service::start(Bench::new(), "");
+    let service = Service::start(TestEnvironment::new(), "");
     let channel = service.channel().await;
     let mut artifacts = ArtifactServiceClient::new(channel.clone());
     let data = vec![7; MEBIBYTE + 1];
@@ -119,7 +119,7 @@ async fn wrong_calls_are_told_what_is_wrong() {
     );
 
     // A key that nobody made.
-    service.bench.write("in.ply", "ply");
+    service.environment.write("in.ply", "ply");
     let nobody = "keys/0190a5d0-0000-7000-8000-00000000000a";
     let error = &service.json(&format!("embed in.ply -o out.ply --key {nobody} --message 00"), 1)["error"];
     assert_eq!(
@@ -132,8 +132,8 @@ async fn wrong_calls_are_told_what_is_wrong() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_upload_that_a_kill_cut_off_is_collected() {
-    let mut service = Service::start(Bench::new(), "--abandoned-after-seconds 1");
-    service.bench.write("whole.ply", "ply, and so on");
+    let mut service = Service::start(TestEnvironment::new(), "--abandoned-after-seconds 1");
+    service.environment.write("whole.ply", "ply, and so on");
     let whole = service.json("artifact put whole.ply", 0);
     let data = vec![7; 3 * MEBIBYTE];
     let (sender, receiver) = tokio::sync::mpsc::channel(3);
@@ -160,5 +160,5 @@ async fn an_upload_that_a_kill_cut_off_is_collected() {
     // What was whole is still there.
     let name = whole["name"].as_str().unwrap();
     service.json(&format!("artifact get {name} -o again.ply"), 0);
-    assert_eq!(service.bench.read("again.ply"), b"ply, and so on");
+    assert_eq!(service.environment.read("again.ply"), b"ply, and so on");
 }

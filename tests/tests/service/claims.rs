@@ -2,7 +2,7 @@
 //! the evidence is checked without a server. With the shipped CLIP, since the mark has to be read.
 use std::time::Duration;
 
-use guardsplat_tests::{Bench, Service};
+use guardsplat_tests::{Service, TestEnvironment};
 use serde_json::Value;
 
 /// The name that a command prints.
@@ -14,10 +14,10 @@ fn made(service: &Service, line: &str) -> String {
 
 #[test]
 fn an_asset_is_marked_and_recognised_and_another_is_not() {
-    let bench = Bench::new();
-    bench.exits("sample in.ply --gaussians 3000 --sh-degree 1 --seed 2", 0);
-    bench.exits("sample other.ply --gaussians 100 --sh-degree 0 --seed 3", 0);
-    let mut service = Service::start(bench, "--embedded-worker true");
+    let environment = TestEnvironment::new();
+    environment.exits("sample in.ply --gaussians 3000 --sh-degree 1 --seed 2", 0);
+    environment.exits("sample other.ply --gaussians 100 --sh-degree 0 --seed 3", 0);
+    let mut service = Service::start(environment, "--embedded-worker true");
     service.patience = Duration::from_secs(600);
     let key = made(&service, "key create --bits 64 --seed 3 --display-name site");
     let owner = made(&service, "owner create studio");
@@ -66,9 +66,9 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
 
     // Pictures that somebody turned, mirrored and darkened.
     service
-        .bench
+        .environment
         .exits("render out.ply views --views 12 --size 160 --device cpu", 0);
-    for entry in std::fs::read_dir(service.bench.path("views")).unwrap() {
+    for entry in std::fs::read_dir(service.environment.path("views")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "png") {
             let mut picture = image::open(&path).unwrap().rotate90().fliph().into_rgb8();
@@ -94,14 +94,14 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
     service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);
     // With pictures in it: what was read, and of the marking the originals and the differences besides.
     let pictures = |folder: &str| {
-        let page = service.bench.path(folder).join("evidence.html");
+        let page = service.environment.path(folder).join("evidence.html");
         std::fs::read_to_string(page).unwrap().matches("data:image/png").count()
     };
     let marking = marked["job"].as_str().unwrap();
     service.json(&format!("report open {marking} -o marking"), 0);
     assert_eq!((pictures("report"), pictures("marking")), (4, 9));
     let pem = service.json("report key", 0)["pem"].as_str().unwrap().to_owned();
-    service.bench.write("service.pem", pem);
+    service.environment.write("service.pem", pem);
     assert!(
         !service.log().contains("ERROR") && !service.log().contains("panicked"),
         "{}",
@@ -137,9 +137,9 @@ fn a_real_scene_is_marked_as_a_user_would_and_found_on_a_page() {
     let Some(scene) = guardsplat_tests::real_scene("playbot_31k.ply") else {
         return;
     };
-    let bench = Bench::new();
-    std::fs::copy(scene, bench.path("in.ply")).unwrap();
-    let mut service = Service::start(bench, "--embedded-worker true --worker-device cpu");
+    let environment = TestEnvironment::new();
+    std::fs::copy(scene, environment.path("in.ply")).unwrap();
+    let mut service = Service::start(environment, "--embedded-worker true --worker-device cpu");
     service.patience = Duration::from_secs(600);
     made(&service, "key create --bits 64 --seed 3 --display-name site");
     made(&service, "owner create studio");
@@ -153,12 +153,16 @@ fn a_real_scene_is_marked_as_a_user_would_and_found_on_a_page() {
     );
 
     service
-        .bench
+        .environment
         .exits("render out.ply views --views 3 --size 480 --device cpu", 0);
-    std::fs::create_dir(service.bench.path("pages")).unwrap();
+    std::fs::create_dir(service.environment.path("pages")).unwrap();
     for view in ["view_000.png", "view_001.png", "view_002.png"] {
-        let picture = image::open(service.bench.path("views").join(view)).unwrap().into_rgb8();
-        page(&picture).save(service.bench.path("pages").join(view)).unwrap();
+        let picture = image::open(service.environment.path("views").join(view))
+            .unwrap()
+            .into_rgb8();
+        page(&picture)
+            .save(service.environment.path("pages").join(view))
+            .unwrap();
     }
     let found = service.json("verify pages --key site --search", 0);
     println!("{found}");

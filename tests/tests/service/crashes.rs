@@ -5,21 +5,21 @@ use std::os::unix::fs::PermissionsExt;
 use guardsplat_tests::process::until;
 use guardsplat_tests::{Service, worker};
 
-use crate::{EMBED, KEY, bench, offline};
+use crate::{EMBED, KEY, environment, offline};
 
 /// Fetches what an embedding made and compares it with the offline result.
 #[track_caller]
 fn is_as_expected(service: &Service, job: &serde_json::Value) {
     let scene = job["result"]["scene"].as_str().unwrap_or_else(|| panic!("{job}"));
     service.json(&format!("artifact get {scene} -o out.ply"), 0);
-    assert!(service.bench.read("out.ply") == service.bench.read("expected.ply"));
+    assert!(service.environment.read("out.ply") == service.environment.read("expected.ply"));
 }
 
 #[test]
 fn when_a_worker_is_killed_another_finishes_its_job() {
-    let bench = bench();
-    offline(&bench, "standard");
-    let service = Service::start(bench, "--lease-seconds 2");
+    let environment = environment();
+    offline(&environment, "standard");
+    let service = Service::start(environment, "--lease-seconds 2");
     let mut first = service.worker("first");
     service.json(KEY, 0);
     let name = service.submit(&format!("{EMBED} standard"));
@@ -36,9 +36,9 @@ fn when_a_worker_is_killed_another_finishes_its_job() {
 
 #[test]
 fn a_worker_that_stopped_and_comes_back_changes_nothing() {
-    let bench = bench();
-    offline(&bench, "standard");
-    let service = Service::start(bench, "--lease-seconds 2");
+    let environment = environment();
+    offline(&environment, "standard");
+    let service = Service::start(environment, "--lease-seconds 2");
     let zombie = service.worker("zombie");
     service.json(KEY, 0);
     let name = service.submit(&format!("{EMBED} standard"));
@@ -82,19 +82,21 @@ exec "$WORKER" "$@" 2>>"$log"
 
 #[test]
 fn a_job_that_kills_its_worker_is_given_up_and_the_next_one_runs() {
-    let mut bench = bench();
-    bench.set("WORKER", worker());
-    bench.write("fragile", FRAGILE);
-    fs::set_permissions(bench.path("fragile"), fs::Permissions::from_mode(0o755)).unwrap();
+    let mut environment = environment();
+    environment.set("WORKER", worker());
+    environment.write("fragile", FRAGILE);
+    fs::set_permissions(environment.path("fragile"), fs::Permissions::from_mode(0o755)).unwrap();
     let flags = "--embedded-worker true --worker-binary fragile --lease-seconds 2";
-    let service = Service::start(bench, flags);
+    let service = Service::start(environment, flags);
     service.json(KEY, 0);
 
     // The worker finds no job, and then there are two: the deadly one is known before any of them begins.
     let scene = service.json("artifact put in.ply", 0);
     let scene = scene["name"].as_str().unwrap();
     let deadly = service.submit(&format!("embed {scene} --key site --message c0ffee42 --preset paper"));
-    service.bench.write("deadly", deadly.strip_prefix("jobs/").unwrap());
+    service
+        .environment
+        .write("deadly", deadly.strip_prefix("jobs/").unwrap());
     let next = service.submit("key create --bits 8 --seed 1");
     let failed = service.reaches(&deadly, "failed");
     assert_eq!((&failed["attempt"], &failed["max_attempts"]), (&3.into(), &3.into()));

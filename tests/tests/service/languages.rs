@@ -3,14 +3,14 @@ use std::process::Command;
 
 use guardsplat_tests::{Service, python};
 
-use crate::bench;
+use crate::environment;
 
 #[test]
 fn a_client_of_another_language_works_from_reflection_alone() {
     let Some(python) = python::python("grpc") else {
         return;
     };
-    let service = Service::start(bench(), "--embedded-worker true");
+    let service = Service::start(environment(), "--embedded-worker true");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/service/generic_client.py");
     let output = Command::new(python).args([script, service.address()]).output().unwrap();
     let [text, log] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));

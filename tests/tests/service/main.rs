@@ -11,7 +11,7 @@ mod restarts;
 mod strangers;
 
 use guardsplat_engine::testing::tiny;
-use guardsplat_tests::Bench;
+use guardsplat_tests::TestEnvironment;
 use serde_json::Value;
 
 /// Marks like the embed jobs of these tests, offline.
@@ -25,17 +25,17 @@ const KEY: &str = "key create --bits 32 --seed 7 --display-name site";
 const MISSED: i32 = 3;
 
 /// A folder with a tiny CLIP, and a scene.
-fn bench() -> Bench {
-    let mut bench = Bench::new();
-    tiny::write(&bench.path("clip"));
-    bench.set("GUARDSPLAT_CLIP", bench.path("clip"));
-    bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
-    bench
+fn environment() -> TestEnvironment {
+    let mut environment = TestEnvironment::new();
+    tiny::write(&environment.path("clip"));
+    environment.set("GUARDSPLAT_CLIP", environment.path("clip"));
+    environment.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
+    environment
 }
 
 /// What the worker makes of the scene without a server: a key, and the marked scene `expected.ply`, whose figures come
 /// back.
-fn offline(bench: &Bench, preset: &str) -> Value {
-    bench.exits("key create --bits 32 --seed 7 -o k.key --device cpu", 0);
-    bench.json(&format!("{OFFLINE} {preset}"), MISSED)
+fn offline(environment: &TestEnvironment, preset: &str) -> Value {
+    environment.exits("key create --bits 32 --seed 7 -o k.key --device cpu", 0);
+    environment.json(&format!("{OFFLINE} {preset}"), MISSED)
 }

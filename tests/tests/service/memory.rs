@@ -2,17 +2,17 @@
 use guardsplat_tests::Service;
 use guardsplat_tests::ply::Ply;
 
-use crate::{KEY, bench};
+use crate::{KEY, environment};
 
 const LIMIT: u64 = 64 << 20;
 
 #[test]
 fn scenes_that_do_not_fit_are_refused_with_the_numbers() {
-    let bench = bench();
+    let environment = environment();
     // Each Gaussian takes 56 bytes in its file and as much in memory, and twice that to be marked.
-    bench.write("vast.ply", Ply::new(320_000, 0).bytes());
-    bench.write("large.ply", Ply::new(200_000, 0).bytes());
-    let service = Service::start(bench, "--embedded-worker true --max-job-memory-mebibytes 64");
+    environment.write("vast.ply", Ply::new(320_000, 0).bytes());
+    environment.write("large.ply", Ply::new(200_000, 0).bytes());
+    let service = Service::start(environment, "--embedded-worker true --max-job-memory-mebibytes 64");
     service.json(KEY, 0);
 
     // One that can't fit is not even queued.

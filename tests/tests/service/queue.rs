@@ -1,16 +1,16 @@
 //! Cancelling, and giving back.
 use std::time::{Duration, Instant};
 
-use guardsplat_tests::{Bench, Service};
+use guardsplat_tests::{Service, TestEnvironment};
 
-use crate::{EMBED, KEY, bench, offline};
+use crate::{EMBED, KEY, environment, offline};
 
 /// With the shipped CLIP, whose steps take as long as they do.
 #[test]
 fn cancel_ends_a_running_embedding_soon() {
-    let bench = Bench::new();
-    bench.exits("sample in.ply --gaussians 5000 --seed 2", 0);
-    let service = Service::start(bench, "--embedded-worker true");
+    let environment = TestEnvironment::new();
+    environment.exits("sample in.ply --gaussians 5000 --seed 2", 0);
+    let service = Service::start(environment, "--embedded-worker true");
     service.json("key create --bits 4 --seed 7 --display-name site", 0);
     let name = service.submit("embed in.ply --key site --message f");
     service.is_embedding(&name, 1);
@@ -32,9 +32,9 @@ fn cancel_ends_a_running_embedding_soon() {
 
 #[test]
 fn a_worker_that_is_asked_to_leave_gives_its_job_back() {
-    let bench = bench();
-    offline(&bench, "standard");
-    let service = Service::start(bench, "");
+    let environment = environment();
+    offline(&environment, "standard");
+    let service = Service::start(environment, "");
     let mut first = service.worker("first");
     service.json(KEY, 0);
     let name = service.submit(&format!("{EMBED} standard"));

@@ -12,7 +12,7 @@ use serde_json::Value;
 use tonic::transport::Channel;
 use uuid::Uuid;
 
-use crate::{EMBED, KEY, bench, offline};
+use crate::{EMBED, KEY, environment, offline};
 
 const SUBMISSIONS: u32 = 50;
 /// After so many acknowledged jobs the server is killed.
@@ -35,7 +35,7 @@ fn request(number: u32, request_id: Uuid) -> CreateJobRequest {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn acknowledged_jobs_survive_a_kill_and_retries_make_no_others() {
-    let mut service = Service::start(guardsplat_tests::Bench::new(), "");
+    let mut service = Service::start(guardsplat_tests::TestEnvironment::new(), "");
     let ids: Vec<Uuid> = (0..SUBMISSIONS).map(|_| Uuid::new_v4()).collect();
     let acknowledged = Arc::new(Mutex::new(BTreeMap::new()));
     let mut tasks = Vec::new();
@@ -97,17 +97,17 @@ async fn names(channel: &Channel) -> Vec<String> {
 
 #[test]
 fn work_goes_on_and_is_watched_across_a_restart() {
-    let bench = bench();
-    offline(&bench, "standard");
-    let mut service = Service::start(bench, "");
+    let environment = environment();
+    offline(&environment, "standard");
+    let mut service = Service::start(environment, "");
     let worker = service.worker("steady");
     service.json(KEY, 0);
     let name = service.submit(&format!("{EMBED} standard"));
     service.is_embedding(&name, 1);
     let mut command = service.client_command(&format!("--json jobs watch {name}"));
-    let lines = service.bench.path("watched");
+    let lines = service.environment.path("watched");
     command.stdout(File::create(&lines).unwrap());
-    let mut watching = Process::start(&mut command, &service.bench.path("watch.log"));
+    let mut watching = Process::start(&mut command, &service.environment.path("watch.log"));
     let seen = || -> Vec<Value> {
         let text = std::fs::read_to_string(&lines).unwrap();
         // The last line may be half written.
@@ -131,7 +131,7 @@ fn work_goes_on_and_is_watched_across_a_restart() {
     assert_eq!(worker.log().matches("job begins").count(), 2, "{}", worker.log());
     let scene = last["result"]["scene"].as_str().unwrap();
     service.json(&format!("artifact get {scene} -o out.ply"), 0);
-    assert!(service.bench.read("out.ply") == service.bench.read("expected.ply"));
+    assert!(service.environment.read("out.ply") == service.environment.read("expected.ply"));
 
     // A cursor of the server before is as good: one message says all that was missed, and a current one says nothing new.
     let cursor = |line: &Value| line["cursor"].as_str().unwrap().to_owned();

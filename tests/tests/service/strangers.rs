@@ -1,26 +1,26 @@
 //! A server that speaks TLS and asks for tokens: a project has its scenes marked by a worker that comes in from outside,
 //! and strangers get nowhere.
-use guardsplat_tests::{Bench, Service, program};
+use guardsplat_tests::{Service, TestEnvironment, program};
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 
-use crate::{EMBED, KEY, MISSED, bench, offline};
+use crate::{EMBED, KEY, MISSED, environment, offline};
 
 /// Writes a CA, and a certificate that it made out to `localhost`.
-fn certify(bench: &Bench) {
+fn certify(environment: &TestEnvironment) {
     let mut params = CertificateParams::new(Vec::new()).unwrap();
     params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
     let issuer = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
     let key = KeyPair::generate().unwrap();
     let params = CertificateParams::new(["localhost".to_owned()]).unwrap();
     let certificate = params.signed_by(&key, &issuer).unwrap();
-    bench.write("ca.pem", issuer.pem());
-    bench.write("server.pem", certificate.pem());
-    bench.write("server.key", key.serialize_pem());
+    environment.write("ca.pem", issuer.pem());
+    environment.write("server.pem", certificate.pem());
+    environment.write("server.key", key.serialize_pem());
 }
 
 /// A token, made on the server's machine.
-fn token(bench: &Bench, project: &str, scopes: &[&str]) -> String {
-    let mut command = bench.command(&program("guardsplat-server"));
+fn token(environment: &TestEnvironment, project: &str, scopes: &[&str]) -> String {
+    let mut command = environment.command(&program("guardsplat-server"));
     command.args(["--data-dir", "data", "token", "create", "--project", project]);
     scopes.iter().for_each(|scope| {
         command.args(["--scope", scope]);
@@ -31,25 +31,25 @@ fn token(bench: &Bench, project: &str, scopes: &[&str]) -> String {
 }
 
 /// What programs are given to come in with.
-fn pass(bench: &Bench, token: &str) -> Vec<(String, String)> {
-    let ca = bench.path("ca.pem").to_str().unwrap().to_owned();
+fn pass(environment: &TestEnvironment, token: &str) -> Vec<(String, String)> {
+    let ca = environment.path("ca.pem").to_str().unwrap().to_owned();
     vec![("GUARDSPLAT_CA".into(), ca), ("GUARDSPLAT_TOKEN".into(), token.into())]
 }
 
 #[test]
 fn a_project_does_its_work_over_tls_and_strangers_do_not() {
-    let bench = bench();
-    certify(&bench);
-    offline(&bench, "draft");
+    let environment = environment();
+    certify(&environment);
+    offline(&environment, "draft");
     let [studio, rival, worker] = [
         ("studio", &["embed", "verify"][..]),
         ("rival", &["embed", "verify"]),
         ("operator", &["worker"]),
     ]
-    .map(|(project, scopes)| token(&bench, project, scopes));
+    .map(|(project, scopes)| token(&environment, project, scopes));
     let flags = "--access tokens --tls-certificate server.pem --tls-key server.key";
-    let mut service = Service::start(bench, flags);
-    let pass = |token: &str, service: &Service| pass(&service.bench, token);
+    let mut service = Service::start(environment, flags);
+    let pass = |token: &str, service: &Service| pass(&service.environment, token);
     let code = |service: &Service, line: &str| service.json(line, 1)["error"]["code"].clone();
 
     // Without a token, with one of nobody's, with one that is for other things.
@@ -69,7 +69,7 @@ fn a_project_does_its_work_over_tls_and_strangers_do_not() {
     service.client_variables = pass(&studio, &service);
     service.json(KEY, 0);
     let marked = service.json(&format!("{EMBED} draft -o out.ply"), MISSED);
-    assert!(service.bench.read("out.ply") == service.bench.read("expected.ply"));
+    assert!(service.environment.read("out.ply") == service.environment.read("expected.ply"));
     let job = marked["job"].as_str().unwrap().to_owned();
 
     // Another project sees nothing of it.
@@ -88,7 +88,7 @@ fn a_project_does_its_work_over_tls_and_strangers_do_not() {
         let secret = secret.rsplit('_').next().unwrap();
         for log in ["server.log", "workhorse.log", "intruder.log"] {
             assert!(
-                !String::from_utf8_lossy(&service.bench.read(log)).contains(secret),
+                !String::from_utf8_lossy(&service.environment.read(log)).contains(secret),
                 "{log}"
             );
         }

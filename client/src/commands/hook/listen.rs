@@ -13,11 +13,11 @@ use uuid::Uuid;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
 use crate::output::{Exit, print_line, say};
+use crate::resource_names;
 use crate::transfer::{Destination, Source, download};
 use crate::webhook::program::Program;
-use crate::webhook::{http, signature::Secret};
+use crate::webhook::{server, signature::Secret};
 
 /// Where the secret is taken from, if not from a file.
 const SECRET_VARIABLE: &str = "GUARDSPLAT_HOOK_SECRET";
@@ -87,7 +87,7 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
             StatusCode::UNAUTHORIZED
         })
     };
-    let (address, mut calls) = http::listen(arguments.listen, Arc::new(doorkeeper)).await?;
+    let (address, mut calls) = server::listen(arguments.listen, Arc::new(doorkeeper)).await?;
     // For whoever started it with port 0.
     context.console.say(&format!("listening on http://{address}"));
     let program = Program::new(&arguments.program);
@@ -163,7 +163,7 @@ async fn fetch(context: &Context, folder: &Path, event: &Event) -> Result<Option
     if path.is_file() && Source::hash(&path).await?.sha256 == scene.sha256 {
         return Ok(Some(path));
     }
-    let fetched = download(context, &names::artifact(&scene.name)?, &path).await?;
+    let fetched = download(context, &resource_names::artifact(&scene.name)?, &path).await?;
     context.console.clear();
     if fetched.sha256 != scene.sha256 {
         return Err(Error::Damaged {
@@ -185,7 +185,7 @@ fn keep(folder: &Path, event: &Event, body: &[u8]) -> Result<()> {
 
 /// The id of the job, which is a file's name here: nothing that leads elsewhere gets further than this.
 fn id_of(event: &Event) -> Result<Uuid> {
-    let job = names::job(&event.data.job)?;
+    let job = resource_names::job(&event.data.job)?;
     let id = job.strip_prefix("jobs/").and_then(|id| Uuid::try_parse(id).ok());
     id.ok_or_else(|| Error::Answer {
         reason: "an event names no job".into(),

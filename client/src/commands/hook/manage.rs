@@ -7,15 +7,13 @@ use guardsplat_proto::v1::{
 };
 use serde::Serialize;
 
-use crate::arguments::display_name;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::names;
+use crate::options::display_name;
 use crate::output::{Exit, print_json, print_line};
+use crate::pages;
 use crate::report::{DeliveryReport, HookReport};
-
-/// Entries asked for at a time.
-const PAGE: i32 = 1000;
+use crate::resource_names;
 
 /// What a job does.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -144,23 +142,16 @@ pub async fn create(context: &Context, arguments: &Create) -> Result<Exit> {
 
 /// Prints all hooks.
 pub async fn list(context: &Context) -> Result<Exit> {
-    let mut hooks = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = ListHooksRequest {
-            page_size: PAGE,
-            page_token,
-        };
-        let page = context.call("listing hooks", request, async |channel, request| {
+    let hooks = pages::all(async |page_size, page_token| {
+        let request = ListHooksRequest { page_size, page_token };
+        let sent = context.call("listing hooks", request, async |channel, request| {
             HookServiceClient::new(channel).list_hooks(request).await
         });
-        let page = page.await?;
-        hooks.extend(page.hooks.iter().map(HookReport::from));
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            break;
-        }
-    }
+        let page = sent.await?;
+        Ok((page.hooks, page.next_page_token))
+    })
+    .await?;
+    let hooks: Vec<_> = hooks.iter().map(HookReport::from).collect();
     if context.json {
         print_json(&Listed { hooks });
     } else {
@@ -173,7 +164,7 @@ pub async fn list(context: &Context) -> Result<Exit> {
 
 /// Deletes one.
 pub async fn delete(context: &Context, text: &str) -> Result<Exit> {
-    let name = names::hook(text)?;
+    let name = resource_names::hook(text)?;
     let request = DeleteHookRequest { name: name.clone() };
     let deleted = context.once("deleting the hook", request, async |channel, request| {
         HookServiceClient::new(channel).delete_hook(request).await
@@ -194,30 +185,24 @@ pub async fn deliveries(context: &Context, arguments: &Deliveries) -> Result<Exi
     let hook = arguments
         .hook
         .as_deref()
-        .map(names::hook)
+        .map(resource_names::hook)
         .transpose()?
         .unwrap_or_default();
-    let mut deliveries = Vec::new();
-    let mut page_token = String::new();
-    while deliveries.len() < arguments.limit {
+    let listed = pages::up_to(arguments.limit, async |page_size, page_token| {
         let request = ListDeliveriesRequest {
             hook: hook.clone(),
             state: state.into(),
-            page_size: i32::try_from(arguments.limit - deliveries.len())
-                .unwrap_or(PAGE)
-                .min(PAGE),
+            page_size,
             page_token,
         };
-        let page = context.call("listing deliveries", request, async |channel, request| {
+        let sent = context.call("listing deliveries", request, async |channel, request| {
             HookServiceClient::new(channel).list_deliveries(request).await
         });
-        let page = page.await?;
-        deliveries.extend(page.deliveries.iter().map(DeliveryReport::from));
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            break;
-        }
-    }
+        let page = sent.await?;
+        Ok((page.deliveries, page.next_page_token))
+    });
+    let (deliveries, _) = listed.await?;
+    let deliveries: Vec<_> = deliveries.iter().map(DeliveryReport::from).collect();
     if context.json {
         print_json(&Told { deliveries });
     } else {
@@ -231,7 +216,7 @@ pub async fn deliveries(context: &Context, arguments: &Deliveries) -> Result<Exi
 /// Has one sent again.
 pub async fn redeliver(context: &Context, text: &str) -> Result<Exit> {
     let request = RedeliverDeliveryRequest {
-        name: names::delivery(text)?,
+        name: resource_names::delivery(text)?,
     };
     let again = context.call("sending the delivery again", request, async |channel, request| {
         HookServiceClient::new(channel).redeliver_delivery(request).await

@@ -14,18 +14,19 @@ use hyper::StatusCode;
 use sha2::{Digest, Sha256};
 use tonic::Code;
 
-use crate::arguments::{LONGEST_NAME, Submission};
 use crate::commands::embed::Preset;
-use crate::commands::{key, suspects};
+use crate::commands::key;
 use crate::context::Context;
-use crate::create::create_with;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
+use crate::file_kind::FileKind;
+use crate::inputs;
+use crate::job::create::create_with;
+use crate::options::{LONGEST_NAME, Submission};
 use crate::output::{Exit, print_line, printable, say};
-use crate::webhook::fetch::{Fetched, Prefix};
-use crate::webhook::http;
 use crate::webhook::notification::{self, Object};
+use crate::webhook::object::{Fetched, Prefix};
 use crate::webhook::program::Program;
+use crate::webhook::server;
 
 /// Where the store's token is taken from, if not from a file.
 const TOKEN_VARIABLE: &str = "GUARDSPLAT_HOOK_TOKEN";
@@ -99,13 +100,13 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     }
     let doorkeeper = move |headers: &hyper::HeaderMap, _: &[u8]| {
         // Hashes are compared, so that timing tells nothing of the token.
-        let shown: Option<[u8; 32]> = http::bearer(headers).map(|shown| Sha256::digest(shown.as_bytes()).into());
+        let shown: Option<[u8; 32]> = server::bearer(headers).map(|shown| Sha256::digest(shown.as_bytes()).into());
         (shown == Some(token)).then_some(()).ok_or_else(|| {
             say("refused a call: it shows another token, or none");
             StatusCode::UNAUTHORIZED
         })
     };
-    let (address, mut calls) = http::listen(arguments.listen, Arc::new(doorkeeper)).await?;
+    let (address, mut calls) = server::listen(arguments.listen, Arc::new(doorkeeper)).await?;
     // For whoever started it with port 0.
     context.console.say(&format!("listening on http://{address}"));
     let program = Program::new(&arguments.program);
@@ -227,9 +228,9 @@ async fn submit(
     object: &Object,
     path: &Path,
 ) -> Result<Outcome> {
-    match Kind::of(path) {
-        Ok(Kind::Scene(_)) => {}
-        Ok(Kind::Picture) => return Ok(Outcome::Never("a picture, and no scene".into())),
+    match FileKind::of(path) {
+        Ok(FileKind::Scene(_)) => {}
+        Ok(FileKind::Picture) => return Ok(Outcome::Never("a picture, and no scene".into())),
         Err(error) => return Ok(Outcome::Never(error.to_string())),
     }
     let message = match (program, &arguments.message) {
@@ -241,7 +242,7 @@ async fn submit(
         return Ok(Outcome::Never("the program has no message for it".into()));
     }
     let message = key::message(key, &message)?;
-    let inputs = suspects::send(context, &[suspects::Input::File(path.to_owned())]).await?;
+    let inputs = inputs::send(context, &[inputs::Input::File(path.to_owned())]).await?;
     let mut spec = EmbedSpec {
         // One input was given, and one name came back.
         scene: inputs.names.first().cloned().unwrap_or_default(),

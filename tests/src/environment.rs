@@ -7,18 +7,18 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 /// A temporary folder in which commands run; it goes away with the value.
-pub struct Bench {
+pub struct TestEnvironment {
     folder: tempfile::TempDir,
     variables: Vec<(String, PathBuf)>,
 }
 
-impl Default for Bench {
+impl Default for TestEnvironment {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Bench {
+impl TestEnvironment {
     /// An empty folder.
     pub fn new() -> Self {
         Self {
@@ -132,7 +132,7 @@ impl Bench {
         String::from_utf8(output.stdout).expect("it prints UTF-8")
     }
 
-    /// As [`Bench::exits`], for a command that prints JSON.
+    /// As [`TestEnvironment::exits`], for a command that prints JSON.
     #[track_caller]
     pub fn json(&self, line: &str, code: i32) -> Value {
         let text = self.exits(line, code);

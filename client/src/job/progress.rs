@@ -1,4 +1,4 @@
-//! Shows how a job comes along.
+//! The progress of a job, for people.
 use guardsplat_proto::v1::job::{Spec, State};
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{Job, Progress};
@@ -8,14 +8,14 @@ use crate::output::printable;
 
 /// What was said of a job so far.
 #[derive(Default)]
-pub struct Show {
+pub struct ProgressView {
     failed_attempt: i32,
     running: bool,
     ending: bool,
     waiting_reason: String,
 }
 
-impl Show {
+impl ProgressView {
     /// Shows a job as it stands.
     pub fn job(&mut self, console: &Console, job: &Job) {
         if let Some(line) = self.failed_attempt(job) {
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_failed_attempt_is_told_once() {
-        let mut show = Show::default();
+        let mut show = ProgressView::default();
         let mut job = Job {
             attempt: 1,
             max_attempts: 3,
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_job_that_was_handed_back_says_so() {
-        let mut show = Show::default();
+        let mut show = ProgressView::default();
         let mut told = |state, failure: Option<Failure>| {
             let mut job = Job {
                 failure,

@@ -1,25 +1,16 @@
 //! Fetches an object by HTTP into a file: what a store's own URL, or a proxy that signs for it, gives to a plain GET.
 use std::io::Write;
-use std::sync::Arc;
 use std::time::Duration;
 
-use http_body_util::{BodyExt, Empty};
+use http_body_util::Empty;
 use hyper::body::Bytes;
-use hyper::client::conn::http1;
 use hyper::{Request, StatusCode, Uri};
-use hyper_util::rt::TokioIo;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use tempfile::TempDir;
-use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::TcpStream;
-use tokio::task::JoinSet;
 use tokio::time::timeout;
-use tokio_rustls::TlsConnector;
-use tokio_rustls::rustls::crypto::ring;
-use tokio_rustls::rustls::pki_types::ServerName;
-use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
-use crate::error::{Error, Result, root_cause};
+use crate::error::{Error, Result};
+use crate::http_client::{Connection, HttpError};
 
 /// Most bytes of an object, as many as a server takes unless it is told otherwise.
 const MOST: u64 = 4 << 30;
@@ -74,72 +65,30 @@ impl Prefix {
             reason,
         };
         let uri: Uri = url.parse().map_err(|_| failed("is no URL".into()))?;
-        let (secure, host) = (uri.scheme_str() == Some("https"), uri.host().unwrap_or_default());
-        let host = host.trim_start_matches('[').trim_end_matches(']').to_owned();
-        let port = uri.port_u16().unwrap_or(if secure { 443 } else { 80 });
-        let silent = |_| failed(format!("the store was silent for {} s", patience.as_secs()));
-        let stream = timeout(patience, TcpStream::connect((host.as_str(), port)))
-            .await
-            .map_err(silent)?;
-        let stream = stream.map_err(|error| failed(error.to_string()))?;
-        let request = Request::get(uri.path())
-            .header("host", uri.authority().map_or("", |authority| authority.as_str()))
-            .header("user-agent", concat!("guardsplat/", env!("CARGO_PKG_VERSION")))
-            .body(Empty::<Bytes>::new())
-            .map_err(|error| failed(error.to_string()))?;
         let folder = tempfile::tempdir().map_err(Error::io(std::env::temp_dir()))?;
         let fetched = Fetched {
             folder,
             name: parts.last().copied().unwrap_or("object").to_owned(),
         };
-        let moved = if secure {
-            let name = ServerName::try_from(host).map_err(|error| failed(error.to_string()))?;
-            let stream = timeout(patience, tls().map_err(failed)?.connect(name, stream))
-                .await
-                .map_err(silent)?;
-            let stream = stream.map_err(|error| failed(error.to_string()))?;
-            receive(stream, request, &fetched, patience).await
-        } else {
-            receive(stream, request, &fetched, patience).await
-        };
-        moved.map_err(failed)?;
+        receive(&uri, &fetched, patience).await.map_err(failed)?;
         Ok(fetched)
     }
 }
 
-fn tls() -> Result<TlsConnector, String> {
-    let roots = RootCertStore::from_iter(webpki_roots::TLS_SERVER_ROOTS.iter().cloned());
-    let config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
-        .with_safe_default_protocol_versions()
-        .map_err(|error| error.to_string())?;
-    Ok(TlsConnector::from(Arc::new(
-        config.with_root_certificates(roots).with_no_client_auth(),
-    )))
-}
-
-async fn receive<S>(stream: S, request: Request<Empty<Bytes>>, to: &Fetched, patience: Duration) -> Result<(), String>
-where
-    S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
-{
-    let told = |error: hyper::Error| root_cause(&error);
-    let silent = |_| format!("the store was silent for {} s", patience.as_secs());
-    let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await.map_err(told)?;
-    // Ends with this call.
-    let mut driver = JoinSet::new();
-    driver.spawn(connection);
-    let answer = timeout(patience, sender.send_request(request)).await.map_err(silent)?;
-    let answer = answer.map_err(told)?;
+async fn receive(uri: &Uri, to: &Fetched, patience: Duration) -> Result<(), String> {
+    let told = |error: HttpError| error.to_string();
+    let request = Request::get(uri).body(Empty::<Bytes>::new());
+    let request = request.map_err(|error| error.to_string())?;
+    let connection = Connection::open(uri, patience).await.map_err(told)?;
+    let answer = timeout(patience, connection.send(request)).await;
+    let mut answer = answer.unwrap_or(Err(HttpError::Silent(patience))).map_err(told)?;
     if answer.status() != StatusCode::OK {
         return Err(format!("the store answered {}", answer.status()));
     }
     let path = to.path();
     let mut file = std::fs::File::create(&path).map_err(|error| error.to_string())?;
-    let mut body = answer.into_body();
     let mut length = 0;
-    while let Some(frame) = timeout(patience, body.frame()).await.map_err(silent)? {
-        let Ok(data) = frame.map_err(told)?.into_data() else {
-            continue;
-        };
+    while let Some(data) = answer.chunk(patience).await.map_err(told)? {
         length += data.len() as u64;
         if length > MOST {
             return Err(format!("is longer than {MOST} bytes"));

@@ -5,19 +5,19 @@ use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
 use guardsplat_proto::v1::{Artifact, GetDownloadUrlRequest};
-use reqwest::header::RANGE;
-use reqwest::redirect::Policy;
-use reqwest::{Client, Response, StatusCode};
+use http_body_util::Empty;
+use hyper::body::Bytes;
+use hyper::header::RANGE;
+use hyper::{Request, StatusCode};
 use tokio::time::timeout;
 
-use super::destination::Destination;
-use super::download::size;
+use super::destination::{Destination, size};
+use super::signed_address::{connect, is_as_safe};
 use crate::console::Unit;
 use crate::context::Context;
 use crate::error::Result;
+use crate::http_client::Answer;
 
-/// Longest wait for a connection to the store, which may be out of reach from here.
-const CONNECT: Duration = Duration::from_secs(5);
 /// How often an artifact is asked for, each time from where the time before ended.
 const TRIES: usize = 3;
 
@@ -60,11 +60,6 @@ async fn address(context: &Context, name: &str) -> Option<(Artifact, String)> {
     Some((answer.artifact?, answer.url)).filter(|_| safe)
 }
 
-/// Whether the way to an address is as safe as the one to the server.
-pub(super) fn is_as_safe(server: &str, url: &str) -> bool {
-    url.starts_with("https://") || url.starts_with("http://") && server.starts_with("http://")
-}
-
 /// Goes on with the file; whether all of it is there.
 async fn fetch(context: &Context, url: &str, artifact: &Artifact, file: &mut Destination) -> Result<bool> {
     let limit = context.server.timeout;
@@ -73,10 +68,10 @@ async fn fetch(context: &Context, url: &str, artifact: &Artifact, file: &mut Des
     };
     loop {
         // The address is a secret, and would be in what is said of an error.
-        match timeout(limit, answer.chunk()).await {
-            Ok(Ok(Some(chunk))) => file.write(&chunk)?,
-            Ok(Ok(None)) => return Ok(file.written() == size(artifact)),
-            Ok(Err(_)) | Err(_) => return Ok(false),
+        match answer.chunk(limit).await {
+            Ok(Some(chunk)) => file.write(&chunk)?,
+            Ok(None) => return Ok(file.written() == size(artifact)),
+            Err(_) => return Ok(false),
         }
         if file.written() > size(artifact) {
             return Ok(false);
@@ -87,42 +82,15 @@ async fn fetch(context: &Context, url: &str, artifact: &Artifact, file: &mut Des
 }
 
 /// An answer that has the rest of the bytes.
-async fn ask(url: &str, offset: u64, size: u64, limit: Duration) -> Option<Response> {
-    let (mut request, mut expected) = (client(limit)?.get(url), StatusCode::OK);
+async fn ask(url: &str, offset: u64, size: u64, limit: Duration) -> Option<Answer> {
+    let (mut request, mut expected) = (Request::get(url), StatusCode::OK);
     if offset > 0 {
         request = request.header(RANGE, format!("bytes={offset}-"));
         expected = StatusCode::PARTIAL_CONTENT;
     }
-    let answer = timeout(limit, request.send()).await.ok()?.ok()?;
-    let whole = answer.status() == expected && answer.content_length() == Some(size - offset);
+    let request = request.body(Empty::<Bytes>::new()).ok()?;
+    let answered = async { connect(request.uri(), limit).await?.send(request).await };
+    let answer = timeout(limit, answered).await.ok()?.ok()?;
+    let whole = answer.status() == expected && answer.length() == Some(size - offset);
     Some(answer).filter(|_| whole)
-}
-
-/// What speaks to a store: to none but the one that the server named.
-pub(super) fn client(limit: Duration) -> Option<Client> {
-    // As everything else here it speaks TLS by ring; another provider that is chosen would do as well.
-    let _ = rustls::crypto::ring::default_provider().install_default();
-    let client = Client::builder()
-        .connect_timeout(CONNECT.min(limit))
-        .redirect(Policy::none());
-    client.build().ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_way_is_less_safe_than_the_one_to_the_server() {
-        for (server, url, safe) in [
-            ("https://splat", "https://store", true),
-            ("https://splat", "http://store", false),
-            ("http://splat", "https://store", true),
-            ("http://splat", "http://store", true),
-            ("http://splat", "file:///etc", false),
-            ("http://splat", "", false),
-        ] {
-            assert_eq!(is_as_safe(server, url), safe, "{url} of {server}");
-        }
-    }
 }

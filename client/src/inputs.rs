@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
-use crate::names;
+use crate::file_kind::FileKind;
+use crate::resource_names;
 use crate::transfer::{Source, discard, upload};
 
 /// Most files of one job; the server takes no more.
@@ -24,7 +24,7 @@ pub enum Input {
 impl Input {
     /// A scene, whatever its file is called.
     pub fn scene(text: &str) -> Self {
-        match names::artifact_or_file(text) {
+        match resource_names::artifact_or_file(text) {
             Some(name) => Self::Artifact(name),
             None => Self::File(text.into()),
         }
@@ -100,7 +100,7 @@ pub fn find(paths: &[String]) -> Result<Vec<Input>> {
             continue;
         }
         // What is neither a scene nor a picture is better known before it is sent.
-        Kind::of(&path)?;
+        FileKind::of(&path)?;
         found.push(Input::File(path));
     }
     if found.len() > MOST {

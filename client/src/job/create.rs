@@ -4,16 +4,16 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{CreateJobRequest, Job, failure::Reason};
 use uuid::Uuid;
 
-use crate::arguments::{LONGEST_NAME, Submission};
-use crate::commands::suspects::Inputs;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::interrupt::Stage;
+use crate::inputs::Inputs;
+use crate::job::progress::ProgressView;
+use crate::job::watch::watch;
+use crate::options::{LONGEST_NAME, Submission};
 use crate::output::{print_json, print_line};
 use crate::report::{JobReport, word};
-use crate::show::Show;
+use crate::stage::Stage;
 use crate::transfer::discard;
-use crate::watch::watch;
 
 /// Queues a job; `name` is what it is called unless the user says otherwise.
 pub async fn create(context: &Context, submission: &Submission, name: &str, spec: Spec) -> Result<Job> {
@@ -77,7 +77,7 @@ pub async fn wait(context: &Context, submission: &Submission, job: &Job) -> Resu
         State::Running => format!("{} is there already, and running", job.name),
         _ => format!("{} is there already, and over", job.name),
     });
-    let mut show = Show::default();
+    let mut show = ProgressView::default();
     let over = watch(context, &job.name, String::new(), |job, _| {
         show.job(&context.console, job)
     })

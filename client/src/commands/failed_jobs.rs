@@ -5,7 +5,7 @@ use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use guardsplat_proto::v1::{JobAttempt, ListJobAttemptsRequest, RequeueJobRequest};
 use serde::Serialize;
 
-use super::jobs::{line, pages, print_list, tell};
+use super::job_list::{line, print_list, read, tell};
 use crate::context::Context;
 use crate::error::Result;
 use crate::output::{Exit, print_json, print_line, printable};
@@ -13,7 +13,7 @@ use crate::report::{AttemptReport, outcome_word, word};
 
 /// Arguments of `jobs dead`.
 #[derive(Args)]
-pub struct Dead {
+pub struct FailedJobs {
     /// Only jobs that failed for this reason; may be given several times
     #[arg(long, value_enum)]
     reason: Vec<ReasonName>,
@@ -50,13 +50,13 @@ struct Attempts {
 }
 
 /// Lists jobs that failed.
-pub async fn list(context: &Context, arguments: &Dead) -> Result<Exit> {
+pub async fn list(context: &Context, arguments: &FailedJobs) -> Result<Exit> {
     let named = match arguments.reason.as_slice() {
         [] => ReasonName::value_variants(),
         some => some,
     };
     let reasons = named.iter().map(|&name| Reason::from(name).into()).collect();
-    let (jobs, more) = pages(context, Vec::new(), reasons, arguments.limit).await?;
+    let (jobs, more) = read(context, Vec::new(), reasons, arguments.limit).await?;
     print_list(context, &jobs, more, |job| match &job.failure {
         Some(failure) => {
             let reason = word(failure.reason().as_str_name(), "REASON_");

@@ -9,15 +9,15 @@ use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
 use guardsplat_proto::v1::{Artifact, FinishUploadRequest, StartUploadRequest, StartUploadResponse};
+use hyper::Request;
 use hyper::body::{Body, Bytes, Frame, SizeHint};
 use tokio::fs::File;
 use tokio::io::AsyncReadExt;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout};
 
-use super::direct::{client, is_as_safe};
-use super::source::{CHUNK, Source};
-use super::upload::{AHEAD, LOOK, metadata};
+use super::signed_address::{connect, is_as_safe};
+use super::source::{AHEAD, CHUNK, LOOK, Source};
 use crate::console::Unit;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -46,7 +46,7 @@ pub async fn upload(context: &Context, source: &Source, before: u64, total: u64)
 async fn begin(context: &Context, source: &Source) -> Option<StartUploadResponse> {
     let mut client = ArtifactServiceClient::new(context.server.channel().await.ok()?);
     let request = StartUploadRequest {
-        metadata: Some(metadata(source)),
+        metadata: Some(source.metadata()),
     };
     let answer = context.in_time(client.start_upload(context.request(request))).await;
     let begun = answer.ok()?.into_inner();
@@ -63,22 +63,21 @@ async fn send(
     total: u64,
 ) -> Result<bool> {
     let limit = context.server.timeout;
-    let Some(client) = client(limit) else {
-        return Ok(false);
-    };
     let file = File::open(&source.path).await.map_err(Error::io(&source.path))?;
     let sent = Arc::new(AtomicU64::new(0));
     let (sender, chunks) = mpsc::channel(AHEAD);
     let reading = tokio::spawn(read(file, source.size, sender, Arc::clone(&sent)));
-    let body = reqwest::Body::wrap(Sending {
-        chunks,
-        left: source.size,
-    });
-    let mut request = client.put(&begun.url).body(body);
+    let mut request = Request::put(&begun.url);
     for header in &begun.headers {
         request = request.header(&header.name, &header.value);
     }
-    let answer = request.send();
+    let Ok(request) = request.body(Sending {
+        chunks,
+        left: source.size,
+    }) else {
+        return Ok(false);
+    };
+    let answer = async { connect(request.uri(), limit).await?.send(request).await };
     tokio::pin!(answer);
     let mut look = tokio::time::interval(LOOK);
     let (mut last, mut moved) = (0, Instant::now());
