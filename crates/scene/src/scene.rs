@@ -1,9 +1,9 @@
 //! A scene and the file it came from, whatever its format.
+use crate::atomic_write::write_whole;
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::sniff::announced;
-use crate::whole::write_whole;
 use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};

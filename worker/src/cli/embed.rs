@@ -6,7 +6,7 @@ use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
-use guardsplat_engine::memory::Memory;
+use guardsplat_engine::memory::MemoryRequirements;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::{Quality, write_picture};
 use guardsplat_engine::scene::{BadRows, Ignored};
@@ -15,8 +15,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Budget, Exit, print_json, print_line};
-use crate::work::settings::chosen;
-use crate::work::{load, sheet};
+use crate::operations::embed_settings::chosen;
+use crate::operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -99,7 +99,7 @@ struct Report<'a> {
     ignored_rows: usize,
     covering_views: usize,
     predicted_memory_bytes: u64,
-    predicted_memory: Memory,
+    predicted_memory: MemoryRequirements,
     peak_memory_bytes: Option<u64>,
     written: bool,
     target_missed: &'a [String],
@@ -197,7 +197,10 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
 
 fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    write_picture(&folder.join(sheet::NAME), &sheet::of(&verification.pairs)?)
+    write_picture(
+        &folder.join(comparison_sheet::NAME),
+        &comparison_sheet::of(&verification.pairs)?,
+    )
 }
 
 fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {

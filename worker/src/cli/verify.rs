@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, print_json, print_line};
-use crate::work::findings::{Findings, Views, read_and_compare};
-use crate::work::load;
+use crate::operations::load;
+use crate::operations::verification::{Findings, Views, read_and_compare};
 
 #[derive(Args)]
 pub struct Arguments {

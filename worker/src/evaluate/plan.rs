@@ -4,8 +4,8 @@ use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::named::Kind;
 use guardsplat_evaluation::report::names;
 
-use super::trade::Variant;
 use super::trial::Trial;
+use super::variants::Variant;
 use crate::error::{Error, Result};
 use guardsplat_engine::embed::{Learn, Ring, Settings};
 

@@ -15,7 +15,7 @@ use super::machine::Machine;
 use super::mark::{Making, path};
 use super::plan::{Plan, Wanted};
 use super::read::{Views, cameras};
-use super::security::{Judged, Marked};
+use super::steganalysis::{Judged, Marked};
 use super::trial::Trial;
 use crate::error::{Error, Result};
 use guardsplat_engine::embed;

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use guardsplat_engine::device::DeviceChoice;
 use tokio::sync::oneshot;
 
-use super::bench::Bench;
+use super::engine_cache::Bench;
 use super::error::{Error, Result};
 
 /// As much as the main thread has, which the commands run on.

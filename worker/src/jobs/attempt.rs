@@ -8,13 +8,13 @@ use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{FramedReading, Job, SeenView, complete_job_request};
 
 use super::accelerator::Accelerator;
-use super::bench::Bench;
 use super::convert;
+use super::engine_cache::Bench;
 use super::error::{Error, Result};
 use super::lease::{Lease, Reporter};
 use super::server::Server;
 use super::transfer::{self, Content};
-use super::{embedding, new_key, verifying};
+use super::{create_key_job, embed_job, verify_job};
 
 /// What came out of an attempt.
 pub struct Outcome {
@@ -71,9 +71,9 @@ impl Attempt<'_> {
 
     async fn compute_and_store(&mut self, job: &Job) -> Result<Outcome> {
         match &job.spec {
-            Some(Spec::Embed(spec)) => embedding::carry_out(self, spec).await,
-            Some(Spec::Verify(spec)) => verifying::carry_out(self, spec).await,
-            Some(Spec::CreateKey(spec)) => new_key::carry_out(self, spec).await,
+            Some(Spec::Embed(spec)) => embed_job::carry_out(self, spec).await,
+            Some(Spec::Verify(spec)) => verify_job::carry_out(self, spec).await,
+            Some(Spec::CreateKey(spec)) => create_key_job::carry_out(self, spec).await,
             None => Err(Error::Damaged {
                 what: job.name.clone(),
                 reason: "a kind of job that this worker does not know".into(),

@@ -7,13 +7,13 @@ use tonic::Code;
 
 use super::accelerator::Accelerator;
 use super::attempt::Attempt;
+use super::capabilities::Offer;
 use super::convert;
 use super::error::{Error, Result};
-use super::folder::Folder;
 use super::lease::{Ended, Lease, Reporter};
-use super::offer::Offer;
 use super::server::{Server, persist, within};
-use super::signals::Leaving;
+use super::shutdown::Leaving;
+use super::work_directory::Folder;
 
 /// How long to wait for a job before asking again.
 const WAIT: Duration = Duration::from_secs(30);

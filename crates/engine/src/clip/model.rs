@@ -1,8 +1,8 @@
 //! Both towers as one trainable burn module.
 use super::config::{ClipConfig, VisionTower};
 use super::params::param;
+use super::random_fourier::StatisticsTower;
 use super::resnet::ResNet;
-use super::statistics::StatisticsTower;
 use super::text::TextTransformer;
 use super::vit::VisionTransformer;
 use burn::module::{Module, Param};

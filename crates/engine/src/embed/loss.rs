@@ -5,10 +5,10 @@
 use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 
-use super::balance::Factors;
+use super::image_augmentation::Shown;
+use super::loss_weight_controller::Factors;
 use super::progress::Terms;
 use super::settings::Settings;
-use super::shown::Shown;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};

@@ -3,8 +3,8 @@ use guardsplat_distortion::{JpegRange, Kind, Ranges, RobustTo};
 
 use super::adam::AdamOptions;
 use super::augment::Augmentation;
-use super::balance::{Balance, Yielding};
-use super::descent::DescentOptions;
+use super::loss_weight_controller::{Balance, Yielding};
+use super::preconditioned_sgd::DescentOptions;
 use super::settings::{EarlyStop, Lambdas, Settings, Verify};
 use super::target::Target;
 use crate::error::{Error, Result};

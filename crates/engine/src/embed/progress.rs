@@ -1,7 +1,7 @@
 //! What an embedding tells whoever watches it.
 use serde::Serialize;
 
-use crate::memory::Memory;
+use crate::memory::MemoryRequirements;
 
 /// Unweighted terms of the loss, means over the views of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -53,7 +53,7 @@ pub struct Check {
 #[serde(tag = "stage", rename_all = "snake_case")]
 pub enum Progress {
     /// The scene was read, and the job fits in memory; this much it will need.
-    Admitted(Memory),
+    Admitted(MemoryRequirements),
     /// It is known which Gaussians training views show.
     Covered {
         /// Views that were looked at.

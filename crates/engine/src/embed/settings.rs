@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::adam::AdamOptions;
 use super::augment::Augmentation;
-use super::balance::Balance;
-use super::descent::DescentOptions;
+use super::loss_weight_controller::Balance;
+use super::preconditioned_sgd::DescentOptions;
 use super::target::Target;
 use crate::error::{Error, Result};
 

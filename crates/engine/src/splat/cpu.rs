@@ -1,6 +1,6 @@
 //! Rasteriser for the CPU: sparse products where weights are kept, compositing anew where they are not.
+use super::composite::{Sink, TileFrame, walk};
 use super::tiles::{TILE, TILE_PIXELS};
-use super::walk::{Sink, TileFrame, walk};
 use super::weights::Band;
 use super::{PreparedView, Rasterizer};
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! The weights of a view, kept: what every splat contributes to every pixel.
+use super::composite::{Sink, TileFrame, walk};
 use super::project::Splat2d;
 use super::tiles::{TILE_PIXELS, TileLists};
-use super::walk::{Sink, TileFrame, walk};
 use crate::error::{Error, Result};
 use crate::view::Camera;
 use half::f16;

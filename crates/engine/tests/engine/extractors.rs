@@ -1,7 +1,8 @@
 //! Embedding and reading know extractors by the trait alone: one of three lines, and a convolutional decoder.
 use burn::tensor::Tensor;
-use guardsplat_engine::embed::{DescentOptions, HiddenKeyOptions, Settings, create_hidden_key, optimise};
+use guardsplat_engine::embed::{DescentOptions, Settings, optimise};
 use guardsplat_engine::extract::{Engine, Extractor, HiddenExtractor, read_scene};
+use guardsplat_engine::message::key::{HiddenKeyOptions, create_hidden_key};
 use guardsplat_engine::message::{Decoding, Message};
 use guardsplat_engine::scene::Scene;
 use guardsplat_engine::stop::Stop;

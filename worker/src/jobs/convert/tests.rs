@@ -108,7 +108,7 @@ fn progress_leaves_out_what_is_no_number() {
     let reading = embedding_progress(&Progress::Verifying { done: 2, total: 20 }).unwrap();
     assert_eq!((reading.stage(), reading.done, reading.total), (Stage::Reading, 2, 20));
     assert_eq!(embedding_progress(&Progress::Writing), None);
-    let training = key_progress(NewKey::Decoder(Training::Training(64, 1152)));
+    let training = key_progress(KeyProgress::Decoder(Training::Training(64, 1152)));
     assert_eq!((training.stage(), training.done), (Stage::Optimising, 64));
 }
 

@@ -2,7 +2,8 @@
 use guardsplat_engine::Result;
 use guardsplat_engine::clip::Parts;
 use guardsplat_engine::device::Compute;
-use guardsplat_engine::embed::{NewKey, create_key, natural};
+use guardsplat_engine::extract::rasterizer;
+use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
 use guardsplat_engine::message::{DecoderKind, FitOptions, Key, KeyOptions};
 use guardsplat_engine::stop::Stop;
 
@@ -10,7 +11,7 @@ use super::load;
 
 /// What the projection ignores and keeps of CLIP's features, where experiments ask for something else than usual.
 #[derive(Clone, Copy, Default)]
-pub struct Kept {
+pub struct ProjectionOverrides {
     /// What kind of decoder reads the message; unless given a linear one of a CLIP with ranked features, else a
     /// perceptron.
     pub decoder: Option<DecoderKind>,
@@ -24,15 +25,15 @@ pub struct Kept {
 /// Makes a key for the CLIP called `clip`, the shipped one without a name.
 pub fn create(
     options: &KeyOptions,
-    kept: Kept,
+    overrides: ProjectionOverrides,
     clip: Option<&str>,
     compute: &Compute,
     stop: &Stop,
-    progress: impl FnMut(NewKey),
+    progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
     let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
     let ranked = clip.config.is_ranked();
-    let kind = kept.decoder.unwrap_or(match ranked {
+    let kind = overrides.decoder.unwrap_or(match ranked {
         true => DecoderKind::Linear,
         false => DecoderKind::Perceptron,
     });
@@ -41,14 +42,16 @@ pub fn create(
     // A perceptron needs more dimensions than bits to tell texts apart; a linear decoder reads the strongest ones best.
     let ranked = ranked && kind == DecoderKind::Linear;
     let projection = FitOptions {
-        remove: kept.remove.unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
-        keep: kept
+        remove: overrides
+            .remove
+            .unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
+        keep: overrides
             .keep
             .or(ranked.then(|| ranked_dimensions(options.bits, clip.dim()))),
         ranked,
     };
     stop.check()?;
-    let pictures = natural::pictures(compute, clip.config.vision.image_size as u32)?;
+    let pictures = natural_images::pictures(rasterizer(compute)?, clip.config.vision.image_size as u32)?;
     create_key(&options, projection, &clip, identity, compute, pictures, stop, progress)
 }
 

@@ -1,21 +1,27 @@
-//! A key: the secret, the decoder trained for it, and the CLIP that both belong to.
-use guardsplat_distortion::RobustTo;
+//! Keys: the secret, the decoder trained for it and the CLIP that both belong to; their files, and how they are made.
+mod create;
+mod create_hidden;
+mod file;
+pub mod natural_images;
+
 use std::fmt;
 use std::path::Path;
 
-use burn::tensor::Device;
+use guardsplat_distortion::RobustTo;
 use rand::TryRng;
 use rand::rngs::SysRng;
 use serde::{Deserialize, Serialize};
 
-use super::bits::{Message, check_bits};
-use super::decoder::DecoderWeights;
-use super::key_file;
-use super::projection::Projection;
-use super::tokens::{CONTEXT, TokenTable, fewest_bits_per_token, hmac_sha256};
-use super::training::{Progress, TrainingOptions, train};
+pub use create::{KeyProgress, create_key};
+pub use create_hidden::{HIDDEN, HiddenKeyOptions, create_hidden_key};
+pub use file::MAX_BYTES as MAX_KEY_BYTES;
+
 use crate::error::{Error, Result};
-use crate::stop::Stop;
+use crate::message::bits::Message;
+use crate::message::decoder::DecoderWeights;
+use crate::message::projection::Projection;
+use crate::message::tokens::{TokenTable, fewest_bits_per_token, hmac_sha256};
+use crate::message::training::TrainingOptions;
 
 /// Which CLIP a key belongs to; for keys that read pictures without one, how their decoder is made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,7 +35,7 @@ pub struct ClipIdentity {
 /// What a key is made from, besides a CLIP.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyOptions {
-    /// Bits of its messages, 1 to [`MAX_BITS`](super::bits::MAX_BITS).
+    /// Bits of its messages, 1 to [`MAX_BITS`](crate::message::MAX_BITS).
     pub bits: usize,
     /// Bits that one CLIP token stands for; `None` takes the fewest that make room.
     pub bits_per_token: Option<usize>,
@@ -72,6 +78,20 @@ impl Secret {
     /// The secret of a seed: as easy to guess as the seed.
     pub fn from_seed(seed: u64) -> Self {
         Self(hmac_sha256(b"guardsplat key secret v1", &[&seed.to_le_bytes()]))
+    }
+
+    /// The secret of a seed, or a random one without a seed.
+    ///
+    /// # Errors
+    /// Those of [`Secret::random`].
+    fn draw(seed: Option<u64>) -> Result<Self> {
+        seed.map_or_else(Self::random, |seed| Ok(Self::from_seed(seed)))
+    }
+
+    /// A seed that follows from the secret; `label` tells the uses apart.
+    fn derived_seed(&self, label: &[u8]) -> u64 {
+        let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(&self.0, &[label]);
+        u64::from_le_bytes([a, b, c, d, e, f, g, h])
     }
 
     /// The bytes, for who may have them.
@@ -122,50 +142,6 @@ pub struct Key {
 }
 
 impl Key {
-    /// Makes a key: draws or derives the secret, and trains its decoder on `device`. `encode` is the text tower of
-    /// `clip`, as in [`train`]. Fails as [`train`] does.
-    pub fn create(
-        options: &KeyOptions,
-        clip: ClipIdentity,
-        projection: Projection,
-        encode: impl FnMut(&[[i64; CONTEXT]]) -> Result<Vec<f32>>,
-        device: &Device,
-        stop: &Stop,
-        progress: impl FnMut(Progress),
-    ) -> Result<Self> {
-        check_bits(options.bits)?;
-        projection.check().map_err(|reason| Error::BadOption {
-            field: "projection",
-            reason,
-        })?;
-        let secret = match options.seed {
-            Some(seed) => Secret::from_seed(seed),
-            None => Secret::random()?,
-        };
-        let bits_per_token = options.bits_per_token();
-        let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;
-        // The training's seed follows from the secret, so that one seed decides the whole file.
-        let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
-        let seed = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-        let training = TrainingOptions {
-            seed,
-            ..options.training.clone()
-        };
-        let trained = train(&table, &projection, encode, &training, device, stop, progress)?;
-        Ok(Self {
-            secret,
-            seed: options.seed,
-            bits_per_token,
-            clip,
-            decoding: Decoding::Clip {
-                projection,
-                decoder: trained.weights,
-            },
-            accuracy_unseen: trained.accuracy_unseen,
-            accuracy_unseen_noisy: trained.accuracy_unseen_noisy,
-        })
-    }
-
     /// Bits of its messages.
     pub fn bits(&self) -> usize {
         match &self.decoding {
@@ -177,10 +153,7 @@ impl Key {
     /// 32 hexadecimal digits that name the key and give nothing of the secret away: an HMAC over everything in it.
     pub fn id(&self) -> String {
         let bits = (self.bits() as u64).to_le_bytes();
-        let tensors: Vec<Vec<u8>> = key_file::tensors(self)
-            .iter()
-            .map(key_file::Named::little_endian)
-            .collect();
+        let tensors: Vec<Vec<u8>> = file::tensors(self).iter().map(file::Named::little_endian).collect();
         let mut parts: Vec<&[u8]> = vec![b"guardsplat key id v1", &bits, self.clip.hash.as_bytes()];
         // Keys of one bit a token came first, and keep their names.
         let per_token = [self.bits_per_token as u8];
@@ -221,17 +194,17 @@ impl Key {
 
     /// Writes the key file, readable by its owner only; a file that is there is replaced whole, or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
-        key_file::write(self, path)
+        file::write(self, path)
     }
 
     /// Reads a key file and checks every part of it. Damage of any kind is [`Error::BadKey`].
     pub fn read(path: &Path) -> Result<Self> {
-        key_file::read(path)
+        file::read(path)
     }
 
     /// The bytes of the key file. They hold the secret.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        key_file::serialize(self).map_err(|reason| Error::BadKey {
+        file::serialize(self).map_err(|reason| Error::BadKey {
             path: self.id().into(),
             reason,
         })
@@ -239,7 +212,7 @@ impl Key {
 
     /// A key from the bytes of its file, checked as [`Key::read`] does; `name` is for messages.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
-        key_file::deserialize(bytes).map_err(|reason| Error::BadKey {
+        file::deserialize(bytes).map_err(|reason| Error::BadKey {
             path: name.into(),
             reason,
         })
@@ -250,54 +223,38 @@ impl Key {
 mod tests {
     use super::*;
 
-    fn encode(sequences: &[[i64; CONTEXT]]) -> Result<Vec<f32>> {
-        Ok(sequences
-            .iter()
-            .flat_map(|s| (1..9).map(|i| ((s[i] * 7 + i as i64) % 13) as f32 / 13.0 - 0.5))
-            .collect())
-    }
-
-    fn create(seed: Option<u64>) -> Key {
-        let training = TrainingOptions {
-            messages: 64,
-            epochs: Some(1),
-            ..TrainingOptions::default()
-        };
-        let clip = ClipIdentity {
-            name: "tiny".into(),
-            hash: "ab".repeat(32),
-        };
-        let options = KeyOptions {
-            bits: 8,
-            bits_per_token: None,
+    fn key(seed: Option<u64>) -> Key {
+        Key {
+            secret: Secret::draw(seed).unwrap(),
             seed,
-            robust_to: RobustTo::none(),
-            training,
-        };
-        Key::create(
-            &options,
-            clip,
-            Projection::identity(8),
-            encode,
-            &Device::flex(),
-            &Stop::default(),
-            |_| {},
-        )
-        .unwrap()
+            bits_per_token: fewest_bits_per_token(8),
+            clip: ClipIdentity {
+                name: "tiny".into(),
+                hash: "ab".repeat(32),
+            },
+            decoding: Decoding::Clip {
+                projection: Projection::identity(8),
+                decoder: DecoderWeights::seeded(8, 8, 1),
+            },
+            accuracy_unseen: None,
+            accuracy_unseen_noisy: None,
+        }
     }
 
     #[test]
-    fn a_seed_decides_the_whole_key_and_no_seed_is_always_another() {
-        let (a, b) = (create(Some(1)), create(Some(1)));
+    fn a_seed_decides_the_secret_and_no_seed_is_always_another() {
+        let (a, b) = (key(Some(1)), key(Some(1)));
         assert_eq!(a, b);
         assert_eq!(a.id(), b.id());
-        assert_ne!(create(Some(2)).id(), a.id());
-        assert_ne!(create(None).secret, create(None).secret);
+        assert_ne!(key(Some(2)).id(), a.id());
+        assert_ne!(key(None).secret, key(None).secret);
+        let seed = |label: &[u8]| a.secret.derived_seed(label);
+        assert_ne!(seed(b"one"), seed(b"two"));
     }
 
     #[test]
     fn another_clip_is_an_error_that_names_both() {
-        let key = create(Some(1));
+        let key = key(Some(1));
         let path = Path::new("mine.key");
         key.require_clip(path, &key.clip).unwrap();
         let other = ClipIdentity {
@@ -311,7 +268,7 @@ mod tests {
 
     #[test]
     fn secrets_are_not_printed_and_messages_have_the_keys_length() {
-        let key = create(Some(1));
+        let key = key(Some(1));
         let printed = format!("{key:?}");
         assert!(printed.contains("Secret(..)") && !printed.contains(&format!("{:?}", key.secret.expose())));
         assert_eq!(key.message("a5").unwrap().to_string(), "a5");

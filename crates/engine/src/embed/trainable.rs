@@ -1,5 +1,5 @@
 //! What of the colours is learned.
-use super::descent::DescentOptions;
+use super::preconditioned_sgd::DescentOptions;
 use super::settings::Settings;
 use crate::error::Error;
 

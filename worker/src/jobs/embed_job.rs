@@ -15,8 +15,8 @@ use super::attempt::{Attempt, Outcome as Finished};
 use super::convert;
 use super::error::{Error, Result};
 use super::transfer::Content;
-use crate::work::sheet;
-use crate::work::shown::small_png;
+use crate::operations::comparison_sheet;
+use crate::operations::thumbnails::small_png;
 
 /// Views of the evidence.
 const SHOWN: usize = 3;
@@ -66,9 +66,9 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         if !outcome.written {
             return Err(Error::TargetMissed(outcome.missed.join(", ")));
         }
-        let sheet = sheet::of(&outcome.verification.pairs)?;
+        let sheet = comparison_sheet::of(&outcome.verification.pairs)?;
         let sheet = encode_picture(&sheet, PictureFormat::Png).map_err(|reason| EngineError::BadPicture {
-            path: sheet::NAME.into(),
+            path: comparison_sheet::NAME.into(),
             reason,
         })?;
         // Only the evidence of an asset shows them.
@@ -94,7 +94,9 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
     let marked = work.await?;
     let marked_name = format!("marked.{}", marked.outcome.format.extension());
     let scene = attempt.upload(&marked_name, marked_file, false).await?;
-    let comparison = attempt.upload(sheet::NAME, Content::Bytes(marked.sheet), false).await?;
+    let comparison = attempt
+        .upload(comparison_sheet::NAME, Content::Bytes(marked.sheet), false)
+        .await?;
     // What was read back of all views, for the evidence of an asset.
     let readings = vec![convert::framed(
         Framing::default(),

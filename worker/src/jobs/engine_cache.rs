@@ -7,7 +7,7 @@ use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::stop::Stop;
 
-use crate::work::load;
+use crate::operations::load;
 
 /// A device with an engine on it.
 pub struct Bench {

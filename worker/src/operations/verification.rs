@@ -1,17 +1,16 @@
 //! What a verification finds: reads scenes and pictures, and says whether the message is there.
 use guardsplat_engine::Result;
-use guardsplat_engine::admission::{self, picture_bytes};
 use guardsplat_engine::extract::{
     Comparison, Engine, Framed, Framing, Reading, Source, default_size, framings, read_scene,
 };
-use guardsplat_engine::memory::Memory;
+use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::message::{Message, Verdict};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
 
-use super::shown::Shown;
+use super::thumbnails::Shown;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -70,12 +69,12 @@ fn read_scenes(
     let total = count(source, views);
     for path in &source.scenes {
         let size = views.size.unwrap_or_else(|| default_size(engine));
-        let rest = Memory {
+        let rest = MemoryRequirements {
             models: engine.model_bytes(false),
             pictures: picture_bytes(size, size),
-            ..Memory::of_program()
+            ..MemoryRequirements::of_program()
         };
-        admission::to_read(path, &engine.limits, rest)?;
+        admission::admit_reading(path, &engine.limits, rest)?;
         let scene = Scene::read_with(path, views.bad_rows)?;
         ignored.extend(scene.ignored().cloned());
         let gaussians = scene.into_gaussians();

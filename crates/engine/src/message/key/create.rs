@@ -3,15 +3,13 @@ use burn::tensor::{Int, Tensor, TensorData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha20Rng;
 
-use super::natural;
+use super::{ClipIdentity, Decoding, Key, KeyOptions, Secret, natural_images};
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
-use crate::message::key::Secret;
+use crate::message::bits::check_bits;
 use crate::message::tokens::hmac_sha256;
-use crate::message::{
-    CONTEXT, ClipIdentity, Decoding, FitOptions, Key, KeyOptions, Message, Projection, TokenTable, fit, train, training,
-};
+use crate::message::{CONTEXT, FitOptions, Message, Projection, TokenTable, fit, train, training};
 use crate::picture::Picture;
 use crate::stop::Stop;
 
@@ -20,9 +18,9 @@ const FITTED_MESSAGES: usize = 512;
 /// Sequences given to the text tower at once.
 const BATCH: usize = 64;
 
-/// What creating a key does, for a progress display.
+/// Progress of [`create_key`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NewKey {
+pub enum KeyProgress {
     /// Natural pictures read, of so many.
     Pictures(usize, usize),
     /// The decoder's training.
@@ -45,14 +43,11 @@ pub fn create_key(
     compute: &Compute,
     pictures: impl Iterator<Item = Result<Picture>>,
     stop: &Stop,
-    mut progress: impl FnMut(NewKey),
+    mut progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
-    crate::message::bits::check_bits(options.bits)?;
+    check_bits(options.bits)?;
     let bits_per_token = options.bits_per_token();
-    let secret = match options.seed {
-        Some(seed) => Secret::from_seed(seed),
-        None => Secret::random()?,
-    };
+    let secret = Secret::draw(options.seed)?;
     let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;
     let length = table.positions() + 2;
     check_text_tower(clip, &identity, length)?;
@@ -61,19 +56,18 @@ pub fn create_key(
         text_features(clip, compute, length, sequences)
     };
 
-    let images = natural::features(clip, compute, pictures, options.robust_to, stop, |done| {
-        progress(NewKey::Pictures(done, natural::count()));
+    let images = natural_images::features(clip, compute, pictures, options.robust_to, stop, |done| {
+        progress(KeyProgress::Pictures(done, natural_images::count()));
     })?;
     let projection = fit_projection(&secret, &table, &images, clip.dim(), projection, &mut encode)?;
 
     // The training's seed follows from the secret, so that one seed decides the whole file.
-    let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat training seed v1"]);
     let training = training::TrainingOptions {
-        seed: u64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        seed: secret.derived_seed(b"guardsplat training seed v1"),
         ..options.training.clone()
     };
     let trained = train(&table, &projection, encode, &training, &compute.device, stop, |p| {
-        progress(NewKey::Decoder(p))
+        progress(KeyProgress::Decoder(p))
     })?;
     Ok(Key {
         secret,

@@ -3,16 +3,15 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::learned::Learned;
-use super::needs::{ModelBytes, SceneSize, ViewSize, needs};
+use super::learned_offsets::Learned;
 use super::optimise::optimise;
 use super::progress::Progress;
+use super::resources::{measure_view, model_bytes, predict_memory};
 use super::settings::Settings;
 use super::verify::{Verification, verify};
-use crate::admission;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
-use crate::memory::Memory;
+use crate::memory::{MemoryRequirements, SceneSize, admission};
 use crate::message::Message;
 use crate::scene::{BadRows, Format, Gaussians, Ignored, Scene};
 
@@ -51,8 +50,8 @@ pub struct Outcome {
     pub steps: usize,
     /// Views drawn in all steps.
     pub view_steps: usize,
-    /// Memory that was predicted.
-    pub memory: Memory,
+    /// MemoryRequirements that was predicted.
+    pub memory: MemoryRequirements,
     /// Gaussians of the scene.
     pub gaussians: usize,
     /// Rows of the file that are none, where some were ignored.
@@ -75,11 +74,11 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     let settings = job.settings;
     let stop = &engine.stop;
     stop.check()?;
-    let rest = Memory {
-        models: ModelBytes::of(engine, settings).learning,
-        ..Memory::of_program()
+    let rest = MemoryRequirements {
+        models: model_bytes(engine, settings).learning,
+        ..MemoryRequirements::of_program()
     };
-    admission::to_mark(job.input, &engine.limits, rest)?;
+    admission::admit_marking(job.input, &engine.limits, rest)?;
     let scene = Scene::read_with(job.input, job.bad_rows)?;
     stop.check()?;
     let memory = admit(engine, &scene, settings)?;
@@ -137,9 +136,9 @@ fn write(job: &Job<'_>, scene: &Scene, learned: &Learned, aside: &Path) -> Resul
 }
 
 /// Predicts what memory the job will need, and refuses one that does not fit.
-fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<Memory> {
-    let view = ViewSize::measure(engine, &scene.gaussians, settings)?;
-    let memory = needs(SceneSize::of(scene), view, settings, ModelBytes::of(engine, settings));
+fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<MemoryRequirements> {
+    let view = measure_view(engine, &scene.gaussians, settings)?;
+    let memory = predict_memory(SceneSize::of(scene), view, settings, model_bytes(engine, settings));
     engine.limits.admit(&memory)?;
     Ok(memory)
 }

@@ -7,13 +7,13 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::bits::MAX_BITS;
-use super::decoder::{DecoderWeights, HIDDEN, LayerWeights};
-use super::key::{ClipIdentity, Decoding, Key, Secret};
-use super::projection::Projection;
-use super::tokens::check_bits_per_token;
+use super::{ClipIdentity, Decoding, Key, Secret};
 use crate::clip::check_header;
 use crate::error::{Error, Result};
+use crate::message::bits::MAX_BITS;
+use crate::message::decoder::{DecoderWeights, HIDDEN, LayerWeights};
+use crate::message::projection::Projection;
+use crate::message::tokens::check_bits_per_token;
 
 /// The format's version; another one is refused.
 const VERSION: u32 = 1;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::alteration::Alteration;
+use super::scene_augmentation::Alteration;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;

@@ -4,15 +4,13 @@ use guardsplat_distortion::{Layer, RobustTo};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::shown::CORNERS;
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
-use crate::extract::rasterizer;
 use crate::picture::Picture;
 use crate::quality::batch;
 use crate::sample::sample;
-use crate::splat::{WeightCache, prepare, sh};
+use crate::splat::{Rasterizer, WeightCache, prepare, sh};
 use crate::stop::Stop;
 use crate::view::{Split, ViewSampler};
 
@@ -23,15 +21,16 @@ const SCENES: u64 = 16;
 const VIEWS: u64 = 8;
 /// Gaussians of a scene; enough for views without holes.
 const GAUSSIANS: usize = 20_000;
+/// Background colour of the corners that rotations uncover.
+const CORNERS: [f32; 3] = [1.0; 3];
 /// The seed of the first scene; users begin at 0, and their own sample scene should not be among these.
 const FIRST_SEED: u64 = 0x6e61_7475_7265;
 
-/// Views of sample scenes, a quarter of them over black.
+/// Views of sample scenes of `size` x `size` pixels, a quarter of them over black.
 ///
 /// # Errors
 /// Each picture may fail as rendering does.
-pub fn pictures(compute: &Compute, size: u32) -> Result<impl Iterator<Item = Result<Picture>>> {
-    let rasterizer = rasterizer(compute)?;
+pub fn pictures(rasterizer: Box<dyn Rasterizer>, size: u32) -> Result<impl Iterator<Item = Result<Picture>>> {
     let scenes = (0..SCENES)
         .map(|index| {
             let scene = sample(GAUSSIANS, 3, FIRST_SEED + index)?.gaussians;

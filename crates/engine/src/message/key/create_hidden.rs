@@ -3,12 +3,11 @@ use guardsplat_distortion::{Layer, RobustTo};
 use guardsplat_hidden::{Geometry, Options, Synthetic, Trained, train};
 use sha2::{Digest, Sha256};
 
+use super::{ClipIdentity, Decoding, Key, Secret};
 use crate::device::Compute;
 use crate::error::Result;
 use crate::message::bits::check_bits;
-use crate::message::key::Secret;
-use crate::message::tokens::{fewest_bits_per_token, hmac_sha256};
-use crate::message::{ClipIdentity, Decoding, Key};
+use crate::message::tokens::fewest_bits_per_token;
 use crate::stop::Stop;
 
 /// What keys name in place of a CLIP.
@@ -71,13 +70,9 @@ pub fn create_hidden_key(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Key> {
     check_bits(options.bits)?;
-    let secret = match options.seed {
-        Some(seed) => Secret::from_seed(seed),
-        None => Secret::random()?,
-    };
+    let secret = Secret::draw(options.seed)?;
     // Weights and pictures follow from the secret: who has not the key has not the decoder.
-    let [a, b, c, d, e, f, g, h, ..] = hmac_sha256(secret.expose(), &[b"guardsplat hidden decoder seed v1"]);
-    let seed = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+    let seed = secret.derived_seed(b"guardsplat hidden decoder seed v1");
     let training = options.training(seed);
     let device = &compute.device.clone().without_autodiff();
     let mut pictures = Synthetic::new(SIDE, seed)?;

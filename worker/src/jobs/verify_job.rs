@@ -10,8 +10,8 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::work::findings::{Findings, read_and_compare, read_framed};
-use crate::work::shown::Shown;
+use crate::operations::thumbnails::Shown;
+use crate::operations::verification::{Findings, read_and_compare, read_framed};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {

@@ -10,7 +10,7 @@ use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::Result;
 use super::transfer::Content;
-use crate::work::keys::{self, Kept};
+use crate::operations::create_key::{self, ProjectionOverrides};
 
 /// A key, before it is stored.
 struct Made {
@@ -32,9 +32,16 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outc
     let work = attempt.compute(move |bench, stop, reporter| {
         let start = Instant::now();
         let compute = bench.compute();
-        let key = keys::create(&options, Kept::default(), None, compute, stop, |progress| {
-            reporter.tell(convert::key_progress(progress));
-        })?;
+        let key = create_key::create(
+            &options,
+            ProjectionOverrides::default(),
+            None,
+            compute,
+            stop,
+            |progress| {
+                reporter.tell(convert::key_progress(progress));
+            },
+        )?;
         Ok(Made {
             file: key.to_bytes()?,
             key,
