@@ -1,6 +1,6 @@
 //! What files of a format keep of colours, without writing one: stand-ins for conversion while a mark is learned.
 //!
-//! Ranges and codebooks of some formats come from the scene, and so [`Kept`] is fitted once to the scene as it is
+//! Ranges and codebooks of some formats come from the scene, and so [`ColorQuantizer`] is fitted once to the scene as it is
 //! before its colours change. With the colours changed it gives what [`convert`](crate::convert) and reading would give
 //! then: bit by bit, but for SOG, whose codebooks and groups stay those of the scene that it was fitted to.
 //! Groups of a changed scene follow its changes a little: of independent noise of 0.02 on the harmonics of a captured
@@ -18,7 +18,7 @@ const NAME: &str = "quantised scene";
 
 /// What a file of a format keeps of the coefficients of a scene.
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct ColorQuantizer {
     gaussians: usize,
     per_gaussian: usize,
     how: How,
@@ -52,12 +52,12 @@ struct Shared {
     rest: Vec<f32>,
 }
 
-impl Kept {
+impl ColorQuantizer {
     /// Fits to a scene. Takes as long as the order, the codebooks and the palette of a conversion: seconds for SOG.
     ///
     /// # Errors
     /// [`Error::BadScene`]: arrays of different lengths, coefficients that are not finite.
-    pub fn fit(gaussians: &Gaussians, format: Format) -> Result<Kept> {
+    pub fn fit(gaussians: &Gaussians, format: Format) -> Result<ColorQuantizer> {
         check_arrays(gaussians).map_err(refused)?;
         let per_gaussian = gaussians.sh.per_gaussian();
         let coefficients = &gaussians.sh.coefficients;
@@ -78,7 +78,7 @@ impl Kept {
                 How::Sog(Box::new(Shared { colours, rest }))
             }
         };
-        Ok(Kept {
+        Ok(ColorQuantizer {
             gaussians: gaussians.len(),
             per_gaussian,
             how,

@@ -180,9 +180,9 @@ impl Scene {
     }
 
     /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what a written file keeps of them.
-    pub fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    pub fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         if let Some(source) = &self.source {
-            source.keep(row, coefficients);
+            source.quantize_colors(row, coefficients);
         }
     }
 }

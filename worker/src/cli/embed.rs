@@ -5,7 +5,9 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
+use guardsplat_engine::embed::{
+    Job, Outcome, Preset, Progress, Ring, Settings, TrainableCoefficients, Verification, embed,
+};
 use guardsplat_engine::memory::MemoryRequirements;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::{Quality, write_picture};
@@ -49,7 +51,7 @@ pub struct Arguments {
     robust_to: Option<RobustTo>,
     /// Which coefficients of colours are learned: sh or all, constant (dc), or all others (rest). Geometry never changes
     #[arg(long, value_name = "WHAT", default_value = "all")]
-    learn: Learn,
+    learn: TrainableCoefficients,
     /// Trains on views on a circle at this elevation in degrees, as the paper's public code does, instead of over the sphere
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     ring: Option<f32>,

@@ -7,7 +7,7 @@ use guardsplat_evaluation::report::names;
 use super::trial::Trial;
 use super::variants::Variant;
 use crate::error::{Error, Result};
-use guardsplat_engine::embed::{Learn, Ring, Settings};
+use guardsplat_engine::embed::{Ring, Settings, TrainableCoefficients};
 
 /// Bits of most experiments.
 const BITS: usize = 32;
@@ -149,8 +149,8 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
             }
             Kind::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
-                add(BITS, names::DC, standard.learning(Learn::Dc), &none)?;
-                add(BITS, names::REST, standard.learning(Learn::Rest), &none)?;
+                add(BITS, names::DC, standard.learning(TrainableCoefficients::Dc), &none)?;
+                add(BITS, names::REST, standard.learning(TrainableCoefficients::Rest), &none)?;
             }
             Kind::Losses => {
                 add(BITS, names::STANDARD, *standard, &none)?;

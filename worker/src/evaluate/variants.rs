@@ -29,15 +29,15 @@ const CHANGES: [(&str, &str); 19] = [
     ("lpips", r#"{"lambda": {"lpips": 2}}"#),
     (
         "adam",
-        r#"{"descent": null, "lambda": {"l1": 0.8, "l2": 0, "ssim": 0.2}}"#,
+        r#"{"optimizer": {"adam": {}}, "lambda": {"l1": 0.8, "l2": 0, "ssim": 0.2}}"#,
     ),
     (
         "rate-flat",
-        r#"{"descent": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 1, "momentum": 0.8}}"#,
+        r#"{"optimizer": {"preconditioned_sgd": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 1, "momentum": 0.8}}}"#,
     ),
     (
         "rate-to-0",
-        r#"{"descent": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 0, "momentum": 0.8}}"#,
+        r#"{"optimizer": {"preconditioned_sgd": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 0, "momentum": 0.8}}}"#,
     ),
     (
         "distorted",
@@ -73,8 +73,8 @@ struct Own {
 /// [{"name": "quick", "preset": "draft", "settings": {"steps": 60}}]
 /// ```
 ///
-/// `only` chooses some by their names, in the order of the list; empty, it takes all. Changes that change nothing, and
-/// those of fields that settings do not have, are left out.
+/// `only` chooses some by their names, in the order of the list; empty, it takes all. Changes that change nothing are
+/// left out.
 ///
 /// # Errors
 /// A file that is no such array, names that are empty, too long, or there twice, settings that are refused, and names in
@@ -87,9 +87,7 @@ pub fn variants(base: &Settings, own: Option<&str>, only: &[String]) -> Result<V
     }
     all.extend(presets.map(|(name, settings)| Candidate::settled(name, settings)));
     for (name, change) in CHANGES {
-        if is_known(base, change)? {
-            all.push(Candidate::changed(name, *base, change.into()));
-        }
+        all.push(Candidate::changed(name, *base, change.into()));
     }
     for own in own.map(parse).transpose()?.unwrap_or_default() {
         let from = own.preset.as_deref().map(str::parse::<Preset>).transpose()?;
@@ -169,14 +167,6 @@ fn check_name(name: &str) -> Result<()> {
         )));
     }
     Ok(())
-}
-
-/// Whether settings have all fields of a change.
-fn is_known(settings: &Settings, change: &str) -> Result<bool> {
-    let failed = |e: serde_json::Error| bad(e.to_string());
-    let known = serde_json::to_value(settings).map_err(failed)?;
-    let change: serde_json::Map<String, serde_json::Value> = serde_json::from_str(change).map_err(failed)?;
-    Ok(change.keys().all(|field| known.get(field).is_some()))
 }
 
 fn bad(reason: String) -> Error {

@@ -9,7 +9,7 @@ use guardsplat_proto::v1::{FramedReading, Job, SeenView, complete_job_request};
 
 use super::accelerator::Accelerator;
 use super::convert;
-use super::engine_cache::Bench;
+use super::engine_cache::EngineCache;
 use super::error::{Error, Result};
 use super::lease::{Lease, Reporter};
 use super::server::Server;
@@ -107,11 +107,11 @@ impl Attempt<'_> {
     /// Does `work` with the engine.
     pub async fn compute<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&mut Bench, &Stop, &Reporter) -> Result<T> + Send + 'static,
+        work: impl FnOnce(&mut EngineCache, &Stop, &Reporter) -> Result<T> + Send + 'static,
     ) -> Result<T> {
         self.reporter.tell(convert::stage(Stage::Preparing, 0, 0));
         let (stop, reporter) = (self.stop.clone(), self.reporter.clone());
-        self.accelerator.run(move |bench| work(bench, &stop, &reporter)).await?
+        self.accelerator.run(move |cache| work(cache, &stop, &reporter)).await?
     }
 
     /// Stores an output under a name for people, and gives its artifact's.

@@ -15,7 +15,7 @@ const MOST_CLIPS: usize = 64;
 
 /// What a worker has.
 #[derive(Clone, Debug)]
-pub struct Offer {
+pub struct WorkerCapabilities {
     /// What it calls itself.
     pub name: String,
     device: String,
@@ -23,7 +23,7 @@ pub struct Offer {
     shipped: Option<String>,
 }
 
-impl Offer {
+impl WorkerCapabilities {
     /// A worker called `name` on `device`, whose jobs may take `budget` bytes of memory, or all that the machine has.
     pub fn new(name: String, device: &str, budget: Option<u64>) -> Self {
         // Without the shipped CLIP it is told when a job needs it, and to whoever made the job.
@@ -72,8 +72,8 @@ mod tests {
 
     #[test]
     fn an_offer_says_what_the_server_takes() {
-        let offer = Offer::new("w".into(), &"é".repeat(100), Some(5 << 20));
-        let request = offer.request(Duration::from_secs(1));
+        let capabilities = WorkerCapabilities::new("w".into(), &"é".repeat(100), Some(5 << 20));
+        let request = capabilities.request(Duration::from_secs(1));
         assert_eq!(request.device.chars().count(), DEVICE_CHARACTERS);
         assert_eq!(request.memory_bytes, 5 << 20);
         assert!(!request.clip_sha256.is_empty());

@@ -17,7 +17,7 @@ use guardsplat_proto::v1::{self as api};
 
 use super::error::{Error, Result};
 use crate::operations::embed_settings::chosen;
-use crate::operations::verification::{Findings, Views};
+use crate::operations::verification::{VerificationReport, Views};
 
 /// What is behind scenes, and behind pictures with transparent pixels.
 const WHITE: [f32; 3] = [1.0; 3];
@@ -143,7 +143,7 @@ pub fn embed_result(outcome: &Outcome) -> api::EmbedResult {
 }
 
 /// The figures of a verification.
-pub fn verify_result(found: Findings) -> api::VerifyResult {
+pub fn verify_result(found: VerificationReport) -> api::VerifyResult {
     let verdict = match found.verdict {
         Verdict::Match => ApiVerdict::Match,
         Verdict::NoMatch => ApiVerdict::NoMatch,

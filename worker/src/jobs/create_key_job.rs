@@ -29,9 +29,9 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outc
         robust_to: RobustTo::none(),
         training: TrainingOptions::default(),
     };
-    let work = attempt.compute(move |bench, stop, reporter| {
+    let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
-        let compute = bench.compute();
+        let compute = cache.compute();
         let key = create_key::create(
             &options,
             ProjectionOverrides::default(),

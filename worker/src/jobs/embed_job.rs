@@ -43,13 +43,13 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
     let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
     let bad_rows = BadRows::ignored_if(spec.ignore_bad_rows);
     let marked_file = Content::File(output.clone());
-    let work = attempt.compute(move |bench, stop, reporter| {
+    let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         let message = key.message(&message)?;
-        let device = bench.device().to_owned();
-        let engine = bench.engine(&name, &key, stop)?;
+        let device = cache.device().to_owned();
+        let engine = cache.engine(&name, &key, stop)?;
         let job = Job {
             input: &input,
             output: &output,

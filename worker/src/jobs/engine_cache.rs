@@ -10,7 +10,7 @@ use guardsplat_engine::stop::Stop;
 use crate::operations::load;
 
 /// A device with an engine on it.
-pub struct Bench {
+pub struct EngineCache {
     compute: Compute,
     /// Bytes of memory that a job may take, if not all of the machine's.
     budget: Option<u64>,
@@ -18,7 +18,7 @@ pub struct Bench {
     loaded: Option<(String, Engine)>,
 }
 
-impl Bench {
+impl EngineCache {
     /// Opens the device, for jobs that may take so many bytes of memory.
     pub fn open(device: DeviceChoice, budget: Option<u64>) -> Result<Self> {
         Ok(Self {

@@ -26,10 +26,10 @@ use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::Target;
 
 use accelerator::Accelerator;
-use capabilities::Offer;
+use capabilities::WorkerCapabilities;
 pub use error::{Error, Result};
 use server::Server;
-use work_directory::Folder;
+use work_directory::WorkDirectory;
 use worker::Worker;
 
 /// Most characters of a machine's name in a worker's.
@@ -69,7 +69,7 @@ async fn work(options: &Options) -> Result<()> {
     let server = Server::new(&options.server)?;
     let leaving = shutdown::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
     let parent = options.work_dir.clone().unwrap_or_else(std::env::temp_dir);
-    let folder = Folder::new(&parent)?;
+    let folder = WorkDirectory::new(&parent)?;
     let (accelerator, device) = Accelerator::start(options.device, options.memory).await?;
     let name = options.name.clone().unwrap_or_else(default_name);
     tracing::info!(worker = name, device, server = options.server.url, "ready for jobs");
@@ -78,7 +78,7 @@ async fn work(options: &Options) -> Result<()> {
         leaving,
         folder,
         accelerator,
-        offer: Offer::new(name, &device, options.memory),
+        capabilities: WorkerCapabilities::new(name, &device, options.memory),
     };
     worker.serve().await
 }

@@ -10,9 +10,9 @@ const SAME_REQUEST: Duration = Duration::from_secs(1);
 
 /// Whether the worker is to leave.
 #[derive(Clone)]
-pub struct Leaving(watch::Receiver<bool>);
+pub struct ShutdownSignal(watch::Receiver<bool>);
 
-impl Leaving {
+impl ShutdownSignal {
     /// Waits until the worker is to leave.
     pub async fn asked(&mut self) {
         // The sender lives in tasks that end with the process only; were it gone, nobody could ask any more.
@@ -23,7 +23,7 @@ impl Leaving {
 }
 
 /// Listens from now on. A second signal ends the process at once.
-pub fn listen(stop_with_stdin: bool) -> std::io::Result<Leaving> {
+pub fn listen(stop_with_stdin: bool) -> std::io::Result<ShutdownSignal> {
     let (sender, receiver) = watch::channel(false);
     let mut signals = Signals::new()?;
     let signalled = sender.clone();
@@ -56,7 +56,7 @@ pub fn listen(stop_with_stdin: bool) -> std::io::Result<Leaving> {
             sender.send_replace(true);
         });
     }
-    Ok(Leaving(receiver))
+    Ok(ShutdownSignal(receiver))
 }
 
 /// The signals that ask for an end.

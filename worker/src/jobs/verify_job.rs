@@ -10,14 +10,14 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::operations::thumbnails::Shown;
-use crate::operations::verification::{Findings, read_and_compare, read_framed};
+use crate::operations::thumbnails::Thumbnails;
+use crate::operations::verification::{VerificationReport, read_and_compare, read_framed};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
-    findings: Findings,
+    findings: VerificationReport,
     readings: Vec<FramedReading>,
-    shown: Shown,
+    shown: Thumbnails,
     device: String,
     clip: String,
     duration: Duration,
@@ -37,7 +37,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
     let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
-    let work = attempt.compute(move |bench, stop, reporter| {
+    let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
         let source = find_source(&paths)?;
         let key = Key::from_bytes(&name, &key_file)?;
@@ -45,19 +45,19 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         // Nothing to compare with is no message of no bits.
         let message = Some(message).filter(|text| !text.is_empty());
         let message = message.map(|text| key.message(&text)).transpose()?;
-        let device = bench.device().to_owned();
-        let engine = bench.engine(&name, &key, stop)?;
+        let device = cache.device().to_owned();
+        let engine = cache.engine(&name, &key, stop)?;
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
-        let mut shown = Shown::default();
+        let mut shown = Thumbnails::default();
         let (findings, framed) = if claim {
             let (framed, ignored) = read_framed(engine, &source, &views, &mut shown, progress)?;
             // As given comes first.
             let reading = framed.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-            (Findings::new(reading, None, &ignored)?, framed)
+            (VerificationReport::new(reading, None, &ignored)?, framed)
         } else {
             let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
-            (Findings::of(&compared)?, Vec::new())
+            (VerificationReport::of(&compared)?, Vec::new())
         };
         Ok(Verified {
             findings,

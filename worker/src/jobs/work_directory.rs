@@ -12,12 +12,12 @@ const PREFIX: &str = "guardsplat-worker-";
 const LOCK: &str = "lock";
 
 /// A worker's own folder, readable by its user only; deleted when dropped.
-pub struct Folder {
+pub struct WorkDirectory {
     folder: TempDir,
     _lock: File,
 }
 
-impl Folder {
+impl WorkDirectory {
     /// Makes a folder in `parent`, and deletes those that workers left there which were killed.
     pub fn new(parent: &Path) -> Result<Self> {
         clear(parent);
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn folders_of_dead_workers_go_and_those_of_the_living_stay() {
         let parent = tempfile::tempdir().unwrap();
-        let living = Folder::new(parent.path()).unwrap();
+        let living = WorkDirectory::new(parent.path()).unwrap();
         let job = living.of_job().unwrap();
         std::fs::write(job.path().join("scene.ply"), "ply").unwrap();
         // As a worker leaves it that was killed: the lock is free.
@@ -93,7 +93,7 @@ mod tests {
         let foreign = parent.path().join("something-else");
         std::fs::create_dir(&foreign).unwrap();
 
-        let other = Folder::new(parent.path()).unwrap();
+        let other = WorkDirectory::new(parent.path()).unwrap();
         assert!(!dead.exists() && foreign.exists());
         assert!(job.path().join("scene.ply").exists());
         drop((other, job, living));

@@ -12,9 +12,9 @@ const SIDE: u32 = 320;
 
 /// The first pictures of a reading as PNGs, with what they show.
 #[derive(Default)]
-pub struct Shown(pub Vec<(String, Vec<u8>)>);
+pub struct Thumbnails(pub Vec<(String, Vec<u8>)>);
 
-impl Shown {
+impl Thumbnails {
     /// Takes a picture in if there is room; `index` counts from 0.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ mod tests {
             height,
             pixels: vec![0.5; 3 * (width * height) as usize],
         };
-        let mut shown = Shown::default();
+        let mut shown = Thumbnails::default();
         for index in 0..9 {
             shown.see("picture", index, &grey(1000, 500)).unwrap();
         }

@@ -10,7 +10,7 @@ use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
 use serde::Serialize;
 
-use super::thumbnails::Shown;
+use super::thumbnails::Thumbnails;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -38,7 +38,7 @@ pub fn read(
     engine: &Engine,
     source: &Source,
     views: &Views,
-    shown: &mut Shown,
+    shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<(Reading, Vec<Ignored>)> {
     let (mut logits, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
@@ -62,7 +62,7 @@ fn read_scenes(
     engine: &Engine,
     source: &Source,
     views: &Views,
-    shown: &mut Shown,
+    shown: &mut Thumbnails,
     progress: &mut impl FnMut(usize, usize),
 ) -> Result<(Logits, Vec<Ignored>)> {
     let (mut logits, mut ignored) = (Logits::new(), Vec::new());
@@ -100,7 +100,7 @@ pub fn read_framed(
     engine: &Engine,
     source: &Source,
     views: &Views,
-    shown: &mut Shown,
+    shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<InFramings> {
     let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
@@ -147,7 +147,7 @@ pub fn read_and_compare(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Compared> {
     // Nobody looks at what was compared with a raw message.
-    let mut shown = Shown::default();
+    let mut shown = Thumbnails::default();
     let (reading, ignored) = read(engine, source, views, &mut shown, &mut progress)?;
     let mut best = Compared {
         reading,
@@ -182,7 +182,7 @@ pub fn read_and_compare(
 
 /// The outcome, with the names of the program's JSON.
 #[derive(Serialize)]
-pub struct Findings {
+pub struct VerificationReport {
     /// Whether the message is there.
     pub verdict: Verdict,
     /// Probability that as many bits match by chance.
@@ -217,7 +217,7 @@ pub struct Findings {
     pub reason: Option<String>,
 }
 
-impl Findings {
+impl VerificationReport {
     /// What a comparison says.
     pub fn of(compared: &Compared) -> Result<Self> {
         let found = Self::new(&compared.reading, compared.comparison.as_ref(), &compared.ignored)?;

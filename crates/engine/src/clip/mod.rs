@@ -21,7 +21,7 @@ mod weights;
 pub use config::ClipConfig;
 pub use model::{ClipModel, ImageTower, Parts, normalize};
 pub use preprocess::{preprocess, resize};
-pub use random_fourier::StatisticsTower;
+pub use random_fourier::RandomFourierEncoder;
 pub use resnet::ResNet;
 pub use tensor_file::{TensorFile, TensorSource};
 pub use text::TextTransformer;

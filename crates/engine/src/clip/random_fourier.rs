@@ -21,7 +21,7 @@ use std::ops::Range;
 
 /// Image tower of the statistics kind.
 #[derive(Module, Debug)]
-pub struct StatisticsTower {
+pub struct RandomFourierEncoder {
     scales: Vec<Scale>,
     proj: Linear,
 }
@@ -39,7 +39,7 @@ struct Scale {
     surround: usize,
 }
 
-impl StatisticsTower {
+impl RandomFourierEncoder {
     /// Lays out the tower; `embed_dim` is the width of its features.
     pub fn new(
         vision: &VisionConfig,
@@ -151,9 +151,9 @@ mod tests {
         config
     }
 
-    fn tower() -> StatisticsTower {
+    fn tower() -> RandomFourierEncoder {
         match ClipModel::init(&config(), Parts::Image, &Device::flex(), 3).visual {
-            Some(ImageTower::Statistics(tower)) => tower,
+            Some(ImageTower::RandomFourier(tower)) => tower,
             other => panic!("{other:?}"),
         }
     }
@@ -168,7 +168,7 @@ mod tests {
     }
 
     /// A tower with filters as the shipped model has them.
-    fn shipped_filters() -> StatisticsTower {
+    fn shipped_filters() -> RandomFourierEncoder {
         let (filters, phases) = crate::train::filters(8 * 3, crate::train::NORM, crate::train::LUMA, 1);
         tower().with_filters(&filters, &phases)
     }

@@ -12,13 +12,13 @@ use crate::splat::{Changes, sh};
 use crate::view::{Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed.
-pub(super) struct HeldOut {
+pub(super) struct EarlyStopping {
     stop: EarlyStop,
     views: Vec<PooledView>,
     passed: usize,
 }
 
-impl HeldOut {
+impl EarlyStopping {
     /// Prepares the views that follow those of the verification, so that no report is made on views that a decision
     /// was taken on.
     pub fn new(

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::learned_offsets::Learned;
+use super::learned_offsets::LearnedOffsets;
 use super::optimise::optimise;
 use super::progress::Progress;
 use super::resources::{measure_view, model_bytes, predict_memory};
@@ -123,7 +123,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
 }
 
 /// Writes the scene with what was learned to the file aside, and reads back what it shows.
-fn write(job: &Job<'_>, scene: &Scene, learned: &Learned, aside: &Path) -> Result<Gaussians> {
+fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Path) -> Result<Gaussians> {
     let colours = learned.colours(&scene.gaussians.sh);
     // The new file is complete before it replaces the reserved one, so free that one's space first.
     std::fs::write(aside, []).map_err(Error::io(job.output))?;

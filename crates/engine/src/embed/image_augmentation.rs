@@ -19,13 +19,13 @@ pub(super) const CORNERS: [f32; 3] = [1.0; 3];
 const GROUND: f32 = 1e-3;
 
 /// Distortions as an engine needs them.
-pub(super) struct Shown {
+pub(super) struct ImageAugmentation {
     layer: Layer,
     /// Side of the pictures that are distorted.
     side: usize,
 }
 
-impl Shown {
+impl ImageAugmentation {
     /// Tones that whoever reads a picture guesses and undoes ([`crate::extract::guesses`]) are left as they are.
     pub fn new(settings: &Settings, engine: &Engine) -> Self {
         let mut layer = settings.layer();
@@ -117,9 +117,9 @@ mod tests {
         };
         let config = config(&options);
         let mut model = ClipModel::init(&config, Parts::Image, &compute.device, 5);
-        if let Some(ImageTower::Statistics(tower)) = model.visual {
+        if let Some(ImageTower::RandomFourier(tower)) = model.visual {
             let (weights, phases) = filters(16 * 3, options.norm, options.luma, 1);
-            model.visual = Some(ImageTower::Statistics(tower.with_filters(&weights, &phases)));
+            model.visual = Some(ImageTower::RandomFourier(tower.with_filters(&weights, &phases)));
         }
         let nobody = ClipIdentity {
             name: String::new(),
@@ -172,7 +172,7 @@ mod tests {
             distorted_size: 320,
             ..Preset::Standard.settings()
         };
-        let shown = Shown::new(&settings, &engine);
+        let shown = ImageAugmentation::new(&settings, &engine);
         let values: Vec<f32> = (0..6 * 3 * 64 * 64)
             .map(|i| 0.5 + 0.4 * (i as f32 * 0.013).sin() * (i as f32 * 0.0007).cos())
             .collect();

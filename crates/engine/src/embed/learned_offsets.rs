@@ -7,9 +7,9 @@ use crate::splat::{Changes, Learnable};
 /// Slots that one task quantises.
 const CHUNK: usize = 512;
 
-/// Learned changes of a scene's colours.
+/// LearnedOffsets changes of a scene's colours.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Learned {
+pub struct LearnedOffsets {
     /// Which coefficients they are for.
     pub learnable: Learnable,
     /// The changes as the optimiser has them, `[slots][columns]`.
@@ -18,7 +18,7 @@ pub struct Learned {
     kept: Option<Vec<f32>>,
 }
 
-impl Learned {
+impl LearnedOffsets {
     /// No changes yet.
     pub fn new(scene: &Scene, learnable: Learnable) -> Self {
         let values = vec![0.0; learnable.len()];
@@ -27,7 +27,7 @@ impl Learned {
             values,
             learnable,
         };
-        learned.settle(scene);
+        learned.quantize(scene);
         learned
     }
 
@@ -43,11 +43,11 @@ impl Learned {
     /// Makes all changes smaller or larger by a factor.
     pub fn scale(&mut self, factor: f32, scene: &Scene) {
         self.values.iter_mut().for_each(|v| *v *= factor);
-        self.settle(scene);
+        self.quantize(scene);
     }
 
     /// To be called after the values have changed: works out anew what the file keeps of them.
-    pub fn settle(&mut self, scene: &Scene) {
+    pub fn quantize(&mut self, scene: &Scene) {
         let Some(kept) = &mut self.kept else {
             return;
         };
@@ -64,7 +64,7 @@ impl Learned {
                 let original = &scene.gaussians.sh.coefficients[at..at + stride];
                 colour.copy_from_slice(original);
                 colour.iter_mut().zip(values).for_each(|(c, v)| *c += v);
-                scene.keep(row as usize, &mut colour);
+                scene.quantize_colors(row as usize, &mut colour);
                 for (kept, (now, before)) in kept.iter_mut().zip(colour.iter().zip(original)) {
                     *kept = now - before;
                 }
@@ -105,10 +105,10 @@ mod tests {
     #[test]
     fn only_learned_rows_and_degrees_change() {
         let scene = sample(4, 1, 1).unwrap();
-        let mut learned = Learned::new(&scene, Learnable::new(&[false, true, false, true], 0));
+        let mut learned = LearnedOffsets::new(&scene, Learnable::new(&[false, true, false, true], 0));
         assert_eq!(learned.values.len(), 6);
         learned.values.copy_from_slice(&[0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        learned.settle(&scene);
+        learned.quantize(&scene);
         let original = &scene.gaussians.sh;
         let colours = learned.colours(original);
         let different: Vec<usize> = (0..48)

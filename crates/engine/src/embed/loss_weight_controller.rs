@@ -11,7 +11,7 @@
 //! A second factor, on SSIM within reconstruction, holds an SSIM in the same way, between 0 and 1: a weight that scenes full of
 //! texture do not feel would leave a scene of few smooth surfaces hardly any place for a mark.
 //!
-//! Where bits stay wrong, both targets give way a little, and no further than the scene needs ([`Yielding`]): a scene of few
+//! Where bits stay wrong, both targets give way a little, and no further than the scene needs ([`TargetRelaxation`]): a scene of few
 //! smooth surfaces holds 64 bits at 38 dB that it does not hold at 40, and one full of texture gains nothing.
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ use crate::error::Result;
 /// How the factor is controlled.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Balance {
+pub struct LossWeightControl {
     /// PSNR to hold on training views, dB.
     pub target_psnr_db: f64,
     /// Training bit accuracy from which on the factor is not lowered any more.
@@ -39,14 +39,14 @@ pub struct Balance {
     pub target_ssim: Option<f64>,
     /// What is given up of both where bits stay wrong; `None` for nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub yielding: Option<Yielding>,
+    pub yielding: Option<TargetRelaxation>,
 }
 
-/// How far targets give way. After [`YIELDS_AFTER`] steps the share that they have given way grows by [`YIELDING`] times what
+/// How far targets give way. After [`RELAXES_AFTER`] steps the share that they have given way grows by [`RELAXATION_GAIN`] times what
 /// the running bit accuracy lacks of `below`, and shrinks likewise; it stays within 0 and 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Yielding {
+pub struct TargetRelaxation {
     /// Training bit accuracy below which they do.
     pub below: f64,
     /// Of the PSNR at most, dB.
@@ -56,9 +56,9 @@ pub struct Yielding {
 }
 
 /// Steps before which bits may be wrong because they were not learnt yet.
-const YIELDS_AFTER: usize = 80;
-/// Of the share of a [`Yielding`], for each step and all bits that are lacking: all of it within 80 steps of 0.05.
-const YIELDING: f64 = 0.25;
+const RELAXES_AFTER: usize = 80;
+/// Of the share of a [`TargetRelaxation`], for each step and all bits that are lacking: all of it within 80 steps of 0.05.
+const RELAXATION_GAIN: f64 = 0.25;
 
 /// Of the logarithm of the factor on SSIM, for each unit below the target.
 const SSIM_PROPORTIONAL: f64 = 300.0;
@@ -67,7 +67,7 @@ const SSIM_INTEGRAL: f64 = 20.0;
 /// Smallest factor on SSIM.
 const SSIM_LEAST: f64 = 0.01;
 
-impl Default for Balance {
+impl Default for LossWeightControl {
     fn default() -> Self {
         Self {
             target_psnr_db: 36.0,
@@ -82,7 +82,7 @@ impl Default for Balance {
     }
 }
 
-impl Balance {
+impl LossWeightControl {
     pub(super) fn check(&self) -> Result<()> {
         within("balance.target_psnr_db", self.target_psnr_db, 0.0, 200.0)?;
         within("balance.proportional", self.proportional, 0.0, 100.0)?;
@@ -100,8 +100,8 @@ impl Balance {
 
 /// The factor and what it follows.
 #[derive(Clone, Debug)]
-pub struct Balancer {
-    balance: Option<Balance>,
+pub struct LossWeightController {
+    balance: Option<LossWeightControl>,
     running: Option<[f64; 3]>,
     /// `integral * sum of e`.
     sum: f64,
@@ -109,22 +109,22 @@ pub struct Balancer {
     /// The same two of SSIM.
     ssim: (f64, f64),
     steps: usize,
-    /// Share of the [`Yielding`] that is given up.
+    /// Share of the [`TargetRelaxation`] that is given up.
     given: f64,
 }
 
 /// What terms of the loss are multiplied by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factors {
+pub struct LossWeightFactors {
     /// All that compare pictures.
     pub reconstruction: f32,
     /// SSIM among these, besides.
     pub ssim: f32,
 }
 
-impl Balancer {
+impl LossWeightController {
     /// Starts at 1, and stays there without a `balance`.
-    pub fn new(balance: Option<Balance>) -> Self {
+    pub fn new(balance: Option<LossWeightControl>) -> Self {
         Self {
             balance,
             running: None,
@@ -137,8 +137,8 @@ impl Balancer {
     }
 
     /// What terms are multiplied by at the next step.
-    pub fn factors(&self) -> Factors {
-        Factors {
+    pub fn factors(&self) -> LossWeightFactors {
+        LossWeightFactors {
             reconstruction: self.factor as f32,
             ssim: self.ssim.1 as f32,
         }
@@ -155,8 +155,8 @@ impl Balancer {
         self.steps += 1;
         let mut given = [0.0; 2];
         if let Some(yielding) = b.yielding {
-            if self.steps > YIELDS_AFTER {
-                self.given = (self.given + YIELDING * (yielding.below - running[1])).clamp(0.0, 1.0);
+            if self.steps > RELAXES_AFTER {
+                self.given = (self.given + RELAXATION_GAIN * (yielding.below - running[1])).clamp(0.0, 1.0);
             }
             given = [yielding.psnr_db, yielding.ssim].map(|most| most * self.given);
         }
@@ -180,17 +180,17 @@ impl Balancer {
 mod tests {
     use super::*;
 
-    fn balancer(proportional: f64, integral: f64) -> Balancer {
-        Balancer::new(Some(Balance {
+    fn controller(proportional: f64, integral: f64) -> LossWeightController {
+        LossWeightController::new(Some(LossWeightControl {
             proportional,
             integral,
             limit: 8.0,
             memory: 0.0,
-            ..Balance::default()
+            ..LossWeightControl::default()
         }))
     }
 
-    fn factors(mut b: Balancer, psnr_and_bits: &[(f64, f64)]) -> Vec<f64> {
+    fn factors(mut b: LossWeightController, psnr_and_bits: &[(f64, f64)]) -> Vec<f64> {
         let follow = |(psnr, bits): &(f64, f64)| {
             b.update(*psnr, *bits, 1.0);
             f64::from(b.factors().reconstruction).ln()
@@ -211,31 +211,31 @@ mod tests {
     fn follows_the_error_and_its_sum() {
         let seen = [(35.0, 1.0), (36.0, 0.5), (37.5, 0.5), (37.0, 1.0)];
         // Room is not used once all bits are right.
-        close(&factors(balancer(0.5, 0.0), &seen), &[0.5, 0.0, -0.75, 0.0]);
-        close(&factors(balancer(0.0, 0.5), &seen), &[0.5, 0.5, -0.25, -0.25]);
-        close(&factors(balancer(0.5, 0.5), &seen), &[1.0, 0.5, -1.0, -0.25]);
+        close(&factors(controller(0.5, 0.0), &seen), &[0.5, 0.0, -0.75, 0.0]);
+        close(&factors(controller(0.0, 0.5), &seen), &[0.5, 0.5, -0.25, -0.25]);
+        close(&factors(controller(0.5, 0.5), &seen), &[1.0, 0.5, -1.0, -0.25]);
     }
 
     #[test]
     fn stays_within_its_limits_and_comes_back_at_once() {
         let limit = 8.0_f64.ln();
         close(
-            &factors(balancer(0.0, 1.0), &[(0.0, 0.5), (37.0, 0.5)]),
+            &factors(controller(0.0, 1.0), &[(0.0, 0.5), (37.0, 0.5)]),
             &[limit, limit - 1.0],
         );
-        close(&factors(balancer(1.0, 1.0), &[(f64::INFINITY, 0.5)]), &[-limit]);
+        close(&factors(controller(1.0, 1.0), &[(f64::INFINITY, 0.5)]), &[-limit]);
     }
 
     #[test]
     fn without_a_target_nothing_changes_and_means_run() {
-        let mut none = Balancer::new(None);
+        let mut none = LossWeightController::new(None);
         none.update(10.0, 0.5, 0.5);
-        let untouched = Factors {
+        let untouched = LossWeightFactors {
             reconstruction: 1.0,
             ssim: 1.0,
         };
         assert_eq!(none.factors(), untouched);
-        let mut slow = Balancer::new(Some(Balance::default()));
+        let mut slow = LossWeightController::new(Some(LossWeightControl::default()));
         slow.update(40.0, 0.5, 0.5);
         slow.update(30.0, 0.5, 0.5); // the mean is 38
         assert!(slow.factors().reconstruction < 1.0 && slow.factors().ssim == 1.0);
@@ -243,19 +243,19 @@ mod tests {
 
     #[test]
     fn targets_give_way_where_bits_stay_wrong_and_come_back() {
-        let yielding = Yielding {
+        let yielding = TargetRelaxation {
             below: 0.9,
             psnr_db: 2.0,
             ssim: 0.004,
         };
-        let mut b = Balancer::new(Some(Balance {
+        let mut b = LossWeightController::new(Some(LossWeightControl {
             target_psnr_db: 40.0,
             target_ssim: Some(0.994),
             proportional: 1.0,
             integral: 0.0,
             memory: 0.0,
             yielding: Some(yielding),
-            ..Balance::default()
+            ..LossWeightControl::default()
         }));
         let mut after = |steps: usize, bits: f64| {
             for _ in 0..steps {
@@ -264,7 +264,7 @@ mod tests {
             (f64::from(b.factors().reconstruction).ln(), b.factors().ssim)
         };
         // Not while they are learnt; then by a quarter of the tenth that is lacking, each step.
-        assert_eq!(after(YIELDS_AFTER, 0.5), (0.0, 1.0));
+        assert_eq!(after(RELAXES_AFTER, 0.5), (0.0, 1.0));
         assert!((after(1, 0.8).0 + 2.0 * 0.025).abs() < 1e-6);
         // Two dB at most, and a mark that is above the lower SSIM has room.
         let (psnr, ssim) = after(100, 0.8);
@@ -274,10 +274,10 @@ mod tests {
 
     #[test]
     fn ssim_weighs_less_where_there_is_room_and_all_where_there_is_none() {
-        let mut b = Balancer::new(Some(Balance {
+        let mut b = LossWeightController::new(Some(LossWeightControl {
             target_ssim: Some(0.994),
             memory: 0.0,
-            ..Balance::default()
+            ..LossWeightControl::default()
         }));
         let mut after = |ssim: f64| {
             b.update(36.0, 0.9, ssim);

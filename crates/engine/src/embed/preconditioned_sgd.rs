@@ -20,7 +20,7 @@ const FLOOR: f32 = 1e-2;
 /// Rates of the steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DescentOptions {
+pub struct PreconditionedSgdOptions {
     /// Length of a step: the root mean square change of a picture.
     pub length: f32,
     /// Share of constant (DC) coefficients in it; 0 leaves them alone.
@@ -33,7 +33,7 @@ pub struct DescentOptions {
     pub momentum: f32,
 }
 
-impl Default for DescentOptions {
+impl Default for PreconditionedSgdOptions {
     fn default() -> Self {
         Self {
             length: 2e-3,
@@ -45,19 +45,19 @@ impl Default for DescentOptions {
     }
 }
 
-impl DescentOptions {
+impl PreconditionedSgdOptions {
     pub(super) fn check(&self) -> Result<()> {
-        within("descent.length", f64::from(self.length), 0.0, 1.0)?;
-        within("descent.dc", f64::from(self.dc), 0.0, 100.0)?;
-        within("descent.rest", f64::from(self.rest), 0.0, 100.0)?;
-        within("descent.final_rate", f64::from(self.final_rate), 0.0, 1.0)?;
-        within("descent.momentum", f64::from(self.momentum), 0.0, 0.999)
+        within("preconditioned_sgd.length", f64::from(self.length), 0.0, 1.0)?;
+        within("preconditioned_sgd.dc", f64::from(self.dc), 0.0, 100.0)?;
+        within("preconditioned_sgd.rest", f64::from(self.rest), 0.0, 100.0)?;
+        within("preconditioned_sgd.final_rate", f64::from(self.final_rate), 0.0, 1.0)?;
+        within("preconditioned_sgd.momentum", f64::from(self.momentum), 0.0, 0.999)
     }
 }
 
 /// The state of the optimiser.
-pub struct Descent {
-    options: DescentOptions,
+pub struct PreconditionedSgd {
+    options: PreconditionedSgdOptions,
     stride: usize,
     /// Of each slot: one over the mean over views of `sum_p w c`, a colour's squared change in a picture's squares.
     inverse: Vec<f32>,
@@ -67,10 +67,10 @@ pub struct Descent {
     largest: f32,
 }
 
-impl Descent {
+impl PreconditionedSgd {
     /// For slots of `stride` coefficients with these energies: the mean over views of the sum over pixels of a Gaussian's
     /// weight times the cover of the pixel.
-    pub fn new(options: DescentOptions, stride: usize, energies: &[f32]) -> Self {
+    pub fn new(options: PreconditionedSgdOptions, stride: usize, energies: &[f32]) -> Self {
         let mean = energies.iter().map(|e| f64::from(*e)).sum::<f64>() / energies.len().max(1) as f64;
         let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
         Self {

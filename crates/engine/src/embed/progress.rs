@@ -5,7 +5,7 @@ use crate::memory::MemoryRequirements;
 
 /// Unweighted terms of the loss, means over the views of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Terms {
+pub struct LossTerms {
     /// Mean absolute difference.
     pub l1: f32,
     /// 1 - SSIM.
@@ -30,7 +30,7 @@ pub struct Step {
     /// Mean PSNR of these views, dB; infinite before anything has changed.
     pub psnr_db: f64,
     /// The loss.
-    pub terms: Terms,
+    pub terms: LossTerms,
     /// Factor on the reconstruction terms.
     pub balance: f32,
 }

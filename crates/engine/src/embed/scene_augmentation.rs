@@ -27,18 +27,18 @@ const UNSEEN: f32 = -100.0;
 
 /// What happens to the scene of one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Alteration {
+pub(super) enum SceneAugmentation {
     /// Nothing.
-    Nothing,
+    None,
     /// Bands above this degree are dropped.
-    Degree(usize),
+    TruncateSh(usize),
     /// Normal noise of these deviations on constant and on all other coefficients.
     Noise { dc: f32, rest: f32, seed: u64 },
     /// A share of the Gaussians is left out, at random.
-    Pruned { share: f32, seed: u64 },
+    Prune { share: f32, seed: u64 },
 }
 
-impl Alteration {
+impl SceneAugmentation {
     /// One of nothing and what of `robust_to` happens to scenes, all equally likely; always the same for an index.
     pub fn draw(robust_to: RobustTo, degree: usize, seed: u64, index: u64) -> Self {
         let kinds: Vec<Kind> = robust_to.of_scenes().collect();
@@ -48,18 +48,18 @@ impl Alteration {
         let seed = rng.random();
         let noise = |[dc, rest]: [f32; 2]| Self::Noise { dc, rest, seed };
         match choice.checked_sub(1).and_then(|i| kinds.get(i)) {
-            Some(Kind::ShTruncation) => Self::Degree(rng.random_range(0..=degree)),
+            Some(Kind::ShTruncation) => Self::TruncateSh(rng.random_range(0..=degree)),
             Some(Kind::ShNoise) => noise([NOISE * rng.random::<f32>(); 2]),
             Some(Kind::Spz) => noise(SPZ),
             Some(Kind::Sog) => noise(SOG),
-            Some(Kind::Pruning) => Self::Pruned { share: PRUNED, seed },
-            _ => Self::Nothing,
+            Some(Kind::Pruning) => Self::Prune { share: PRUNED, seed },
+            _ => Self::None,
         }
     }
 
     /// The scene with the Gaussians that are left out made invisible, where there are any; rows stay what they were.
     pub fn pruned(self, gaussians: &Gaussians) -> Option<Gaussians> {
-        let Self::Pruned { share, seed } = self else {
+        let Self::Prune { share, seed } = self else {
             return None;
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -95,19 +95,21 @@ mod tests {
 
     #[test]
     fn nothing_is_altered_unless_asked_for_and_all_kinds_are_drawn_alike() {
-        let none = (0..50).map(|i| Alteration::draw(RobustTo::none(), 3, 1, i));
-        assert!(none.into_iter().all(|a| a == Alteration::Nothing));
+        let none = (0..50).map(|i| SceneAugmentation::draw(RobustTo::none(), 3, 1, i));
+        assert!(none.into_iter().all(|a| a == SceneAugmentation::None));
         // Those of pictures leave the scene alone.
         let pictures = "jpeg,crop".parse().unwrap();
-        assert_eq!(Alteration::draw(pictures, 3, 1, 7), Alteration::Nothing);
-        let all: Vec<Alteration> = (0..600).map(|i| Alteration::draw(RobustTo::all(), 3, 1, i)).collect();
-        let share = |is: fn(&Alteration) -> bool| all.iter().filter(|a| is(a)).count() as f64 / 600.0;
-        assert!((share(|a| *a == Alteration::Nothing) - 1.0 / 6.0).abs() < 0.05);
-        assert!((share(|a| matches!(a, Alteration::Degree(_))) - 1.0 / 6.0).abs() < 0.05);
-        assert!((share(|a| matches!(a, Alteration::Noise { .. })) - 0.5).abs() < 0.07);
-        assert!((share(|a| matches!(a, Alteration::Pruned { .. })) - 1.0 / 6.0).abs() < 0.05);
+        assert_eq!(SceneAugmentation::draw(pictures, 3, 1, 7), SceneAugmentation::None);
+        let all: Vec<SceneAugmentation> = (0..600)
+            .map(|i| SceneAugmentation::draw(RobustTo::all(), 3, 1, i))
+            .collect();
+        let share = |is: fn(&SceneAugmentation) -> bool| all.iter().filter(|a| is(a)).count() as f64 / 600.0;
+        assert!((share(|a| *a == SceneAugmentation::None) - 1.0 / 6.0).abs() < 0.05);
+        assert!((share(|a| matches!(a, SceneAugmentation::TruncateSh(_))) - 1.0 / 6.0).abs() < 0.05);
+        assert!((share(|a| matches!(a, SceneAugmentation::Noise { .. })) - 0.5).abs() < 0.07);
+        assert!((share(|a| matches!(a, SceneAugmentation::Prune { .. })) - 1.0 / 6.0).abs() < 0.05);
         for degree in 0..4 {
-            assert!(all.contains(&Alteration::Degree(degree)));
+            assert!(all.contains(&SceneAugmentation::TruncateSh(degree)));
         }
     }
 
@@ -116,14 +118,14 @@ mod tests {
         let scene = sample(4000, 2, 3).unwrap().gaussians;
         let camera = ViewSampler::new(&scene, 1).unwrap().camera(Split::Training, 0, 48);
         let view = prepare(&scene, &camera, WeightCache::None).unwrap();
-        let pruning = Alteration::Pruned { share: 0.25, seed: 5 };
+        let pruning = SceneAugmentation::Prune { share: 0.25, seed: 5 };
         let pruned = pruning.pruned(&scene).unwrap();
         let left = prepare(&pruned, &camera, WeightCache::None).unwrap().visible.len();
         let share = left as f64 / view.visible.len() as f64;
         assert!((share - 0.75).abs() < 0.05, "{share}");
-        assert!(pruning.noise(&view, 2).is_empty() && Alteration::Nothing.pruned(&scene).is_none());
+        assert!(pruning.noise(&view, 2).is_empty() && SceneAugmentation::None.pruned(&scene).is_none());
 
-        let noise = Alteration::Noise {
+        let noise = SceneAugmentation::Noise {
             dc: 0.1,
             rest: 0.1,
             seed: 1,

@@ -17,13 +17,13 @@ pub(super) enum Stage {
 const STAGES: usize = Stage::Check as usize + 1;
 
 /// Milliseconds by stage.
-pub(super) struct Timing {
+pub(super) struct StepTimer {
     clock: Instant,
     ms: [f64; STAGES],
     steps: usize,
 }
 
-impl Timing {
+impl StepTimer {
     pub fn new() -> Self {
         Self {
             clock: Instant::now(),

@@ -1,11 +1,10 @@
 //! What of the colours is learned.
-use super::preconditioned_sgd::DescentOptions;
 use super::settings::Settings;
 use crate::error::Error;
 
 /// Which coefficients change. Geometry and opacity never do: the renderer has no gradient to them, and does not need one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Learn {
+pub enum TrainableCoefficients {
     /// All coefficients of the spherical harmonics.
     #[default]
     Sh,
@@ -15,7 +14,7 @@ pub enum Learn {
     Rest,
 }
 
-impl std::str::FromStr for Learn {
+impl std::str::FromStr for TrainableCoefficients {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
@@ -34,19 +33,13 @@ impl std::str::FromStr for Learn {
 
 impl Settings {
     /// These settings with only some coefficients learned: the optimiser's rates of the others are 0.
-    pub fn learning(mut self, what: Learn) -> Self {
+    pub fn learning(mut self, what: TrainableCoefficients) -> Self {
         let (dc, rest) = match what {
-            Learn::Sh => return self,
-            Learn::Dc => (1.0, 0.0),
-            Learn::Rest => (0.0, 1.0),
+            TrainableCoefficients::Sh => return self,
+            TrainableCoefficients::Dc => (1.0, 0.0),
+            TrainableCoefficients::Rest => (0.0, 1.0),
         };
-        self.adam.rate_dc *= dc;
-        self.adam.rate_rest *= rest;
-        self.descent = self.descent.map(|descent| DescentOptions {
-            dc: descent.dc * dc,
-            rest: descent.rest * rest,
-            ..descent
-        });
+        self.optimizer = self.optimizer.scaled(dc, rest);
         self
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::scene_augmentation::Alteration;
+use super::scene_augmentation::SceneAugmentation;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
@@ -44,24 +44,24 @@ impl PooledView {
         half: bool,
         background: [f32; 3],
     ) -> Result<Self> {
-        let how = Drawn {
+        let how = TrainingView {
             times,
             half,
             background,
-            alteration: Alteration::Nothing,
+            augmentation: SceneAugmentation::None,
         };
         Self::altered(engine, gaussians, camera, how)
     }
 
     /// As [`PooledView::new`], of a scene to which something happened.
-    fn altered(engine: &Engine, gaussians: &Gaussians, camera: &Camera, how: Drawn) -> Result<Self> {
-        let pruned = how.alteration.pruned(gaussians);
+    fn altered(engine: &Engine, gaussians: &Gaussians, camera: &Camera, how: TrainingView) -> Result<Self> {
+        let pruned = how.augmentation.pruned(gaussians);
         let shown = pruned.as_ref().unwrap_or(gaussians);
         let mut view = prepare_averaged(shown, camera, how.times, engine.weight_cache(camera.width, how.half))?;
-        if let Alteration::Degree(degree) = how.alteration {
+        if let SceneAugmentation::TruncateSh(degree) = how.augmentation {
             view.degree = view.degree.min(degree);
         }
-        let noise = how.alteration.noise(&view, gaussians.sh.degree);
+        let noise = how.augmentation.noise(&view, gaussians.sh.degree);
         let empty = Picture {
             width: 0,
             height: 0,
@@ -111,15 +111,15 @@ impl PooledView {
 }
 
 /// How a training view is drawn.
-struct Drawn {
+struct TrainingView {
     times: f32,
     half: bool,
     background: [f32; 3],
-    alteration: Alteration,
+    augmentation: SceneAugmentation,
 }
 
 /// Training views, kept within a number and a budget of bytes.
-pub(super) struct Pool {
+pub(super) struct ViewPool {
     sampler: ViewSampler,
     settings: Settings,
     next: u64,
@@ -146,7 +146,7 @@ impl Coverage {
     }
 }
 
-impl Pool {
+impl ViewPool {
     pub fn new(sampler: ViewSampler, settings: &Settings) -> Self {
         let mut picks = ChaCha8Rng::seed_from_u64(settings.seed);
         picks.set_stream(u64::MAX);
@@ -237,17 +237,17 @@ impl Pool {
 
     /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
     /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand.
-    fn chosen(&self, index: u64, degree: usize) -> Drawn {
+    fn chosen(&self, index: u64, degree: usize) -> TrainingView {
         let s = &self.settings;
         let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(1));
         rng.set_stream(index);
         let black = rng.random::<f32>() < s.black_backgrounds;
         let times = 1.0 + (s.enlarged - 1.0) * rng.random::<f32>();
-        Drawn {
+        TrainingView {
             times,
             half: s.half_weights,
             background: if black { [0.0; 3] } else { [1.0; 3] },
-            alteration: Alteration::draw(s.robust_to, degree, s.seed, index),
+            augmentation: SceneAugmentation::draw(s.robust_to, degree, s.seed, index),
         }
     }
 }

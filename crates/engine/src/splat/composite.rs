@@ -14,7 +14,7 @@ const LANES: usize = 4;
 const FETCH: usize = 64;
 
 /// Receives the contributions to a tile, splat by splat from front to back.
-pub(super) trait Sink {
+pub(super) trait ContributionSink {
     /// The next splat of the tile's list begins: its place in the list and its index.
     fn begin(&mut self, place: usize, splat: u32);
     /// It adds `weight` times its colour to `pixel` (row-major in the tile).
@@ -25,17 +25,17 @@ pub(super) trait Sink {
 
 /// Where a tile lies.
 #[derive(Clone, Copy)]
-pub(super) struct TileFrame {
+pub(super) struct TileBounds {
     /// First pixel.
     pub origin: [u32; 2],
     /// Pixels inside the picture, at most [`TILE`] each way.
     pub size: [usize; 2],
 }
 
-impl TileFrame {
+impl TileBounds {
     pub fn new(column: u32, row: u32, width: u32, height: u32) -> Self {
         let origin = [column * TILE, row * TILE];
-        TileFrame {
+        TileBounds {
             origin,
             size: [
                 (width - origin[0]).min(TILE) as usize,
@@ -46,7 +46,12 @@ impl TileFrame {
 }
 
 /// Composites the splats of `list` and returns each pixel's final transmittance.
-pub(super) fn walk(frame: TileFrame, splats: &[Splat2d], list: &[u32], sink: &mut impl Sink) -> [f32; TILE_PIXELS] {
+pub(super) fn composite_tile(
+    frame: TileBounds,
+    splats: &[Splat2d],
+    list: &[u32],
+    sink: &mut impl ContributionSink,
+) -> [f32; TILE_PIXELS] {
     let mut transmittance = [1.0f32; TILE_PIXELS];
     // A bit a pixel that is not finished: most splats of a dense scene lie behind finished pixels only.
     let mut open = [0u32; SIDE];

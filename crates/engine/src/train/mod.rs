@@ -23,7 +23,7 @@ pub use drawing::{Drawing, SIDE, draw, random_view};
 pub(crate) use filters::{LUMA, NORM, filters};
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
-use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
+use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, RandomFourierEncoder};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use burn::tensor::Tensor;
@@ -165,7 +165,7 @@ pub fn train_clip(
     let head = head::fit(&tower, &config, options, compute, &mut progress)?;
     let tower = tower.with_head(head.matrix, head.bias);
     let model = ClipModel {
-        visual: Some(ImageTower::Statistics(tower)),
+        visual: Some(ImageTower::RandomFourier(tower)),
         ..model
     };
     let (model, retrieval) = contrastive::train(model, &config, options, compute, &mut progress)?;
@@ -177,9 +177,9 @@ pub fn train_clip(
     })
 }
 
-fn tower(model: &ClipModel) -> Result<StatisticsTower> {
+fn tower(model: &ClipModel) -> Result<RandomFourierEncoder> {
     match &model.visual {
-        Some(ImageTower::Statistics(tower)) => Ok(tower.clone()),
+        Some(ImageTower::RandomFourier(tower)) => Ok(tower.clone()),
         _ => Err(Error::BadModel {
             name: "guardsplat-clip".into(),
             reason: "has another image tower".into(),

@@ -163,7 +163,7 @@ impl Container for Packed {
         false
     }
 
-    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         let (constant, rest) = coefficients.split_at_mut(3);
         for (value, range) in constant.iter_mut().zip(&self.grids[row / CHUNK]) {
             *value = range.coefficient(range.nearest(*value));

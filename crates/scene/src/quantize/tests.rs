@@ -19,7 +19,7 @@ fn converted(scene: &Gaussians, format: Format) -> Vec<f32> {
     all
 }
 
-fn applied(kept: &Kept, scene: &Gaussians) -> Vec<f32> {
+fn applied(kept: &ColorQuantizer, scene: &Gaussians) -> Vec<f32> {
     let rows: Vec<usize> = (0..scene.len()).collect();
     let mut coefficients = scene.sh.coefficients.clone();
     kept.apply(&rows, &mut coefficients).unwrap();
@@ -45,7 +45,7 @@ fn stand_ins_are_what_files_keep() {
     for degree in 0..=MAX_DEGREE {
         let scene = random(700, degree, 10 + degree as u64);
         for format in Format::ALL {
-            let kept = Kept::fit(&scene, format).unwrap();
+            let kept = ColorQuantizer::fit(&scene, format).unwrap();
             assert!(
                 applied(&kept, &scene) == converted(&scene, format),
                 "{format:?} of degree {degree}"
@@ -69,7 +69,7 @@ fn real_scenes_too() {
         let scene = Scene::read(&path).unwrap().into_gaussians();
         let changed = noisy(&scene, 2);
         for format in [Format::CompressedPly, Format::Spz, Format::Splat] {
-            let kept = Kept::fit(&scene, format).unwrap();
+            let kept = ColorQuantizer::fit(&scene, format).unwrap();
             // Bands that a reader drops are half a step from 0.
             let limit = if format == Format::CompressedPly {
                 1.0 / 64.0
@@ -84,7 +84,7 @@ fn real_scenes_too() {
                 );
             }
         }
-        let kept = Kept::fit(&scene, Format::Sog).unwrap();
+        let kept = ColorQuantizer::fit(&scene, Format::Sog).unwrap();
         assert!(applied(&kept, &scene) == converted(&scene, Format::Sog), "{name}");
         // Groups and codebooks of the changed scene are others; what they leave of the change is about the same.
         let original = converted(&scene, Format::Sog);
@@ -123,7 +123,7 @@ fn some_rows_are_as_all_with_the_others_unchanged() {
         some.extend(own);
     }
     for format in Format::ALL {
-        let kept = Kept::fit(&scene, format).unwrap();
+        let kept = ColorQuantizer::fit(&scene, format).unwrap();
         let all = applied(&kept, &mixed);
         let mut some = some.clone();
         kept.apply(&rows, &mut some).unwrap();
@@ -142,19 +142,24 @@ fn some_rows_are_as_all_with_the_others_unchanged() {
 #[test]
 fn rows_and_lengths_are_checked() {
     let scene = random(4, 1, 31);
-    let kept = Kept::fit(&scene, Format::Sog).unwrap();
+    let kept = ColorQuantizer::fit(&scene, Format::Sog).unwrap();
     let reason = |rows: &[usize], count| kept.apply(rows, &mut vec![0.0; count]).unwrap_err().to_string();
     assert!(reason(&[0, 4], 24).contains("row 4 of a scene of 4"));
     assert!(reason(&[0], 24).contains("24 coefficients for 1 rows, must be 12"));
     kept.apply(&[], &mut []).unwrap();
     // What is learned may have become nothing at all; that is for others to say.
     for format in Format::ALL {
-        let kept = Kept::fit(&scene, format).unwrap();
+        let kept = ColorQuantizer::fit(&scene, format).unwrap();
         kept.apply(&[1], &mut [f32::NAN; 12]).unwrap();
         kept.apply(&[2], &mut [f32::INFINITY; 12]).unwrap();
     }
     let mut bad = scene.clone();
     bad.sh.coefficients[13] = f32::NAN;
-    assert!(Kept::fit(&bad, Format::Spz).unwrap_err().to_string().contains("row 1"));
-    Kept::fit(&Gaussians::default(), Format::Sog).unwrap();
+    assert!(
+        ColorQuantizer::fit(&bad, Format::Spz)
+            .unwrap_err()
+            .to_string()
+            .contains("row 1")
+    );
+    ColorQuantizer::fit(&Gaussians::default(), Format::Sog).unwrap();
 }

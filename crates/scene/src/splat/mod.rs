@@ -172,7 +172,7 @@ impl Container for Splat {
         false
     }
 
-    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, _row: usize, coefficients: &mut [f32]) {
         for value in coefficients {
             *value = Range::UNIT.coefficient(Range::UNIT.nearest(*value));
         }

@@ -174,8 +174,8 @@ impl Container for Streams {
         false
     }
 
-    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
-        colour::keep(coefficients);
+    fn quantize_colors(&self, _row: usize, coefficients: &mut [f32]) {
+        colour::quantize_colors(coefficients);
     }
 
     fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {

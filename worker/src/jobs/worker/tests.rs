@@ -23,9 +23,9 @@ async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
         })
         .unwrap(),
         leaving: shutdown::listen(false).unwrap(),
-        folder: Folder::new(folder).unwrap(),
+        folder: WorkDirectory::new(folder).unwrap(),
         accelerator,
-        offer: Offer::new("test".into(), "cpu", None),
+        capabilities: WorkerCapabilities::new("test".into(), "cpu", None),
     }
 }
 
