@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// The `left` bytes that a source should still have, or as many as it has: one that grows while it is read is read up
 /// to the size it had.
-pub(crate) fn remaining(path: &Path, source: &mut BufReader<impl Read>, left: u64) -> Result<Vec<u8>> {
+pub(crate) fn read_remaining(path: &Path, source: &mut BufReader<impl Read>, left: u64) -> Result<Vec<u8>> {
     let mut body = Vec::new();
     usize::try_from(left)
         .ok()

@@ -5,7 +5,7 @@ use guardsplat_evaluation::report::names::CONTROL;
 use guardsplat_evaluation::report::record::{Detection, Id, Record, detection_id};
 use guardsplat_evaluation::report::store::Store;
 use guardsplat_evaluation::steganalysis::control::replace_bits;
-use guardsplat_evaluation::steganalysis::{Impression, Judge, Pairs, judge};
+use guardsplat_evaluation::steganalysis::{DetectorInputs, Pairs, Steganalyzer, judge};
 
 use super::mark::path;
 use super::read::{Views, cameras};
@@ -27,20 +27,20 @@ pub(super) struct Marked {
     pub id: Id,
 }
 
-/// One detector on marks, or on its positive control.
-struct Wanted {
-    judge: Judge,
+/// MarkRun detector on marks, or on its positive control.
+struct WantedDetection {
+    judge: Steganalyzer,
     control: bool,
     name: String,
 }
 
 /// Marks of one length, all of the same variant.
-pub(super) struct Judged<'a> {
+pub(super) struct SteganalysisRun<'a> {
     pub marks: &'a [Marked],
     pub options: &'a Options,
 }
 
-impl Judged<'_> {
+impl SteganalysisRun<'_> {
     /// Has the detectors look at what they have not yet; `engine` is only asked for if there is anything.
     pub fn carry_out(
         &self,
@@ -54,10 +54,10 @@ impl Judged<'_> {
         let pairs: Vec<usize> = (scenes.iter())
             .map(|scene| self.options.views * self.marks.iter().filter(|mark| mark.name == *scene).count())
             .collect();
-        let wanted: Vec<Wanted> = [false, true]
+        let wanted: Vec<WantedDetection> = [false, true]
             .into_iter()
-            .flat_map(|control| Judge::ALL.map(|judge| Wanted::new(judge, control)))
-            .filter(|wanted| wanted.judge.can_judge(&pairs).is_ok())
+            .flat_map(|control| Steganalyzer::ALL.map(|judge| WantedDetection::new(judge, control)))
+            .filter(|wanted| wanted.judge.can_detect(&pairs).is_ok())
             .filter(|wanted| !store.has(&detection_id(&wanted.name, &scenes, &marks, SEED, views)))
             .collect();
         if wanted.is_empty() {
@@ -113,11 +113,11 @@ impl Judged<'_> {
             let replaced: Vec<_> = (clean.iter().zip(0_u64..))
                 .map(|(view, index)| replace_bits(view, CONTROL_RATE, mark.seed.rotate_left(32) ^ index))
                 .collect();
-            let clean = Impression::of_all(&clean);
+            let clean = DetectorInputs::of_all(&clean);
             for (pairs, suspicious) in [(&mut of_marks, marked), (&mut of_controls, replaced)] {
                 if let Some(pairs) = pairs.get_mut(place) {
                     pairs.clean.extend(clean.iter().cloned());
-                    pairs.suspicious.extend(Impression::of_all(&suspicious));
+                    pairs.suspicious.extend(DetectorInputs::of_all(&suspicious));
                 }
             }
         }
@@ -125,8 +125,8 @@ impl Judged<'_> {
     }
 }
 
-impl Wanted {
-    fn new(judge: Judge, control: bool) -> Self {
+impl WantedDetection {
+    fn new(judge: Steganalyzer, control: bool) -> Self {
         Self {
             judge,
             control,

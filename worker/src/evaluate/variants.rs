@@ -58,7 +58,7 @@ pub struct Variant {
 /// A variant as a user's file has it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Own {
+struct CustomVariant {
     name: String,
     /// What is changed; the settings that the run has by default.
     preset: Option<String>,
@@ -155,7 +155,7 @@ impl Candidate {
     }
 }
 
-fn parse(text: &str) -> Result<Vec<Own>> {
+fn parse(text: &str) -> Result<Vec<CustomVariant>> {
     serde_json::from_str(text).map_err(|e| bad(e.to_string()))
 }
 

@@ -1,4 +1,4 @@
-//! What this worker can do, for the server to give it jobs that it can carry out.
+//! The worker's capabilities: its device, memory and CLIPs, by which the server chooses jobs for it.
 use std::time::Duration;
 
 use guardsplat_engine::clip::Clip;
@@ -13,7 +13,7 @@ const DEVICE_CHARACTERS: usize = 63;
 /// Most CLIPs that the API takes.
 const MOST_CLIPS: usize = 64;
 
-/// What a worker has.
+/// What a worker can carry out.
 #[derive(Clone, Debug)]
 pub struct WorkerCapabilities {
     /// What it calls itself.

@@ -1,4 +1,4 @@
-//! What the engine's thread keeps between jobs: the device, and the engine of the key that was used last.
+//! A cache of the engine's thread: the device, and the engine of the key that was used last.
 use std::path::Path;
 
 use guardsplat_engine::Result;
@@ -9,7 +9,7 @@ use guardsplat_engine::stop::Stop;
 
 use crate::operations::load;
 
-/// A device with an engine on it.
+/// A device, and the engine of the last key on it.
 pub struct EngineCache {
     compute: Compute,
     /// Bytes of memory that a job may take, if not all of the machine's.

@@ -1,4 +1,4 @@
-//! The picture that goes with a marked scene.
+//! The comparison picture of a marked scene: original, marked, and their difference.
 use guardsplat_engine::Result;
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::contact_sheet;

@@ -1,4 +1,4 @@
-//! What the commands and the jobs of a server do alike, so that both give the same bytes and the same figures.
+//! Operations that the offline commands and the jobs of a server share, so that both give the same bytes and figures.
 pub mod comparison_sheet;
 pub mod create_key;
 pub mod embed_settings;

@@ -1,4 +1,4 @@
-//! Pictures of what was read, small, for people who look at the evidence.
+//! Thumbnails of the pictures that were read, for people who look at the evidence.
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{PictureFormat, encode_picture};
 use guardsplat_engine::{Error, Result};

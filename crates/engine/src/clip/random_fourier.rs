@@ -1,4 +1,4 @@
-//! Image tower of local statistics: which colours a picture has, at several scales, wherever they stand in it.
+//! Random Fourier feature encoder: which colours a picture has, at several scales, wherever they stand in it.
 //!
 //! The picture at several scales passes a layer of filters of one pixel; the response y of filter i becomes
 //! sin(y + phase_i) and is averaged over the whole picture, and a linear head turns the averages into the feature. The
@@ -19,7 +19,7 @@ use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
 use std::ops::Range;
 
-/// Image tower of the statistics kind.
+/// Image tower of averaged random Fourier features; configurations call it `statistics`.
 #[derive(Module, Debug)]
 pub struct RandomFourierEncoder {
     scales: Vec<Scale>,
@@ -131,106 +131,5 @@ impl Scale {
         };
         let filters = weight.reshape([-1, 3]); // the kernel is one pixel
         mean_sines(x, filters, phases)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::config::ClipConfig;
-    use super::super::{ClipModel, ImageTower, Parts};
-    use super::*;
-    use burn::tensor::TensorData;
-
-    const SIZE: usize = 64;
-
-    fn config() -> ClipConfig {
-        let mut config = crate::train::config(&crate::train::TrainOptions::default());
-        config.vision.image_size = SIZE;
-        config.vision.width = 8;
-        config.embed_dim = 6;
-        config
-    }
-
-    fn tower() -> RandomFourierEncoder {
-        match ClipModel::init(&config(), Parts::Image, &Device::flex(), 3).visual {
-            Some(ImageTower::RandomFourier(tower)) => tower,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn picture(value: impl Fn(usize) -> f32) -> Tensor<4> {
-        let values: Vec<f32> = (0..3 * SIZE * SIZE).map(value).collect();
-        Tensor::from_data(TensorData::new(values, [1, 3, SIZE, SIZE]), &Device::flex())
-    }
-
-    fn values(tensor: Tensor<2>) -> Vec<f32> {
-        tensor.try_to_vec_as::<f32>().unwrap()
-    }
-
-    /// A tower with filters as the shipped model has them.
-    fn shipped_filters() -> RandomFourierEncoder {
-        let (filters, phases) = crate::train::filters(8 * 3, crate::train::NORM, crate::train::LUMA, 1);
-        tower().with_filters(&filters, &phases)
-    }
-
-    #[test]
-    fn flat_pictures_read_alike_at_every_scale_place_and_size() {
-        for level in [-2.0, 0.0, 0.7] {
-            let tower = shipped_filters();
-            let averages = values(tower.statistics(&picture(|_| level)));
-            let small = Tensor::<4>::full([1, 3, 16, 16], level, &Device::flex());
-            for (a, b) in averages.iter().zip(values(tower.statistics(&small))) {
-                assert!((a - b).abs() < 1e-4, "{a} {b}");
-            }
-        }
-    }
-
-    #[test]
-    fn grounds_of_black_and_white_have_no_response() {
-        let normalization = config().normalization;
-        for level in [0.0, 1.0] {
-            let ground = Tensor::<4>::full([1, 3, SIZE, SIZE], level, &Device::flex());
-            let input = super::super::preprocess(ground, SIZE, &normalization);
-            let response = values(shipped_filters().statistics(&input));
-            assert!(response.iter().all(|v| v.abs() < 1e-4), "{level}: {response:?}");
-        }
-    }
-
-    #[test]
-    fn averages_do_not_depend_on_the_place() {
-        // The same blob in two places, aligned to the coarsest scale.
-        let blob = |x0: usize, y0: usize| {
-            picture(move |i| {
-                let (x, y) = (i % SIZE, i / SIZE % SIZE);
-                let inside = (x0..x0 + 8).contains(&x) && (y0..y0 + 8).contains(&y);
-                if inside {
-                    ((x - x0) as f32 - 3.5) * 0.2 + (y - y0) as f32 * 0.05
-                } else {
-                    0.0
-                }
-            })
-        };
-        let averages = |at| values(shipped_filters().statistics(&at));
-        let (a, b, elsewhere) = (
-            averages(blob(24, 28)),
-            averages(blob(32, 24)),
-            averages(picture(|i| (i as f32).sin())),
-        );
-        let gap = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(gap(&a, &b) < 1e-4, "{}", gap(&a, &b));
-        assert!(gap(&a, &elsewhere) > 1e-2);
-    }
-
-    #[test]
-    fn configuration_survives_writing() {
-        let text = config().to_open_clip().unwrap();
-        assert_eq!(ClipConfig::parse("test", &text).unwrap(), config());
-        let broken = text.replace("\"kernel\": 1", "\"kernel\": 3");
-        assert!(
-            ClipConfig::parse("test", &broken)
-                .unwrap_err()
-                .to_string()
-                .contains("kernel")
-        );
     }
 }

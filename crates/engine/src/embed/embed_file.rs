@@ -1,4 +1,4 @@
-//! From file to file: the marked scene is written aside, read back and verified before it gets its name.
+//! Embedding from file to file: the marked scene is written aside, read back and verified before it gets its name.
 use std::path::Path;
 
 use tempfile::TempPath;

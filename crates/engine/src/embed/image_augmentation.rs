@@ -1,4 +1,4 @@
-//! What CLIP is shown of training views, where a mark is to stand what is done to pictures.
+//! Augmentation of training views in the picture: the distortions that a mark is to stand.
 //!
 //! People compress pictures of some 800 pixels, and training views have 160: squares of JPEG's eight pixels would be five
 //! times too large there, and every pixel would have the noise of twenty-five. So a view that something is done to is
@@ -18,7 +18,7 @@ pub(super) const CORNERS: [f32; 3] = [1.0; 3];
 /// How far a ground may be from black or white.
 const GROUND: f32 = 1e-3;
 
-/// Distortions as an engine needs them.
+/// Distorts training views before their messages are read.
 pub(super) struct ImageAugmentation {
     layer: Layer,
     /// Side of the pictures that are distorted.

@@ -1,4 +1,4 @@
-//! What an embedding learns: changes of the colours of Gaussians that views show, and what the file keeps of them.
+//! The learned offsets: changes of the spherical harmonics of Gaussians that views show, quantized as the file keeps them.
 use rayon::prelude::*;
 
 use crate::scene::{Scene, Sh};

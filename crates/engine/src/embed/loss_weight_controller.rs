@@ -1,4 +1,4 @@
-//! Holds a PSNR: one factor on the reconstruction terms, large while pictures are too far off, small while there is room
+//! A controller of loss weights that holds a PSNR: one factor on the reconstruction terms, large while pictures are too far off, small while there is room
 //! and bits are still wrong.
 //!
 //! After every step the mean PSNR and bit accuracy of its views enter exponential running means. With e the dB that the
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::settings::within;
 use crate::error::Result;
 
-/// How the factor is controlled.
+/// Targets and gains of the [`LossWeightController`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LossWeightControl {

@@ -1,4 +1,4 @@
-//! Scaled gradient descent with momentum over the offsets: a step is divided by what it costs in the picture.
+//! Preconditioned SGD with momentum over the offsets: a step is divided by what it costs in the picture.
 //!
 //! Adam divides a gradient by its own size, so that a Gaussian whose gradients from different views cancel moves as far
 //! as one whose gradients agree, at random: most of what a mark then costs is that walk. Here a coefficient's step is

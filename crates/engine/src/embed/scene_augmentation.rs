@@ -1,4 +1,4 @@
-//! What happens to the scene that a training view shows, so that the mark stands it.
+//! Augmentation of the scene that a training view shows: the changes of scenes that a mark is to stand.
 //!
 //! The unmarked picture that the view is compared with shows the same: only the mark is to differ. What files of other
 //! formats round away is noise here, of the deviation that their steps have.

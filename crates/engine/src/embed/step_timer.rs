@@ -1,4 +1,4 @@
-//! Where the time of a step goes, for profiling (`RUST_LOG=guardsplat_engine::embed=debug`).
+//! Times the stages of a step, for profiling (`RUST_LOG=guardsplat_engine::embed=debug`).
 use std::time::Instant;
 
 /// Parts of a step, in order.

@@ -1,4 +1,4 @@
-//! What of the colours is learned.
+//! Which spherical harmonics coefficients are trainable.
 use super::settings::Settings;
 use crate::error::Error;
 

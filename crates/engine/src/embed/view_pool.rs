@@ -110,7 +110,7 @@ impl PooledView {
     }
 }
 
-/// How a training view is drawn.
+/// How a training view is rendered and augmented.
 struct TrainingView {
     times: f32,
     half: bool,

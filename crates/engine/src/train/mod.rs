@@ -10,6 +10,8 @@
 //!    tuning, Zhai et al. 2022), and retrieval is measured on drawings and captions that it never saw.
 mod contrastive;
 mod drawing;
+#[cfg(test)]
+mod encoder_tests;
 mod filters;
 mod head;
 mod paint;
@@ -20,7 +22,7 @@ mod steering;
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
 #[cfg(test)]
-pub(crate) use filters::{LUMA, NORM, filters};
+pub(crate) use filters::filters;
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
 use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, RandomFourierEncoder};

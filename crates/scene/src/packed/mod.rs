@@ -56,7 +56,7 @@ pub(crate) fn read(
     let reason = |reason| bad(path, reason);
     let layout = Layout::find(parsed).map_err(reason)?;
     layout.check_size(left).map_err(reason)?;
-    let body = crate::remaining::remaining(path, source, left)?;
+    let body = crate::remaining::read_remaining(path, source, left)?;
     // Again, since a file can shrink between the look at its size and the read.
     layout.check_size(body.len() as u64).map_err(reason)?;
     let chunks = decode::chunks(&layout, &body).map_err(reason)?;

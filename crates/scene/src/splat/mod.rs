@@ -8,7 +8,7 @@ use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::ply::fields::Rows;
 use crate::range::{Range, logit};
-use crate::remaining::remaining;
+use crate::remaining::read_remaining;
 use crate::scene::{UNKNOWN, bad};
 use crate::summary::Summary;
 use std::io::{self, BufReader, Read, Write};
@@ -44,7 +44,7 @@ pub(crate) fn read(
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let refused = |reason| bad(path, format!("{}{reason}", UNKNOWN));
     check_size(size).map_err(refused)?;
-    let body = remaining(path, source, size)?;
+    let body = read_remaining(path, source, size)?;
     // Again, since a file can shrink between the look at its size and the read.
     check_size(body.len() as u64).map_err(refused)?;
     let (gaussians, ignored) = decode(&body, bad_rows).map_err(refused)?;
