@@ -3,7 +3,7 @@ mod cli;
 mod error;
 mod evaluate;
 mod jobs;
-mod work;
+mod operations;
 
 fn main() -> std::process::ExitCode {
     cli::run()

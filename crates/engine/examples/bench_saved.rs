@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use guardsplat_engine::clip::{Clip, Parts};
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{Adam, Penalty, Preset};
+use guardsplat_engine::embed::{Adam, AdamOptions, Penalty, Preset};
 use guardsplat_engine::scene::{Gaussians, HEAD, Scene, Sh, summary};
 use guardsplat_engine::splat::{Changes, Learnable, PreparedView, WeightCache, prepare, sh};
 use guardsplat_engine::view::{Split, ViewSampler};
@@ -121,7 +121,7 @@ fn padded(sh: &Sh, degree: usize) -> Sh {
 }
 
 fn cost(sh: &Sh, learnable: &Learnable, views: &[PreparedView]) -> Cost {
-    let options = Preset::Standard.settings().adam;
+    let options = AdamOptions::tuned();
     let gaussians = sh.coefficients.len() / sh.per_gaussian();
     let mut adam = Adam::new(options, learnable.rows().len(), learnable.columns(), gaussians);
     let penalty = Penalty { dc: 0.0, rest: 0.0 };

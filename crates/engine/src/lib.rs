@@ -1,5 +1,4 @@
 //! The GuardSplat engine: marks a 3D Gaussian Splatting scene and reads the mark back from pictures of it.
-pub mod admission;
 pub mod clip;
 pub mod device;
 pub mod embed;

@@ -7,10 +7,9 @@ use burn::tensor::Tensor;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::clip::{Clip, ClipConfig, ClipModel, Parts};
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
-use guardsplat_engine::embed::{
-    Augmentation, Job, NewKey, Outcome, Preset, Progress, Settings, create_key, embed, natural, optimise,
-};
-use guardsplat_engine::extract::{Engine, read_pictures, read_scene};
+use guardsplat_engine::embed::{Augmentation, Job, Outcome, Preset, Progress, Settings, embed, optimise};
+use guardsplat_engine::extract::{Engine, rasterizer, read_pictures, read_scene};
+use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
 use guardsplat_engine::message::{ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions};
 use guardsplat_engine::sample::sample;
 use guardsplat_engine::scene::{BadRows, Gaussians, Scene};
@@ -37,7 +36,7 @@ fn new_key(compute: &Compute, seed: u64) -> Result<Key> {
     new_key_until(compute, seed, &Stop::default(), |_| {})
 }
 
-fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut(NewKey)) -> Result<Key> {
+fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut(KeyProgress)) -> Result<Key> {
     let options = KeyOptions {
         bits: BITS,
         bits_per_token: None,
@@ -57,7 +56,7 @@ fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut
         name: "tiny".into(),
         hash: "00".repeat(32),
     };
-    let pictures = natural::pictures(compute, 32)?.step_by(5);
+    let pictures = natural_images::pictures(rasterizer(compute)?, 32)?.step_by(5);
     create_key(
         &options,
         fit,

@@ -55,7 +55,7 @@ pub(crate) trait Container: Debug + Send + Sync {
     }
 
     /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what the file keeps of them.
-    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         let _ = (row, coefficients);
     }
 

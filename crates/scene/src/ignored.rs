@@ -108,19 +108,19 @@ impl fmt::Display for Ignored {
 
 /// Sorts out rows while a file is read.
 #[derive(Debug, Default)]
-pub(crate) struct Sieve {
+pub(crate) struct RowFilter {
     bad_rows: BadRows,
     ignored: Ignored,
     /// The first of them.
     least: Option<usize>,
 }
 
-impl Sieve {
+impl RowFilter {
     /// That does with bad rows as it is told.
-    pub fn new(bad_rows: BadRows) -> Sieve {
-        Sieve {
+    pub fn new(bad_rows: BadRows) -> RowFilter {
+        RowFilter {
             bad_rows,
-            ..Sieve::default()
+            ..RowFilter::default()
         }
     }
 
@@ -174,7 +174,7 @@ pub(crate) mod tests {
     }
 
     fn of(rows: impl IntoIterator<Item = usize>) -> Ignored {
-        let mut sieve = Sieve::new(BadRows::Ignore);
+        let mut sieve = RowFilter::new(BadRows::Ignore);
         for row in rows {
             sieve.reject(row, || format!("row {row}")).unwrap();
         }
@@ -188,7 +188,7 @@ pub(crate) mod tests {
         assert_eq!(ignored.to_string(), "3 rows ignored, the first since row 3");
         assert_eq!(of([5]).to_string(), "1 row ignored: row 5");
         assert_eq!(of([]).if_any(), None);
-        let mut sieve = Sieve::new(BadRows::default());
+        let mut sieve = RowFilter::new(BadRows::default());
         assert_eq!(sieve.reject(4, || "why".into()), Err("why".into()));
         assert_eq!(sieve.finish(), Ignored::default());
     }

@@ -4,8 +4,9 @@
 //! Only the bands of spherical harmonics that hold something are in memory, whatever the file has room for.
 //!
 //! [`convert`] writes any Gaussians in any format, [`alter`] makes the changes that people make to scenes, and
-//! [`quantise`] says what formats keep of colours: what a hidden mark has to stand.
+//! [`quantize`] says what formats keep of colours: what a hidden mark has to stand.
 pub mod alter;
+mod atomic_write;
 mod container;
 pub mod convert;
 mod error;
@@ -14,9 +15,9 @@ mod ignored;
 mod names;
 mod packed;
 mod ply;
-pub mod quantise;
+pub mod quantize;
 mod range;
-mod rest;
+mod remaining;
 mod scene;
 mod sniff;
 mod sog;
@@ -25,8 +26,8 @@ mod spz;
 mod summary;
 #[doc(hidden)]
 pub mod testing;
-mod whole;
 
+pub use atomic_write::write_whole;
 pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
@@ -34,4 +35,3 @@ pub use ignored::{BadRows, Ignored};
 pub use scene::Scene;
 pub use sniff::{HEAD, is_loose_sog, sniff};
 pub use summary::{Summary, summary};
-pub use whole::write_whole;

@@ -1,9 +1,9 @@
 //! A scene and the file it came from, whatever its format.
+use crate::atomic_write::write_whole;
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::sniff::announced;
-use crate::whole::write_whole;
 use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -180,9 +180,9 @@ impl Scene {
     }
 
     /// Replaces the coefficients of Gaussian `row`, laid out as a row of [`Sh`], by what a written file keeps of them.
-    pub fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    pub fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         if let Some(source) = &self.source {
-            source.keep(row, coefficients);
+            source.quantize_colors(row, coefficients);
         }
     }
 }

@@ -5,8 +5,10 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{Job, Learn, Outcome, Preset, Progress, Ring, Settings, Verification, embed};
-use guardsplat_engine::memory::Memory;
+use guardsplat_engine::embed::{
+    Job, Outcome, Preset, Progress, Ring, Settings, TrainableCoefficients, Verification, embed,
+};
+use guardsplat_engine::memory::MemoryRequirements;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::{Quality, write_picture};
 use guardsplat_engine::scene::{BadRows, Ignored};
@@ -15,8 +17,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Budget, Exit, print_json, print_line};
-use crate::work::settings::chosen;
-use crate::work::{load, sheet};
+use crate::operations::embed_settings::chosen;
+use crate::operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -49,7 +51,7 @@ pub struct Arguments {
     robust_to: Option<RobustTo>,
     /// Which coefficients of colours are learned: sh or all, constant (dc), or all others (rest). Geometry never changes
     #[arg(long, value_name = "WHAT", default_value = "all")]
-    learn: Learn,
+    learn: TrainableCoefficients,
     /// Trains on views on a circle at this elevation in degrees, as the paper's public code does, instead of over the sphere
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     ring: Option<f32>,
@@ -99,7 +101,7 @@ struct Report<'a> {
     ignored_rows: usize,
     covering_views: usize,
     predicted_memory_bytes: u64,
-    predicted_memory: Memory,
+    predicted_memory: MemoryRequirements,
     peak_memory_bytes: Option<u64>,
     written: bool,
     target_missed: &'a [String],
@@ -197,7 +199,10 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
 
 fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    write_picture(&folder.join(sheet::NAME), &sheet::of(&verification.pairs)?)
+    write_picture(
+        &folder.join(comparison_sheet::NAME),
+        &comparison_sheet::of(&verification.pairs)?,
+    )
 }
 
 fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {

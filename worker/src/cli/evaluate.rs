@@ -6,8 +6,9 @@ use crate::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out,
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
-use guardsplat_engine::embed::{self, HIDDEN, HiddenKeyOptions, Preset, Settings, create_hidden_key};
+use guardsplat_engine::embed::{self, Preset, Settings};
 use guardsplat_engine::extract::Engine;
+use guardsplat_engine::message::key::{HIDDEN, HiddenKeyOptions, create_hidden_key};
 use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_engine::stop::Stop;
 use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
@@ -19,7 +20,7 @@ use guardsplat_evaluation::report::store::Store;
 use super::display::Display;
 use super::{Budget, Exit, Extractor, print_line};
 use crate::error::{Error, Result};
-use crate::work::{keys, load};
+use crate::operations::{create_key, load};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -257,7 +258,14 @@ fn engine(
                         robust_to: RobustTo::none(),
                         training: TrainingOptions::default(),
                     };
-                    keys::create(&options, keys::Kept::default(), clip, &compute, &stop, |_| {})?
+                    create_key::create(
+                        &options,
+                        create_key::ProjectionOverrides::default(),
+                        clip,
+                        &compute,
+                        &stop,
+                        |_| {},
+                    )?
                 }
                 Extractor::Hidden => create_hidden_key(&hidden, &compute, &stop, |_, _| {})?,
             };

@@ -3,11 +3,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use guardsplat_engine::Result;
-use guardsplat_engine::admission::{self, picture_bytes};
 use guardsplat_engine::clip::{Clip, Parts};
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs, needs_to_render};
-use guardsplat_engine::memory::{Bytes, Limits, Memory};
+use guardsplat_engine::embed::{Preset, measure_view_on_cpu, predict_memory};
+use guardsplat_engine::memory::{
+    Bytes, Limits, MemoryRequirements, ModelBytes, SceneSize, admission, picture_bytes, rendering_requirements,
+};
 use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
 use guardsplat_engine::splat::{WeightCache, prepare};
 use guardsplat_engine::view::{Extent, Split, ViewSampler};
@@ -72,12 +73,12 @@ struct Where {
 #[derive(Serialize)]
 struct Need {
     bytes: u64,
-    parts: Memory,
+    parts: MemoryRequirements,
     fits: bool,
 }
 
 impl Need {
-    fn new(parts: Memory, limits: &Limits) -> Self {
+    fn new(parts: MemoryRequirements, limits: &Limits) -> Self {
         Self {
             bytes: parts.total(),
             fits: limits.admit(&parts).is_ok(),
@@ -93,27 +94,27 @@ impl Need {
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let limits = Limits::of_machine(arguments.budget.bytes());
-    let rest = Memory::of_program();
-    admission::to_read(&arguments.scene, &limits, rest)?;
+    let rest = MemoryRequirements::of_program();
+    admission::admit_reading(&arguments.scene, &limits, rest)?;
     let head = admission::summary_of(&arguments.scene);
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
     let scene = Scene::read_with(&arguments.scene, bad_rows)?;
     let gaussians = &scene.gaussians;
     let size = SceneSize::of(&scene);
-    let render = needs_to_render(size, picture_bytes(PICTURE, PICTURE));
+    let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));
     let (mut extent, mut embed, mut seen) = (None, None, None);
     // Of nothing there is nothing to be seen.
     if !gaussians.is_empty() {
         extent = Some(Extent::of(gaussians)?);
         let settings = Preset::Standard.settings();
-        let view = ViewSize::on_cpu(gaussians, &settings)?;
+        let view = measure_view_on_cpu(gaussians, &settings)?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
         let clip = 4 * clip.parameters() as u64;
         let models = ModelBytes {
             learning: clip,
             verifying: clip,
         };
-        embed = Some(needs(size, view, &settings, models));
+        embed = Some(predict_memory(size, view, &settings, models));
         seen = arguments.views.map(|views| count_seen(gaussians, views)).transpose()?;
     }
     let report = Report {

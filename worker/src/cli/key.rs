@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
-use guardsplat_engine::embed::{HiddenKeyOptions, NewKey, create_hidden_key};
+use guardsplat_engine::message::key::{HiddenKeyOptions, KeyProgress, create_hidden_key};
 use guardsplat_engine::message::training::Progress;
 use guardsplat_engine::message::{DecoderKind, Key, KeyOptions, TrainingOptions};
 use guardsplat_engine::stop::Stop;
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Exit, Extractor, print_json, print_line};
-use crate::work::keys;
+use crate::operations::create_key;
 
 #[derive(Subcommand)]
 pub enum Command {
@@ -107,7 +107,7 @@ fn for_clip(arguments: &Create, compute: &Compute) -> Result<Key> {
             reason: "they are of the convolutional decoder, --extractor hidden".into(),
         });
     }
-    let kept = keys::Kept {
+    let kept = create_key::ProjectionOverrides {
         remove: arguments.remove,
         keep: arguments.keep,
         decoder: arguments.decoder,
@@ -134,16 +134,16 @@ fn for_clip(arguments: &Create, compute: &Compute) -> Result<Key> {
         display.set(done, total, String::new);
     };
     let clip = arguments.clip.as_deref();
-    keys::create(
+    create_key::create(
         &options,
         kept,
         clip,
         compute,
         &Stop::default(),
         |progress| match progress {
-            NewKey::Pictures(done, total) => show(0, "pictures", done, total),
-            NewKey::Decoder(Progress::Encoding(done, total)) => show(1, "messages", done, total),
-            NewKey::Decoder(Progress::Training(done, total)) => show(2, "decoder", done, total),
+            KeyProgress::Pictures(done, total) => show(0, "pictures", done, total),
+            KeyProgress::Decoder(Progress::Encoding(done, total)) => show(1, "messages", done, total),
+            KeyProgress::Decoder(Progress::Training(done, total)) => show(2, "decoder", done, total),
         },
     )
 }

@@ -2,11 +2,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use guardsplat_engine::admission::{self, picture_bytes};
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{SceneSize, needs_to_render};
 use guardsplat_engine::extract::rasterizer;
-use guardsplat_engine::memory::{Limits, Memory};
+use guardsplat_engine::memory::{
+    Limits, MemoryRequirements, SceneSize, admission, picture_bytes, rendering_requirements,
+};
 use guardsplat_engine::quality::write_picture;
 use guardsplat_engine::scene::{BadRows, Scene};
 use guardsplat_engine::splat::{WeightCache, prepare, sh};
@@ -73,16 +73,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         Some(cameras) => cameras.iter().map(|c| picture_bytes(c.width, c.height)).max(),
         None => Some(picture_bytes(size, size)),
     };
-    let rest = Memory {
+    let rest = MemoryRequirements {
         pictures: pictures.unwrap_or(0),
-        ..Memory::of_program()
+        ..MemoryRequirements::of_program()
     };
     let limits = Limits::of_machine(arguments.budget.bytes());
-    admission::to_read(&arguments.input, &limits, rest)?;
+    admission::admit_reading(&arguments.input, &limits, rest)?;
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
     let scene = Scene::read_with(&arguments.input, bad_rows)?;
     let ignored = scene.ignored().cloned();
-    limits.admit(&needs_to_render(SceneSize::of(&scene), rest.pictures))?;
+    limits.admit(&rendering_requirements(SceneSize::of(&scene), rest.pictures))?;
     let scene = scene.into_gaussians();
     let cameras = match given {
         Some(cameras) => cameras,

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, print_json, print_line};
-use crate::work::findings::{Findings, Views, read_and_compare};
-use crate::work::load;
+use crate::operations::load;
+use crate::operations::verification::{VerificationReport, Views, read_and_compare};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -61,7 +61,7 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
-    findings: Findings,
+    findings: VerificationReport,
     seconds: f64,
     device: &'a str,
     clip: &'a str,
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })?;
     drop(display);
     let report = Report {
-        findings: Findings::of(&compared)?,
+        findings: VerificationReport::of(&compared)?,
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,
         clip: &key.clip.name,
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-fn tell(report: &Findings, comparison: Option<&Comparison>, ignored: &[Ignored]) {
+fn tell(report: &VerificationReport, comparison: Option<&Comparison>, ignored: &[Ignored]) {
     let verdict = match report.verdict {
         Verdict::Match => "match",
         Verdict::NoMatch => "no match",

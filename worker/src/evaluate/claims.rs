@@ -46,7 +46,7 @@ pub(super) struct Case {
 }
 
 /// The mark that is looked for.
-pub(super) struct Claiming<'a> {
+pub(super) struct ClaimTrials<'a> {
     pub engine: &'a Engine,
     pub message: &'a Message,
     pub mark: &'a Id,
@@ -55,7 +55,7 @@ pub(super) struct Claiming<'a> {
     pub seed: u64,
 }
 
-impl Claiming<'_> {
+impl ClaimTrials<'_> {
     /// What the store does not have yet, of so many views.
     pub fn left(&self, store: &Store, views: usize) -> Vec<Case> {
         let case = |suspect, searched, pools: &[usize]| Case {
@@ -152,7 +152,7 @@ impl Claiming<'_> {
     }
 }
 
-/// One view, read.
+/// MarkRun view, read.
 enum Suspect {
     AsGiven(Vec<f32>),
     Searched(Framed),

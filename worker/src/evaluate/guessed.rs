@@ -88,7 +88,7 @@ mod tests {
     fn the_right_guess_is_found_and_nothing_done_is_preferred() {
         let found = cross_chosen(&[logits(8), logits(7), logits(0), logits(9)], &message());
         assert_eq!(right(&found), 16);
-        // One bit better is no reason to believe that something was done.
+        // MarkRun bit better is no reason to believe that something was done.
         assert_eq!(cross_chosen(&[logits(1), logits(0)], &message()), logits(1));
     }
 

@@ -18,7 +18,7 @@ const MADE: f64 = 0.99;
 const SHOWN: usize = 3;
 
 /// What a mark is made of.
-pub(super) struct Making<'a> {
+pub(super) struct Marking<'a> {
     pub engine: &'a Engine,
     pub scene: &'a Scene,
     pub message: &'a Message,
@@ -37,7 +37,7 @@ pub(super) fn path(folder: &Path, id: &str, scene: &Scene) -> PathBuf {
         .join(format!("{id}.{}", scene.format().extension()))
 }
 
-impl Making<'_> {
+impl Marking<'_> {
     /// Embeds, writes the marked scene, reads it back, and compares. `key` is the time that making the key took and its
     /// accuracy on texts that it was not trained on.
     pub fn make(

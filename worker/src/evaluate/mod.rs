@@ -9,10 +9,10 @@ mod mark;
 mod plan;
 mod read;
 mod run;
-mod security;
-mod trade;
+mod steganalysis;
 mod trial;
+mod variants;
 
 pub use plan::{Trade, plan};
 pub use run::{Options, Progress, run};
-pub use trade::{Variant, variants};
+pub use variants::{Variant, variants};

@@ -4,10 +4,10 @@ use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::named::Kind;
 use guardsplat_evaluation::report::names;
 
-use super::trade::Variant;
 use super::trial::Trial;
+use super::variants::Variant;
 use crate::error::{Error, Result};
-use guardsplat_engine::embed::{Learn, Ring, Settings};
+use guardsplat_engine::embed::{Ring, Settings, TrainableCoefficients};
 
 /// Bits of most experiments.
 const BITS: usize = 32;
@@ -20,7 +20,7 @@ const LONGER_BITS: usize = 128;
 
 /// Marks of one length and one variant of the settings, and how they are read.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct WantedMark {
     /// The experiment that asked first.
     pub experiment: Kind,
     /// Bits of the message.
@@ -40,8 +40,8 @@ pub struct Wanted {
 /// Everything that some experiments need.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// One of each length and variant.
-    pub wanted: Vec<Wanted>,
+    /// MarkRun of each length and variant.
+    pub wanted: Vec<WantedMark>,
     /// Lengths whose standard marks detectors are to judge.
     pub judged: Vec<usize>,
 }
@@ -76,7 +76,7 @@ impl Plan {
     }
 
     fn add(&mut self, experiment: Kind, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
-        let same = |w: &&mut Wanted| w.bits == bits && w.variant == variant;
+        let same = |w: &&mut WantedMark| w.bits == bits && w.variant == variant;
         let claims = experiment == Kind::Claims;
         if let Some(known) = self.wanted.iter_mut().find(same) {
             known.claims |= claims;
@@ -87,7 +87,7 @@ impl Plan {
             }
             return;
         }
-        self.wanted.push(Wanted {
+        self.wanted.push(WantedMark {
             experiment,
             bits,
             variant: variant.into(),
@@ -149,8 +149,8 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
             }
             Kind::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
-                add(BITS, names::DC, standard.learning(Learn::Dc), &none)?;
-                add(BITS, names::REST, standard.learning(Learn::Rest), &none)?;
+                add(BITS, names::DC, standard.learning(TrainableCoefficients::Dc), &none)?;
+                add(BITS, names::REST, standard.learning(TrainableCoefficients::Rest), &none)?;
             }
             Kind::Losses => {
                 add(BITS, names::STANDARD, *standard, &none)?;
@@ -261,7 +261,7 @@ mod tests {
         assert!(timed.contains(&"trade:cpu:draft") && timed.contains(&"trade:cpu:standard"));
         for (i, one) in plan.wanted.iter().enumerate() {
             one.settings.check().unwrap();
-            let again = |other: &Wanted| (other.bits, &other.variant) == (one.bits, &one.variant);
+            let again = |other: &WantedMark| (other.bits, &other.variant) == (one.bits, &one.variant);
             assert!(!plan.wanted[i + 1..].iter().any(again), "{} {}", one.bits, one.variant);
         }
         let claimed: Vec<usize> = plan.wanted.iter().filter(|w| w.claims).map(|w| w.bits).collect();

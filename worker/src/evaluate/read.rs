@@ -21,13 +21,13 @@ const MESSAGE_VIEWS: [u32; 3] = [1, 5, 10];
 
 /// A camera, and how high it stands over the scene's horizon in degrees.
 #[derive(Clone, Debug)]
-pub(super) struct Placed {
+pub(super) struct HeldOutCamera {
     pub camera: Camera,
     pub elevation: f32,
 }
 
 /// Held-out cameras around a scene.
-pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64) -> Result<Vec<Placed>> {
+pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64) -> Result<Vec<HeldOutCamera>> {
     let sampler = ViewSampler::new(gaussians, seed)?;
     let (up, centre) = (sampler.extent().up, sampler.extent().centre);
     let place = |index: usize| {
@@ -40,7 +40,7 @@ pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64)
         let from: [f32; 3] = std::array::from_fn(|k| eye[k] - centre[k]);
         let length = from.iter().map(|v| v * v).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
         let height: f32 = from.iter().zip(up).map(|(f, u)| f * u).sum::<f32>() / length;
-        Placed {
+        HeldOutCamera {
             camera,
             elevation: height.clamp(-1.0, 1.0).asin().to_degrees(),
         }
@@ -50,14 +50,14 @@ pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64)
 
 /// Pictures of a scene from some cameras, over white.
 pub(super) struct Views {
-    pub cameras: Vec<Placed>,
+    pub cameras: Vec<HeldOutCamera>,
     pub images: Vec<RgbImage>,
     /// Whether somebody else made pictures of them, so that their tones may have been changed.
-    pub strange: bool,
+    pub processed: bool,
 }
 
 impl Views {
-    pub fn render(engine: &Engine, gaussians: &Gaussians, cameras: &[Placed]) -> Result<Self> {
+    pub fn render(engine: &Engine, gaussians: &Gaussians, cameras: &[HeldOutCamera]) -> Result<Self> {
         let images = cameras
             .iter()
             .map(|placed| to_image(&engine.picture(gaussians, &placed.camera, [1.0; 3])?))
@@ -65,7 +65,7 @@ impl Views {
         Ok(Self {
             cameras: cameras.to_vec(),
             images,
-            strange: false,
+            processed: false,
         })
     }
 
@@ -76,10 +76,10 @@ impl Views {
     /// Logits of all views; of pictures that somebody else made, under what is guessed to have been done to them.
     pub fn read(&self, engine: &Engine, message: &Message) -> Result<Reading> {
         let mut logits = Vec::with_capacity(self.images.len());
-        // One at a time: large pictures of all views need not be there as floats.
+        // MarkRun at a time: large pictures of all views need not be there as floats.
         for image in &self.images {
             let picture = to_picture(image);
-            match self.strange {
+            match self.processed {
                 true => logits.push(cross_chosen(&read_guesses(engine, &picture)?, message)),
                 false => logits.extend(engine.read_logits(&[picture])?),
             }
@@ -96,7 +96,7 @@ impl Views {
         Ok(Self {
             cameras: self.cameras.clone(),
             images,
-            strange: attack.to_string() != names::NONE,
+            processed: attack.to_string() != names::NONE,
         })
     }
 
@@ -111,7 +111,7 @@ impl Views {
         Ok(Self {
             cameras: self.cameras.clone(),
             images: self.images.iter().map(one).collect::<Result<_>>()?,
-            strange: true,
+            processed: true,
         })
     }
 

@@ -10,12 +10,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha20Rng;
 use sha2::{Digest, Sha256};
 
-use super::claims::Claiming;
+use super::claims::ClaimTrials;
 use super::machine::Machine;
-use super::mark::{Making, path};
-use super::plan::{Plan, Wanted};
+use super::mark::{Marking, path};
+use super::plan::{Plan, WantedMark};
 use super::read::{Views, cameras};
-use super::security::{Judged, Marked};
+use super::steganalysis::{Marked, SteganalysisRun};
 use super::trial::Trial;
 use crate::error::{Error, Result};
 use guardsplat_engine::embed;
@@ -92,7 +92,7 @@ pub fn run(
                     total,
                     format!("{name}, {} bits, {}, seed {seed}", wanted.bits, wanted.variant),
                 ));
-                let one = One {
+                let one = MarkRun {
                     wanted,
                     options,
                     seed,
@@ -126,7 +126,7 @@ pub fn run(
     for (bits, marks) in judged {
         let Some(first) = marks.first() else { continue };
         let seed = first.seed;
-        let judged = Judged { marks: &marks, options };
+        let judged = SteganalysisRun { marks: &marks, options };
         let engine = || engine(bits, seed).map(|(engine, ..)| engine);
         judged.carry_out(store, engine, |detector, area| {
             progress(Progress::Detected(bits, detector, area));
@@ -147,9 +147,9 @@ fn message(bits: usize, seed: u64) -> Result<Message> {
     Ok(Message::random(bits, &mut rng)?)
 }
 
-/// One mark and its readings.
-struct One<'a> {
-    wanted: &'a Wanted,
+/// MarkRun mark and its readings.
+struct MarkRun<'a> {
+    wanted: &'a WantedMark,
     options: &'a Options,
     seed: u64,
     engine: &'a Engine,
@@ -158,7 +158,7 @@ struct One<'a> {
     machine: &'a Machine,
 }
 
-impl One<'_> {
+impl MarkRun<'_> {
     fn embedding(&self, name: &str, message: &Message) -> Result<Embedding> {
         let settings =
             serde_json::to_vec(&self.wanted.settings).map_err(|e| Error::bad_option("settings", e.to_string()))?;
@@ -194,7 +194,7 @@ impl One<'_> {
             let possible = |trial: &&Trial| **trial != Trial::Vae || self.options.vae.is_some();
             self.wanted.trials.iter().filter(possible).filter(is_left).collect()
         };
-        let claiming = Claiming {
+        let claiming = ClaimTrials {
             engine: self.engine,
             message: &message,
             mark: &id,
@@ -218,7 +218,7 @@ impl One<'_> {
                 seed: self.seed,
                 ..self.wanted.settings
             };
-            let making = Making {
+            let making = Marking {
                 engine: self.engine,
                 scene: &scene,
                 message: &message,

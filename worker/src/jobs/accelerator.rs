@@ -6,14 +6,14 @@ use std::sync::mpsc;
 use guardsplat_engine::device::DeviceChoice;
 use tokio::sync::oneshot;
 
-use super::bench::Bench;
+use super::engine_cache::EngineCache;
 use super::error::{Error, Result};
 
 /// As much as the main thread has, which the commands run on.
 const STACK: usize = 8 << 20;
 
 /// Says whether the thread can go on.
-type Work = Box<dyn FnOnce(&mut Bench) -> bool + Send>;
+type Work = Box<dyn FnOnce(&mut EngineCache) -> bool + Send>;
 
 /// The way into the thread's queue.
 pub struct Accelerator {
@@ -30,19 +30,19 @@ impl Accelerator {
         let (queue, waiting) = mpsc::channel::<Work>();
         let (opened, is_open) = oneshot::channel();
         let run = move || {
-            let mut bench = match Bench::open(device, budget) {
-                Ok(bench) => bench,
+            let mut cache = match EngineCache::open(device, budget) {
+                Ok(cache) => cache,
                 Err(error) => {
                     let _ = opened.send(Err(error));
                     return;
                 }
             };
-            let _ = opened.send(Ok(bench.device().to_owned()));
+            let _ = opened.send(Ok(cache.device().to_owned()));
             // Ends when the worker does.
             while let Ok(work) = waiting.recv() {
-                if !work(&mut bench) {
+                if !work(&mut cache) {
                     // Whatever state the device is in, it is not to be touched any more; the process ends anyway.
-                    std::mem::forget(bench);
+                    std::mem::forget(cache);
                     return;
                 }
             }
@@ -60,11 +60,11 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Panicked`] when this work panics, or something did before. The thread does nothing any more then.
-    pub async fn run<T: Send + 'static>(&self, work: impl FnOnce(&mut Bench) -> T + Send + 'static) -> Result<T> {
+    pub async fn run<T: Send + 'static>(&self, work: impl FnOnce(&mut EngineCache) -> T + Send + 'static) -> Result<T> {
         let (reply, answer) = oneshot::channel();
-        let work = Box::new(move |bench: &mut Bench| {
-            // The bench is not used again after a panic.
-            let done = catch_unwind(AssertUnwindSafe(|| work(bench))).map_err(|panic| words(&*panic));
+        let work = Box::new(move |cache: &mut EngineCache| {
+            // The cache is not used again after a panic.
+            let done = catch_unwind(AssertUnwindSafe(|| work(cache))).map_err(|panic| words(&*panic));
             let fine = done.is_ok();
             // Nobody waits any more when the job was given up meanwhile.
             let _ = reply.send(done);

@@ -8,13 +8,13 @@ use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::{FramedReading, Job, SeenView, complete_job_request};
 
 use super::accelerator::Accelerator;
-use super::bench::Bench;
 use super::convert;
+use super::engine_cache::EngineCache;
 use super::error::{Error, Result};
 use super::lease::{Lease, Reporter};
 use super::server::Server;
 use super::transfer::{self, Content};
-use super::{embedding, new_key, verifying};
+use super::{create_key_job, embed_job, verify_job};
 
 /// What came out of an attempt.
 pub struct Outcome {
@@ -71,9 +71,9 @@ impl Attempt<'_> {
 
     async fn compute_and_store(&mut self, job: &Job) -> Result<Outcome> {
         match &job.spec {
-            Some(Spec::Embed(spec)) => embedding::carry_out(self, spec).await,
-            Some(Spec::Verify(spec)) => verifying::carry_out(self, spec).await,
-            Some(Spec::CreateKey(spec)) => new_key::carry_out(self, spec).await,
+            Some(Spec::Embed(spec)) => embed_job::carry_out(self, spec).await,
+            Some(Spec::Verify(spec)) => verify_job::carry_out(self, spec).await,
+            Some(Spec::CreateKey(spec)) => create_key_job::carry_out(self, spec).await,
             None => Err(Error::Damaged {
                 what: job.name.clone(),
                 reason: "a kind of job that this worker does not know".into(),
@@ -107,11 +107,11 @@ impl Attempt<'_> {
     /// Does `work` with the engine.
     pub async fn compute<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&mut Bench, &Stop, &Reporter) -> Result<T> + Send + 'static,
+        work: impl FnOnce(&mut EngineCache, &Stop, &Reporter) -> Result<T> + Send + 'static,
     ) -> Result<T> {
         self.reporter.tell(convert::stage(Stage::Preparing, 0, 0));
         let (stop, reporter) = (self.stop.clone(), self.reporter.clone());
-        self.accelerator.run(move |bench| work(bench, &stop, &reporter)).await?
+        self.accelerator.run(move |cache| work(cache, &stop, &reporter)).await?
     }
 
     /// Stores an output under a name for people, and gives its artifact's.

@@ -3,8 +3,9 @@ use std::time::Duration;
 
 use guardsplat_distortion::{Kind, RobustTo};
 use guardsplat_engine::Error as EngineError;
-use guardsplat_engine::embed::{self, NewKey, Outcome, Preset, Settings};
+use guardsplat_engine::embed::{self, Outcome, Preset, Settings};
 use guardsplat_engine::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
+use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::message::{Key, Verdict};
 use guardsplat_engine::scene::{BadRows, Ignored};
@@ -15,8 +16,8 @@ use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{self as api};
 
 use super::error::{Error, Result};
-use crate::work::findings::{Findings, Views};
-use crate::work::settings::chosen;
+use crate::operations::embed_settings::chosen;
+use crate::operations::verification::{VerificationReport, Views};
 
 /// What is behind scenes, and behind pictures with transparent pixels.
 const WHITE: [f32; 3] = [1.0; 3];
@@ -111,12 +112,12 @@ pub fn embedding_progress(progress: &embed::Progress) -> Option<api::Progress> {
 }
 
 /// How far a key has come.
-pub fn key_progress(progress: NewKey) -> api::Progress {
+pub fn key_progress(progress: KeyProgress) -> api::Progress {
     match progress {
-        NewKey::Pictures(done, total) | NewKey::Decoder(Training::Encoding(done, total)) => {
+        KeyProgress::Pictures(done, total) | KeyProgress::Decoder(Training::Encoding(done, total)) => {
             stage(Stage::Preparing, done, total)
         }
-        NewKey::Decoder(Training::Training(done, total)) => stage(Stage::Optimising, done, total),
+        KeyProgress::Decoder(Training::Training(done, total)) => stage(Stage::Optimising, done, total),
     }
 }
 
@@ -142,7 +143,7 @@ pub fn embed_result(outcome: &Outcome) -> api::EmbedResult {
 }
 
 /// The figures of a verification.
-pub fn verify_result(found: Findings) -> api::VerifyResult {
+pub fn verify_result(found: VerificationReport) -> api::VerifyResult {
     let verdict = match found.verdict {
         Verdict::Match => ApiVerdict::Match,
         Verdict::NoMatch => ApiVerdict::NoMatch,

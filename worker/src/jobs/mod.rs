@@ -5,19 +5,19 @@
 mod accelerator;
 mod attempt;
 mod backoff;
-mod bench;
+mod capabilities;
 mod convert;
+mod create_key_job;
 mod direct;
-mod embedding;
+mod embed_job;
+mod engine_cache;
 mod error;
-mod folder;
 mod lease;
-mod new_key;
-mod offer;
 mod server;
-mod signals;
+mod shutdown;
 mod transfer;
-mod verifying;
+mod verify_job;
+mod work_directory;
 mod worker;
 
 use std::path::PathBuf;
@@ -26,10 +26,10 @@ use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::Target;
 
 use accelerator::Accelerator;
+use capabilities::WorkerCapabilities;
 pub use error::{Error, Result};
-use folder::Folder;
-use offer::Offer;
 use server::Server;
+use work_directory::WorkDirectory;
 use worker::Worker;
 
 /// Most characters of a machine's name in a worker's.
@@ -67,9 +67,9 @@ pub fn run(options: &Options) -> Result<()> {
 
 async fn work(options: &Options) -> Result<()> {
     let server = Server::new(&options.server)?;
-    let leaving = signals::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
+    let leaving = shutdown::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
     let parent = options.work_dir.clone().unwrap_or_else(std::env::temp_dir);
-    let folder = Folder::new(&parent)?;
+    let folder = WorkDirectory::new(&parent)?;
     let (accelerator, device) = Accelerator::start(options.device, options.memory).await?;
     let name = options.name.clone().unwrap_or_else(default_name);
     tracing::info!(worker = name, device, server = options.server.url, "ready for jobs");
@@ -78,7 +78,7 @@ async fn work(options: &Options) -> Result<()> {
         leaving,
         folder,
         accelerator,
-        offer: Offer::new(name, &device, options.memory),
+        capabilities: WorkerCapabilities::new(name, &device, options.memory),
     };
     worker.serve().await
 }

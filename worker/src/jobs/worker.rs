@@ -7,13 +7,13 @@ use tonic::Code;
 
 use super::accelerator::Accelerator;
 use super::attempt::Attempt;
+use super::capabilities::WorkerCapabilities;
 use super::convert;
 use super::error::{Error, Result};
-use super::folder::Folder;
 use super::lease::{Ended, Lease, Reporter};
-use super::offer::Offer;
 use super::server::{Server, persist, within};
-use super::signals::Leaving;
+use super::shutdown::ShutdownSignal;
+use super::work_directory::WorkDirectory;
 
 /// How long to wait for a job before asking again.
 const WAIT: Duration = Duration::from_secs(30);
@@ -35,13 +35,13 @@ pub struct Worker {
     /// Who has the jobs.
     pub server: Server,
     /// Whether it is to leave.
-    pub leaving: Leaving,
+    pub leaving: ShutdownSignal,
     /// For the files of jobs.
-    pub folder: Folder,
+    pub folder: WorkDirectory,
     /// Where to compute.
     pub accelerator: Accelerator,
     /// What it calls itself, and what it can do.
-    pub offer: Offer,
+    pub capabilities: WorkerCapabilities,
 }
 
 impl Worker {
@@ -66,7 +66,7 @@ impl Worker {
     /// Waits for a job. Comes back without one now and then.
     async fn lease(&self) -> Result<Option<(Lease, Job)>> {
         let start = Instant::now();
-        let request = self.offer.request(WAIT);
+        let request = self.capabilities.request(WAIT);
         let call = "ask for a job";
         let answer = persist(call, async || {
             let mut server = self.server.worker();

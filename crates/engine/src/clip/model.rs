@@ -1,8 +1,8 @@
 //! Both towers as one trainable burn module.
 use super::config::{ClipConfig, VisionTower};
 use super::params::param;
+use super::random_fourier::RandomFourierEncoder;
 use super::resnet::ResNet;
-use super::statistics::StatisticsTower;
 use super::text::TextTransformer;
 use super::vit::VisionTransformer;
 use burn::module::{Module, Param};
@@ -39,7 +39,7 @@ pub enum ImageTower {
     /// Modified ResNet.
     ResNet(ResNet),
     /// Local statistics.
-    Statistics(StatisticsTower),
+    RandomFourier(RandomFourierEncoder),
 }
 
 impl ClipModel {
@@ -69,7 +69,7 @@ impl ImageTower {
                 scales,
                 kernel,
                 surround,
-            } => Self::Statistics(StatisticsTower::new(
+            } => Self::RandomFourier(RandomFourierEncoder::new(
                 vision, scales, *kernel, *surround, embed_dim, device,
             )),
         }
@@ -81,7 +81,7 @@ impl ImageTower {
         match self {
             Self::Transformer(tower) => tower.forward(pictures),
             Self::ResNet(tower) => tower.forward(pictures),
-            Self::Statistics(tower) => tower.forward(&pictures),
+            Self::RandomFourier(tower) => tower.forward(&pictures),
         }
     }
 }

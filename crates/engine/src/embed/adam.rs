@@ -45,6 +45,17 @@ impl Default for AdamOptions {
 }
 
 impl AdamOptions {
+    /// The rates that fit the presets' losses.
+    pub fn tuned() -> Self {
+        Self {
+            rate_dc: 0.014,
+            rate_rest: 0.0012,
+            final_rate: 0.1,
+            sparse: true,
+            ..Self::default()
+        }
+    }
+
     pub(super) fn check(&self) -> Result<()> {
         within("adam.rate_dc", f64::from(self.rate_dc), 0.0, 10.0)?;
         within("adam.rate_rest", f64::from(self.rate_rest), 0.0, 10.0)?;

@@ -5,10 +5,10 @@
 use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 
-use super::balance::Factors;
-use super::progress::Terms;
+use super::image_augmentation::ImageAugmentation;
+use super::loss_weight_controller::LossWeightFactors;
+use super::progress::LossTerms;
 use super::settings::Settings;
-use super::shown::Shown;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
@@ -19,7 +19,7 @@ use crate::quality::{Ssim, batch, unbatch};
 pub(super) struct Loss<'a> {
     engine: &'a Engine,
     settings: Settings,
-    shown: Shown,
+    image_augmentation: ImageAugmentation,
     targets: Vec<f32>,
     ssim: Ssim,
 }
@@ -27,7 +27,7 @@ pub(super) struct Loss<'a> {
 /// The loss of a batch of views.
 pub(super) struct Evaluated {
     /// Its terms; the offset penalty is added elsewhere.
-    pub terms: Terms,
+    pub terms: LossTerms,
     /// Gradient to each picture, laid out as its pixels.
     pub gradients: Vec<Picture>,
     /// Share of right bits in the augmented views.
@@ -40,7 +40,7 @@ impl<'a> Loss<'a> {
         Self {
             engine,
             settings: *settings,
-            shown: Shown::new(settings, engine),
+            image_augmentation: ImageAugmentation::new(settings, engine),
             targets: message.targets().collect(),
             ssim: Ssim::new(side, side, &engine.compute.device),
         }
@@ -55,7 +55,7 @@ impl<'a> Loss<'a> {
         step: usize,
         pictures: &[&Picture],
         references: &[&Picture],
-        factors: Factors,
+        factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
     ) -> Result<Evaluated> {
         let device = &self.engine.compute.device;
@@ -83,7 +83,7 @@ impl<'a> Loss<'a> {
             None => None,
         };
         let seen = self.settings.augmentation.apply(marked, rng);
-        let logits = self.shown.logits(self.engine, seen, rng)?;
+        let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, device);
@@ -96,7 +96,7 @@ impl<'a> Loss<'a> {
         let mut parts = vec![l1, ssim, message];
         parts.extend(lpips);
         let values = self.engine.to_host(Tensor::cat(parts, 0).inner())?;
-        let terms = Terms {
+        let terms = LossTerms {
             l1: values[0],
             ssim: values[1],
             message: values[2],
@@ -138,7 +138,7 @@ impl<'a> Loss<'a> {
     }
 }
 
-fn check_finite(step: usize, terms: &Terms) -> Result<()> {
+fn check_finite(step: usize, terms: &LossTerms) -> Result<()> {
     finite(step, "L1", terms.l1)?;
     finite(step, "SSIM", terms.ssim)?;
     finite(step, "LPIPS", terms.lpips.unwrap_or(0.0))?;

@@ -5,15 +5,16 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::adam::{Adam, Penalty};
-use super::balance::Balancer;
-use super::check::HeldOut;
-use super::descent::Descent;
-use super::learned::Learned;
+use super::early_stopping::EarlyStopping;
+use super::learned_offsets::LearnedOffsets;
 use super::loss::{Loss, finite};
-use super::pool::{Coverage, Pool, PooledView};
+use super::loss_weight_controller::LossWeightController;
+use super::optimizer::Optimizer;
+use super::preconditioned_sgd::PreconditionedSgd;
 use super::progress::{Progress, Step};
 use super::settings::Settings;
-use super::timing::{Stage, Timing};
+use super::step_timer::{Stage, StepTimer};
+use super::view_pool::{Coverage, PooledView, ViewPool};
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::Message;
@@ -29,7 +30,7 @@ const TIMED_STEPS: usize = 20;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimised {
     /// The learned changes.
-    pub learned: Learned,
+    pub learned: LearnedOffsets,
     /// Views that it took to find the Gaussians that can be seen.
     pub covering_views: usize,
     /// Steps taken.
@@ -65,7 +66,7 @@ pub fn optimise(
     }
     let mut held_out = settings
         .early_stop
-        .map(|stop| HeldOut::new(engine, gaussians, &sampler, settings, stop))
+        .map(|stop| EarlyStopping::new(engine, gaussians, &sampler, settings, stop))
         .transpose()?;
     let (mut run, coverage) = Run::new(engine, scene, message, settings, sampler)?;
     progress(Progress::Covered {
@@ -73,7 +74,7 @@ pub fn optimise(
         seen: coverage.count(),
         gaussians: gaussians.len(),
     });
-    let mut timing = Timing::new();
+    let mut timing = StepTimer::new();
     let mut steps = 0;
     while steps < settings.steps {
         engine.stop.check()?;
@@ -102,9 +103,9 @@ pub fn optimise(
 }
 
 /// What moves the offsets.
-enum Optimiser {
+enum OptimizerState {
     Adam(Adam),
-    Descent(Descent),
+    PreconditionedSgd(PreconditionedSgd),
 }
 
 /// The state of a run.
@@ -113,11 +114,11 @@ struct Run<'a> {
     scene: &'a Scene,
     settings: &'a Settings,
     loss: Loss<'a>,
-    pool: Pool,
-    optimiser: Optimiser,
-    balancer: Balancer,
+    pool: ViewPool,
+    optimiser: OptimizerState,
+    controller: LossWeightController,
     augmentation: ChaCha8Rng,
-    learned: Learned,
+    learned: LearnedOffsets,
     gradient: Vec<f32>,
 }
 
@@ -129,22 +130,22 @@ impl<'a> Run<'a> {
         settings: &'a Settings,
         sampler: ViewSampler,
     ) -> Result<(Self, Coverage)> {
-        let mut pool = Pool::new(sampler, settings);
+        let mut pool = ViewPool::new(sampler, settings);
         let coverage = pool.cover(engine, &scene.gaussians)?;
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
         let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
         augmentation.set_stream(u64::MAX - 1);
         let (rows, columns) = (learnable.rows().len(), learnable.columns());
-        let optimiser = match settings.descent {
-            Some(options) => {
+        let optimiser = match settings.optimizer {
+            Optimizer::PreconditionedSgd(options) => {
                 let energies: Vec<f32> = learnable
                     .rows()
                     .iter()
                     .map(|r| coverage.energies[*r as usize])
                     .collect();
-                Optimiser::Descent(Descent::new(options, columns, &energies))
+                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies))
             }
-            None => Optimiser::Adam(Adam::new(settings.adam, rows, columns, scene.gaussians.len())),
+            Optimizer::Adam(options) => OptimizerState::Adam(Adam::new(options, rows, columns, scene.gaussians.len())),
         };
         let run = Self {
             engine,
@@ -153,16 +154,16 @@ impl<'a> Run<'a> {
             loss: Loss::new(engine, settings, message),
             pool,
             optimiser,
-            balancer: Balancer::new(settings.balance),
+            controller: LossWeightController::new(settings.balance),
             augmentation,
             gradient: vec![0.0; learnable.len()],
-            learned: Learned::new(scene, learnable),
+            learned: LearnedOffsets::new(scene, learnable),
         };
         Ok((run, coverage))
     }
 
     /// One step; `step` counts from 1.
-    fn step(&mut self, step: usize, timing: &mut Timing) -> Result<Step> {
+    fn step(&mut self, step: usize, timing: &mut StepTimer) -> Result<Step> {
         let views = self.pool.batch(self.engine, &self.scene.gaussians)?;
         timing.lap(Stage::Prepare);
         let mut figures = self.differentiate(step, &views, timing)?;
@@ -178,22 +179,22 @@ impl<'a> Run<'a> {
         let rate = self.rate(step);
         let (offsets, gradient) = (&mut self.learned.values, &mut self.gradient);
         match &mut self.optimiser {
-            Optimiser::Adam(adam) => adam.step(rate, penalty, offsets, gradient),
-            Optimiser::Descent(descent) => {
+            OptimizerState::Adam(adam) => adam.step(rate, penalty, offsets, gradient),
+            OptimizerState::PreconditionedSgd(sgd) => {
                 let pixels = 3.0 * (self.settings.size as f32).powi(2);
-                descent.step(rate, pixels, offsets, gradient);
+                sgd.step(rate, pixels, offsets, gradient);
             }
         }
-        self.learned.settle(self.scene);
+        self.learned.quantize(self.scene);
         let ssim = 1.0 - f64::from(figures.terms.ssim);
-        self.balancer.update(figures.psnr_db, figures.bit_accuracy, ssim);
+        self.controller.update(figures.psnr_db, figures.bit_accuracy, ssim);
         timing.lap(Stage::Adam);
         Ok(figures)
     }
 
     /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
     /// `self.gradient`.
-    fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut Timing) -> Result<Step> {
+    fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut StepTimer) -> Result<Step> {
         let (engine, scene) = (self.engine, &self.scene.gaussians);
         let changes = self.learned.changes();
         let colours = engine.each(views, |v| Ok(v.colours(&scene.sh, Some(changes))))?;
@@ -204,7 +205,7 @@ impl<'a> Run<'a> {
 
         let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
         let pictures: Vec<&Picture> = pictures.iter().collect();
-        let factors = self.balancer.factors();
+        let factors = self.controller.factors();
         let rng = &mut self.augmentation;
         let found = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
         let psnr_db = mean_psnr(&references, &pictures);
@@ -231,7 +232,7 @@ impl<'a> Run<'a> {
     /// Factor on the learning rates: a half cosine from 1 to the final rate.
     fn rate(&self, step: usize) -> f32 {
         let s = self.settings;
-        let last = s.descent.map_or(s.adam.final_rate, |d| d.final_rate);
+        let last = s.optimizer.final_rate();
         let turn = std::f32::consts::PI * (step - 1) as f32 / self.settings.steps as f32;
         last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
     }
@@ -323,7 +324,7 @@ mod tests {
                 run.gradient.fill(0.0);
                 // The same augmentation every time.
                 run.augmentation = ChaCha8Rng::seed_from_u64(4);
-                let t = run.differentiate(1, &views, &mut Timing::new()).unwrap().terms;
+                let t = run.differentiate(1, &views, &mut StepTimer::new()).unwrap().terms;
                 let l = &settings.lambda;
                 let reconstruction = l.l1 * t.l1 + l.ssim * t.ssim;
                 let loss = l.message * t.message + l.reconstruction * reconstruction;

@@ -3,9 +3,10 @@ use guardsplat_distortion::{JpegRange, Kind, Ranges, RobustTo};
 
 use super::adam::AdamOptions;
 use super::augment::Augmentation;
-use super::balance::{Balance, Yielding};
-use super::descent::DescentOptions;
-use super::settings::{EarlyStop, Lambdas, Settings, Verify};
+use super::loss_weight_controller::{LossWeightControl, TargetRelaxation};
+use super::optimizer::Optimizer;
+use super::preconditioned_sgd::PreconditionedSgdOptions;
+use super::settings::{EarlyStop, LossWeights, Settings, Verify};
 use super::target::Target;
 use crate::error::{Error, Result};
 
@@ -78,7 +79,7 @@ impl Preset {
             size: 160,
             enlarged: 3.0,
             black_backgrounds: 0.1,
-            lambda: Lambdas {
+            lambda: LossWeights {
                 reconstruction: 1.0,
                 l1: 0.0,
                 l2: 33.0,
@@ -93,24 +94,17 @@ impl Preset {
                 offset_rest: 0.0,
             },
             lpips_views: None,
-            adam: AdamOptions {
-                rate_dc: 0.014,
-                rate_rest: 0.0012,
-                final_rate: 0.1,
-                sparse: true,
-                ..AdamOptions::default()
-            },
-            descent: Some(DescentOptions::default()),
-            balance: Some(Balance {
+            optimizer: Optimizer::PreconditionedSgd(PreconditionedSgdOptions::default()),
+            balance: Some(LossWeightControl {
                 target_psnr_db: 40.4,
                 target_ssim: Some(0.9945),
                 // Hardly a mark of 32 bits needs it, and of 64 bits those of smooth scenes.
-                yielding: Some(Yielding {
+                yielding: Some(TargetRelaxation {
                     below: 0.93,
                     psnr_db: 2.0,
                     ssim: 0.0045,
                 }),
-                ..Balance::default()
+                ..LossWeightControl::default()
             }),
             augmentation: Augmentation::default(),
             robust_to: EVERYDAY.into_iter().collect(),
@@ -147,10 +141,10 @@ impl Preset {
             Self::Draft => Settings {
                 steps: 80,
                 pool_views: 100,
-                balance: Some(Balance {
+                balance: Some(LossWeightControl {
                     target_psnr_db: 39.4,
                     target_ssim: Some(0.993),
-                    ..Balance::default()
+                    ..LossWeightControl::default()
                 }),
                 early_stop: standard.early_stop.map(|stop| EarlyStop {
                     min_steps: 50,
@@ -177,7 +171,7 @@ impl Preset {
                 black_backgrounds: 0.0,
                 distorted_size: 224,
                 robust_to: RobustTo::none(),
-                lambda: Lambdas {
+                lambda: LossWeights {
                     l1: 0.8,
                     l2: 0.0,
                     ssim: 0.2,
@@ -188,8 +182,7 @@ impl Preset {
                     offset_rest: 10.0,
                     ..standard.lambda
                 },
-                adam: AdamOptions::default(),
-                descent: None,
+                optimizer: Optimizer::Adam(AdamOptions::default()),
                 balance: None,
                 early_stop: None,
                 ..standard

@@ -1,11 +1,11 @@
 //! What an embedding tells whoever watches it.
 use serde::Serialize;
 
-use crate::memory::Memory;
+use crate::memory::MemoryRequirements;
 
 /// Unweighted terms of the loss, means over the views of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Terms {
+pub struct LossTerms {
     /// Mean absolute difference.
     pub l1: f32,
     /// 1 - SSIM.
@@ -30,7 +30,7 @@ pub struct Step {
     /// Mean PSNR of these views, dB; infinite before anything has changed.
     pub psnr_db: f64,
     /// The loss.
-    pub terms: Terms,
+    pub terms: LossTerms,
     /// Factor on the reconstruction terms.
     pub balance: f32,
 }
@@ -53,7 +53,7 @@ pub struct Check {
 #[serde(tag = "stage", rename_all = "snake_case")]
 pub enum Progress {
     /// The scene was read, and the job fits in memory; this much it will need.
-    Admitted(Memory),
+    Admitted(MemoryRequirements),
     /// It is known which Gaussians training views show.
     Covered {
         /// Views that were looked at.

@@ -2,17 +2,17 @@
 use guardsplat_distortion::{Layer, Ranges, RobustTo};
 use serde::{Deserialize, Serialize};
 
-use super::adam::AdamOptions;
 use super::augment::Augmentation;
-use super::balance::Balance;
-use super::descent::DescentOptions;
+use super::loss_weight_controller::LossWeightControl;
+use super::optimizer::{Optimizer, accept_names};
+use super::preconditioned_sgd::PreconditionedSgdOptions;
 use super::target::Target;
 use crate::error::{Error, Result};
 
 /// Weights of the terms of the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Lambdas {
+pub struct LossWeights {
     /// Of all terms that compare pictures.
     pub reconstruction: f32,
     /// Of the mean absolute difference, within reconstruction.
@@ -112,16 +112,16 @@ pub struct Settings {
     /// Share of training views over black instead of white.
     pub black_backgrounds: f32,
     /// Weights of the loss.
-    pub lambda: Lambdas,
+    pub lambda: LossWeights,
     /// Views of a step that LPIPS looks at, the next ones at every step; its time is nearly all of a step's. `None` for all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lpips_views: Option<usize>,
-    /// The optimiser.
-    pub adam: AdamOptions,
-    /// Takes the place of Adam.
-    pub descent: Option<DescentOptions>,
+    /// The optimiser. In JSON `{"optimizer": {"adam": {..}}}` or `{"optimizer": {"preconditioned_sgd": {..}}}`; it is
+    /// written as the fields `adam` and `descent`, its old names.
+    #[serde(flatten)]
+    pub optimizer: Optimizer,
     /// Holds a PSNR by changing the weight of reconstruction; `None` leaves it.
-    pub balance: Option<Balance>,
+    pub balance: Option<LossWeightControl>,
     /// What CLIP sees of a training view besides the view itself.
     pub augmentation: Augmentation,
     /// What is done to training views, and to the scene that they show, so that the mark stands it: each view gets one
@@ -150,7 +150,19 @@ impl Settings {
             field: "settings",
             reason: e.to_string(),
         };
-        let changes: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json).map_err(bad)?;
+        let mut changes: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json).map_err(bad)?;
+        accept_names(&mut changes).map_err(|reason| Error::BadOption {
+            field: "settings",
+            reason,
+        })?;
+        // Options of an optimiser that was not chosen before begin as they are by default.
+        if let Some(options @ serde_json::Value::Object(_)) = changes.get_mut("descent")
+            && !matches!(self.optimizer, Optimizer::PreconditionedSgd(_))
+        {
+            let mut sgd = serde_json::to_value(PreconditionedSgdOptions::default()).map_err(bad)?;
+            merge(&mut sgd, options.take());
+            *options = sgd;
+        }
         let mut all = serde_json::to_value(self).map_err(bad)?;
         merge(&mut all, serde_json::Value::Object(changes));
         let settings: Settings = serde_json::from_value(all).map_err(bad)?;
@@ -208,15 +220,12 @@ impl Settings {
             within(field, f64::from(value), 0.0, 1e9)?;
         }
         within("lambda.temperature", f64::from(l.temperature), 1e-3, 1e6)?;
-        self.adam.check()?;
+        self.optimizer.check()?;
         self.augmentation.check()?;
         self.layer().check().map_err(|e| Error::BadOption {
             field: "distortions",
             reason: e.to_string(),
         })?;
-        if let Some(descent) = &self.descent {
-            descent.check()?;
-        }
         if let Some(balance) = &self.balance {
             balance.check()?;
         }

@@ -80,7 +80,8 @@ impl Projection {
     }
 
     /// Projects image features `[n][width]` on the host; gives `[n][rank]`.
-    pub fn project_image(&self, features: &[f32]) -> Vec<f32> {
+    #[cfg(test)]
+    pub(crate) fn project_image(&self, features: &[f32]) -> Vec<f32> {
         project(features, &self.mean_image, &self.matrix_image, self.rank)
     }
 

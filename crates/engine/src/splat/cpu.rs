@@ -1,6 +1,6 @@
 //! Rasteriser for the CPU: sparse products where weights are kept, compositing anew where they are not.
+use super::composite::{ContributionSink, TileBounds, composite_tile};
 use super::tiles::{TILE, TILE_PIXELS};
-use super::walk::{Sink, TileFrame, walk};
 use super::weights::Band;
 use super::{PreparedView, Rasterizer};
 use crate::error::Result;
@@ -30,7 +30,7 @@ impl Rasterizer for CpuRasterizer {
                 let mut cursor = view.weights.as_ref().map(|w| Cursor::new(&w.bands[row]));
                 for column in 0..view.tiles.columns {
                     let list = view.tiles.of(row * view.tiles.columns as usize + column as usize);
-                    let frame = TileFrame::new(column, row as u32, width, height);
+                    let frame = TileBounds::new(column, row as u32, width, height);
                     let mut draw = Draw {
                         colours,
                         colour: [0.0; 4],
@@ -38,7 +38,7 @@ impl Rasterizer for CpuRasterizer {
                     };
                     let left = match &mut cursor {
                         Some(cursor) => cursor.replay(list, &mut draw),
-                        None => &walk(frame, &view.splats, list, &mut draw),
+                        None => &composite_tile(frame, &view.splats, list, &mut draw),
                     };
                     store(frame, width, &draw.image, left, background, out);
                 }
@@ -64,7 +64,7 @@ impl Rasterizer for CpuRasterizer {
             let mut cursor = view.weights.as_ref().map(|w| Cursor::new(&w.bands[row]));
             for column in 0..columns {
                 let list = view.tiles.of(row * columns + column);
-                let frame = TileFrame::new(column as u32, row as u32, width, height);
+                let frame = TileBounds::new(column as u32, row as u32, width, height);
                 let (tile_slots, after) = slots.split_at_mut(list.len());
                 slots = after;
                 let mut gather = Gather {
@@ -77,7 +77,7 @@ impl Rasterizer for CpuRasterizer {
                         cursor.replay(list, &mut gather);
                     }
                     None => {
-                        walk(frame, &view.splats, list, &mut gather);
+                        composite_tile(frame, &view.splats, list, &mut gather);
                     }
                 }
             }
@@ -106,7 +106,7 @@ impl<'a> Cursor<'a> {
 
     /// Gives `sink` what [`walk`] would, and returns the next tile's transmittance.
     #[inline(always)]
-    fn replay(&mut self, list: &[u32], sink: &mut impl Sink) -> &'a [f32; TILE_PIXELS] {
+    fn replay(&mut self, list: &[u32], sink: &mut impl ContributionSink) -> &'a [f32; TILE_PIXELS] {
         let mut room = [0.0; TILE_PIXELS];
         for (place, &splat) in list.iter().enumerate() {
             let end = self.band.ends[self.slot + place] as usize;
@@ -131,7 +131,7 @@ struct Draw<'a> {
     image: TileImage,
 }
 
-impl Sink for Draw<'_> {
+impl ContributionSink for Draw<'_> {
     #[inline(always)]
     fn begin(&mut self, _: usize, splat: u32) {
         let at = 3 * splat as usize;
@@ -157,7 +157,7 @@ struct Gather<'a> {
     slots: &'a mut [[f32; 3]],
 }
 
-impl Sink for Gather<'_> {
+impl ContributionSink for Gather<'_> {
     #[inline(always)]
     fn begin(&mut self, _: usize, _: u32) {
         self.sum = [0.0; 4];
@@ -179,7 +179,7 @@ impl Sink for Gather<'_> {
 
 /// Copies a tile into its band of the picture, over the background.
 fn store(
-    frame: TileFrame,
+    frame: TileBounds,
     width: u32,
     image: &TileImage,
     left: &[f32; TILE_PIXELS],
@@ -198,7 +198,7 @@ fn store(
 }
 
 /// Copies a tile out of its band of a picture; what lies outside the picture is 0.
-fn load(frame: TileFrame, width: u32, band: &[f32]) -> TileImage {
+fn load(frame: TileBounds, width: u32, band: &[f32]) -> TileImage {
     let mut image = [[0.0; 4]; TILE_PIXELS];
     for y in 0..frame.size[1] {
         let at = 3 * (y * width as usize + frame.origin[0] as usize);

@@ -6,8 +6,8 @@
 #![allow(missing_docs)]
 use cubecl::prelude::*;
 
+use super::composite::{ALPHA_MAX, TRANSMITTANCE_MIN};
 use super::project::ALPHA_MIN;
-use super::walk::{ALPHA_MAX, TRANSMITTANCE_MIN};
 
 /// Floats of a [`super::Splat2d`] in a buffer.
 pub(super) const SPLAT_FLOATS: usize = 8;

@@ -5,6 +5,7 @@
 #[cfg(test)]
 mod checks;
 pub mod compare;
+mod composite;
 mod cpu;
 mod gpu;
 mod kernels;
@@ -15,7 +16,6 @@ pub mod reference;
 pub mod sh;
 mod tiles;
 mod uploads;
-mod walk;
 mod weights;
 
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! The weights of a view, kept: what every splat contributes to every pixel.
+use super::composite::{ContributionSink, TileBounds, composite_tile};
 use super::project::Splat2d;
 use super::tiles::{TILE_PIXELS, TileLists};
-use super::walk::{Sink, TileFrame, walk};
 use crate::error::{Error, Result};
 use crate::view::Camera;
 use half::f16;
@@ -144,8 +144,8 @@ impl Band {
         for column in 0..tiles.columns {
             let list = tiles.of(first + column as usize);
             let before = collect.keep.len();
-            let frame = TileFrame::new(column, row, camera.width, camera.height);
-            transmittance.push(walk(frame, splats, list, &mut collect));
+            let frame = TileBounds::new(column, row, camera.width, camera.height);
+            transmittance.push(composite_tile(frame, splats, list, &mut collect));
             // Once all pixels are finished the walk ends early; the splats behind have no weight.
             collect.keep.resize(before + list.len(), false);
         }
@@ -187,7 +187,7 @@ struct Collect<'a> {
     keep: Vec<bool>,
 }
 
-impl Sink for Collect<'_> {
+impl ContributionSink for Collect<'_> {
     #[inline(always)]
     fn begin(&mut self, _: usize, _: u32) {
         self.count = 0;

@@ -9,7 +9,7 @@
 use super::scenes::ViewedScene;
 use super::steering::across_views;
 use super::{IMAGE_SIZE, TrainOptions, TrainProgress, host};
-use crate::clip::{ClipConfig, StatisticsTower, preprocess};
+use crate::clip::{ClipConfig, RandomFourierEncoder, preprocess};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::extract::rasterizer;
@@ -49,7 +49,7 @@ pub(super) struct Head {
 
 /// Fits the head to sample scenes.
 pub(super) fn fit(
-    tower: &StatisticsTower,
+    tower: &RandomFourierEncoder,
     config: &ClipConfig,
     options: &TrainOptions,
     compute: &Compute,
@@ -92,7 +92,7 @@ pub(super) fn fit(
 
 /// Covariance of the averages between views of a scene, plus a share of the squared means of scenes, `[n][n]`.
 fn natural(
-    tower: &StatisticsTower,
+    tower: &RandomFourierEncoder,
     config: &ClipConfig,
     options: &TrainOptions,
     scenes: Range<u64>,
@@ -153,7 +153,7 @@ fn add_square(sum: &mut [f64], v: &[f64], weight: f64) {
 
 /// Mean over scenes of what a mark can do across views, `[n][n]`.
 fn steering(
-    tower: &StatisticsTower,
+    tower: &RandomFourierEncoder,
     config: &ClipConfig,
     options: &TrainOptions,
     scenes: Range<u64>,

@@ -10,6 +10,8 @@
 //!    tuning, Zhai et al. 2022), and retrieval is measured on drawings and captions that it never saw.
 mod contrastive;
 mod drawing;
+#[cfg(test)]
+mod encoder_tests;
 mod filters;
 mod head;
 mod paint;
@@ -20,10 +22,10 @@ mod steering;
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
 #[cfg(test)]
-pub(crate) use filters::{LUMA, NORM, filters};
+pub(crate) use filters::filters;
 
 use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
-use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, StatisticsTower};
+use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, RandomFourierEncoder};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use burn::tensor::Tensor;
@@ -165,7 +167,7 @@ pub fn train_clip(
     let head = head::fit(&tower, &config, options, compute, &mut progress)?;
     let tower = tower.with_head(head.matrix, head.bias);
     let model = ClipModel {
-        visual: Some(ImageTower::Statistics(tower)),
+        visual: Some(ImageTower::RandomFourier(tower)),
         ..model
     };
     let (model, retrieval) = contrastive::train(model, &config, options, compute, &mut progress)?;
@@ -177,9 +179,9 @@ pub fn train_clip(
     })
 }
 
-fn tower(model: &ClipModel) -> Result<StatisticsTower> {
+fn tower(model: &ClipModel) -> Result<RandomFourierEncoder> {
     match &model.visual {
-        Some(ImageTower::Statistics(tower)) => Ok(tower.clone()),
+        Some(ImageTower::RandomFourier(tower)) => Ok(tower.clone()),
         _ => Err(Error::BadModel {
             name: "guardsplat-clip".into(),
             reason: "has another image tower".into(),

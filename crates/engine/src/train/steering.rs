@@ -7,7 +7,7 @@
 //! a view with itself would count what is merely memorised.
 use super::scenes::ViewedScene;
 use super::{IMAGE_SIZE, host};
-use crate::clip::{ClipConfig, StatisticsTower, preprocess};
+use crate::clip::{ClipConfig, RandomFourierEncoder, preprocess};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::quality::{batch, unbatch};
@@ -23,7 +23,7 @@ const UNSEEN: f32 = 1e-6;
 /// Mean over pairs of different views of `J_w M^-1 J_v^T`, `[n][n]`, for a scene over white.
 pub(super) fn across_views(
     scene: &ViewedScene,
-    tower: &StatisticsTower,
+    tower: &RandomFourierEncoder,
     config: &ClipConfig,
     rasterizer: &dyn Rasterizer,
     compute: &Compute,
@@ -80,7 +80,7 @@ fn inverse_root_energy(scene: &ViewedScene, rasterizer: &dyn Rasterizer) -> Resu
 fn gradients(
     scene: &ViewedScene,
     view: &PreparedView,
-    tower: &StatisticsTower,
+    tower: &RandomFourierEncoder,
     config: &ClipConfig,
     rasterizer: &dyn Rasterizer,
     compute: &Compute,

@@ -72,7 +72,8 @@ impl Camera {
     }
 
     /// World to camera coordinates.
-    pub fn to_camera(&self, p: [f32; 3]) -> [f32; 3] {
+    #[cfg(test)]
+    pub(crate) fn to_camera(&self, p: [f32; 3]) -> [f32; 3] {
         std::array::from_fn(|row| dot(self.rotation[row], p) + self.translation[row])
     }
 }

@@ -1,7 +1,8 @@
 //! Embedding and reading know extractors by the trait alone: one of three lines, and a convolutional decoder.
 use burn::tensor::Tensor;
-use guardsplat_engine::embed::{DescentOptions, HiddenKeyOptions, Settings, create_hidden_key, optimise};
+use guardsplat_engine::embed::{Optimizer, PreconditionedSgdOptions, Settings, optimise};
 use guardsplat_engine::extract::{Engine, Extractor, HiddenExtractor, read_scene};
+use guardsplat_engine::message::key::{HiddenKeyOptions, create_hidden_key};
 use guardsplat_engine::message::{Decoding, Message};
 use guardsplat_engine::scene::Scene;
 use guardsplat_engine::stop::Stop;
@@ -36,9 +37,9 @@ impl Extractor for Tint {
 fn message_only() -> Settings {
     let mut settings = settings();
     settings.steps = 40;
-    settings.descent = settings.descent.map(|descent| DescentOptions {
+    settings.optimizer = Optimizer::PreconditionedSgd(PreconditionedSgdOptions {
         length: 0.02,
-        ..descent
+        ..PreconditionedSgdOptions::default()
     });
     settings.lambda.reconstruction = 0.0;
     settings.black_backgrounds = 1.0;

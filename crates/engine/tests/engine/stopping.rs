@@ -1,7 +1,8 @@
 //! Whatever is computed ends when it is asked to.
 use guardsplat_engine::Error;
-use guardsplat_engine::embed::{Job, NewKey, Progress, embed};
+use guardsplat_engine::embed::{Job, Progress, embed};
 use guardsplat_engine::extract::read_scene;
+use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::stop::Stop;
@@ -58,7 +59,7 @@ fn a_key_under_way_ends_when_it_is_asked_to() {
         let mut told = 0;
         let made = new_key_until(&compute, 1, &stop, |progress| {
             told += 1;
-            if matches!(progress, NewKey::Decoder(Training::Training(..))) == training {
+            if matches!(progress, KeyProgress::Decoder(Training::Training(..))) == training {
                 stop.request();
             }
         });

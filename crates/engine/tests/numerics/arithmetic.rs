@@ -3,7 +3,7 @@ use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use guardsplat_distortion::{Chroma, Draw, Jpeg, Layer, Ranges, RobustTo};
 use guardsplat_engine::clip::{Clip, ClipConfig, ClipModel, Parts, Precision, normalize};
-use guardsplat_engine::embed::{Adam, AdamOptions, Penalty, Preset};
+use guardsplat_engine::embed::{Adam, AdamOptions, Optimizer, Penalty, Preset};
 use guardsplat_engine::message::{DecoderWeights, Projection, Reader, bce_from_logits};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{Psnr, Ssim, measure, psnr};
@@ -154,9 +154,14 @@ pub fn adam_in_a_vast_scene() {
         rest: paper.lambda.offset_rest,
     };
     for preset in Preset::ALL {
-        assert!(preset.settings().adam.epsilon <= 1e-12);
+        if let Optimizer::Adam(adam) = preset.settings().optimizer {
+            assert!(adam.epsilon <= 1e-12);
+        }
     }
-    let options = paper.adam;
+    assert!(AdamOptions::tuned().epsilon <= 1e-12);
+    let Optimizer::Adam(options) = paper.optimizer else {
+        panic!("{:?}", paper.optimizer);
+    };
     let step = |options: AdamOptions, rows: usize, stride: usize| {
         let mut adam = Adam::new(options, rows, stride, GAUSSIANS);
         let mut offsets = vec![5e-3; rows * stride];

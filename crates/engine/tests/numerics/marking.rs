@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use guardsplat_engine::clip::{Clip, ClipConfig, ClipModel, Parts};
-use guardsplat_engine::embed::{Job, Optimised, Preset, Progress, Settings, Terms, embed, optimise};
+use guardsplat_engine::embed::{Job, LossTerms, Optimised, Preset, Progress, Settings, embed, optimise};
 use guardsplat_engine::error::Error;
 use guardsplat_engine::extract::Engine;
 use guardsplat_engine::memory::Bytes;
@@ -69,7 +69,7 @@ fn short(preset: Preset) -> Settings {
 
 /// Marks a scene in memory; every term of every step and all that is learned must be finite.
 fn mark(engine: &Engine, gaussians: Gaussians, settings: &Settings) -> Optimised {
-    let mut terms: Vec<Terms> = Vec::new();
+    let mut terms: Vec<LossTerms> = Vec::new();
     let scene = Scene::from_gaussians(gaussians);
     let done = optimise(engine, &scene, &message(), settings, &mut |progress| {
         if let Progress::Step(step) = progress {

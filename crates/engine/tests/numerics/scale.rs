@@ -2,10 +2,10 @@
 use std::fs::File;
 use std::path::Path;
 
-use guardsplat_engine::admission::to_mark;
-use guardsplat_engine::embed::{ModelBytes, Preset, SceneSize, ViewSize, needs};
+use guardsplat_engine::embed::{Preset, predict_memory};
 use guardsplat_engine::error::Error;
-use guardsplat_engine::memory::{Bytes, Limits, Memory};
+use guardsplat_engine::memory::admission::admit_marking;
+use guardsplat_engine::memory::{Bytes, Limits, MemoryRequirements, ModelBytes, SceneSize, ViewSize};
 use guardsplat_engine::sample::sample;
 use guardsplat_engine::scene::{HEAD, Scene, Summary, summary};
 use guardsplat_engine::splat::{MAX_PAIRS, WeightCache, prepare, sh};
@@ -41,7 +41,7 @@ pub fn memory_is_predicted() {
             exact: true,
             file: 4 * NUMBERS * n,
         };
-        let needed = needs(size, view, &settings, ModelBytes::default());
+        let needed = predict_memory(size, view, &settings, ModelBytes::default());
         assert_eq!(needed.scene, 2 * 4 * NUMBERS * n);
         assert_eq!(needed.offsets, (2 * 4 * 48 + 9) * n);
         assert_eq!(needed.optimiser, (2 * 4 * 48 + 4) * n);
@@ -93,10 +93,10 @@ pub fn refused_at_admission() {
     for n in SIZES {
         let least = sparse_file(&path, n).least_to_mark();
         assert!(least >= 2 * n * 4 * (NUMBERS + 14));
-        let rest = Memory::of_program();
-        to_mark(&path, &up_to(least + rest.total()), rest).unwrap();
+        let rest = MemoryRequirements::of_program();
+        admit_marking(&path, &up_to(least + rest.total()), rest).unwrap();
         let limit = least + rest.total() - 1;
-        let error = to_mark(&path, &up_to(limit), rest).unwrap_err();
+        let error = admit_marking(&path, &up_to(limit), rest).unwrap_err();
         assert!(matches!(error, Error::DoesNotFit { .. }));
         let words = error.to_string();
         println!("{words}");

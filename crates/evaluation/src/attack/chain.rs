@@ -5,7 +5,7 @@ use std::str::FromStr;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::draw::Source;
+use super::draw::RandomSource;
 use super::size;
 use super::step::Step;
 use crate::{Error, Result};
@@ -68,12 +68,12 @@ impl Attack {
     }
 
     /// The steps with where their random numbers come from.
-    fn sources(&self, seed: u64, index: u64) -> impl Iterator<Item = (Step, Source)> {
+    fn sources(&self, seed: u64, index: u64) -> impl Iterator<Item = (Step, RandomSource)> {
         self.steps.iter().enumerate().map(move |(position, step)| {
             let before = self.steps.iter().take(position);
             let occurrence = before.filter(|other| other.kind() == step.kind()).count() as u16;
             let kind = step.kind();
-            let source = Source {
+            let source = RandomSource {
                 seed,
                 index,
                 kind,

@@ -6,7 +6,7 @@ use super::kind::Kind;
 
 /// What random numbers are for. Each use has a stream, so that a range and the number drawn from it place alike.
 #[derive(Clone, Copy)]
-pub(super) enum Use {
+pub(super) enum RandomStream {
     /// Strength from a range.
     Strength = 0,
     /// Noise and places.
@@ -18,16 +18,16 @@ pub(super) enum Use {
 /// They depend on what the step is and on how many of its kind came before, not on its position: a place or a strength
 /// stays the same when a codec is put before it, which makes chains comparable, and noise added twice differs.
 #[derive(Clone, Copy)]
-pub(super) struct Source {
+pub(super) struct RandomSource {
     pub seed: u64,
     pub index: u64,
     pub kind: Kind,
     pub occurrence: u16,
 }
 
-impl Source {
+impl RandomSource {
     /// The stream of one use.
-    pub fn random(self, purpose: Use) -> ChaCha8Rng {
+    pub fn random(self, purpose: RandomStream) -> ChaCha8Rng {
         // seed, index and occurrence in little endian, then the name, padded with zeros: no two sources share a key.
         let bytes = self.seed.to_le_bytes().into_iter();
         let bytes = bytes.chain(self.index.to_le_bytes());

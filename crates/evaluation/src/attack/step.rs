@@ -5,7 +5,7 @@ use std::str::FromStr;
 use image::{Rgb, RgbImage};
 use rand::RngExt;
 
-use super::draw::{Source, Use};
+use super::draw::{RandomSource, RandomStream};
 use super::kind::{Grid, Kind, Limits};
 use super::strength::{Strength, start_of};
 use super::{codec, colour, cover, filter, frame, noise, resample, rotate};
@@ -52,7 +52,7 @@ impl Step {
     }
 
     /// The step with the one strength that a picture draws.
-    pub(super) fn drawn(self, source: Source) -> Self {
+    pub(super) fn drawn(self, source: RandomSource) -> Self {
         let (Some(limits), Some(strength)) = (self.kind.spec(), self.strength) else {
             return self;
         };
@@ -63,12 +63,12 @@ impl Step {
     }
 
     /// Does it, with the lower end of its strength: ranges are [`Step::drawn`] before.
-    pub(super) fn apply(self, picture: RgbImage, source: Source) -> Result<RgbImage> {
+    pub(super) fn apply(self, picture: RgbImage, source: RandomSource) -> Result<RgbImage> {
         let value = self.strength.map_or(0.0, Strength::low);
         if self.strength.is_some() && self.kind.spec().and_then(|limits| limits.identity) == Some(value) {
             return Ok(picture);
         }
-        let random = &mut source.random(Use::Pixels);
+        let random = &mut source.random(RandomStream::Pixels);
         Ok(match self.kind {
             Kind::Jpeg => codec::jpeg(&picture, value as u8)?,
             Kind::Webp => codec::webp(&picture, value as f32)?,
@@ -112,12 +112,12 @@ impl Limits {
     }
 
     /// Uniform over the numbers that are allowed.
-    fn draw(self, strength: Strength, source: Source) -> f64 {
+    fn draw(self, strength: Strength, source: RandomSource) -> f64 {
         let (low, high) = (strength.low(), strength.high());
         if strength.is_fixed() {
             return low;
         }
-        let random = &mut source.random(Use::Strength);
+        let random = &mut source.random(RandomStream::Strength);
         let mut whole = |every: f64| low + every * f64::from(random.random_range(0..=((high - low) / every) as u32));
         match self.grid {
             Grid::Whole => whole(1.0),

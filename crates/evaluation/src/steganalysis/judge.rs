@@ -19,30 +19,30 @@ const CONFIDENCE: f64 = 0.95;
 
 /// Who judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judge {
+pub enum Steganalyzer {
     /// A detector of replaced bits, which needs no examples.
     Fixed(Detector),
     /// The one that learns from pairs of other scenes.
     Learned,
 }
 
-impl Judge {
+impl Steganalyzer {
     /// All six, in the order of the reports.
-    pub const ALL: [Judge; 6] = [
-        Judge::Fixed(Detector::RsAnalysis),
-        Judge::Fixed(Detector::SamplePairs),
-        Judge::Fixed(Detector::ChiSquare),
-        Judge::Fixed(Detector::PrimarySets),
-        Judge::Fixed(Detector::Fusion),
-        Judge::Learned,
+    pub const ALL: [Steganalyzer; 6] = [
+        Steganalyzer::Fixed(Detector::RsAnalysis),
+        Steganalyzer::Fixed(Detector::SamplePairs),
+        Steganalyzer::Fixed(Detector::ChiSquare),
+        Steganalyzer::Fixed(Detector::PrimarySets),
+        Steganalyzer::Fixed(Detector::Fusion),
+        Steganalyzer::Learned,
     ];
 
     /// Whether it can judge so many scenes with so many pairs of pictures each.
     ///
     /// # Errors
     /// Says what is lacking.
-    pub fn can_judge(self, pairs: &[usize]) -> std::result::Result<(), String> {
-        if self != Judge::Learned {
+    pub fn can_detect(self, pairs: &[usize]) -> std::result::Result<(), String> {
+        if self != Steganalyzer::Learned {
             return Ok(());
         }
         if pairs.len() < 2 {
@@ -59,24 +59,24 @@ impl Judge {
     }
 }
 
-impl fmt::Display for Judge {
+impl fmt::Display for Steganalyzer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Judge::Fixed(detector) => detector.fmt(f),
-            Judge::Learned => f.pad(LEARNED),
+            Steganalyzer::Fixed(detector) => detector.fmt(f),
+            Steganalyzer::Learned => f.pad(LEARNED),
         }
     }
 }
 
 /// What judges need of a picture; much less than the picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Impression {
+pub struct DetectorInputs {
     /// Of each of [`Detector::ALL`]; 0, no alarm, where there is no result.
     scores: [f64; 5],
     features: Features,
 }
 
-impl Impression {
+impl DetectorInputs {
     /// Looks at a picture.
     pub fn of(picture: &RgbImage) -> Self {
         let four = Detector::estimates(picture);
@@ -97,14 +97,14 @@ impl Impression {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pairs {
     /// Unmarked.
-    pub clean: Vec<Impression>,
+    pub clean: Vec<DetectorInputs>,
     /// Marked, or with replaced bits.
-    pub suspicious: Vec<Impression>,
+    pub suspicious: Vec<DetectorInputs>,
 }
 
 /// What a judge said.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct DetectionResult {
     /// Scores of clean views, scene by scene; a higher score says "marked".
     pub clean: Vec<f64>,
     /// Of suspicious ones.
@@ -120,8 +120,8 @@ pub struct Verdict {
 /// Lets one judge look at all scenes.
 ///
 /// # Errors
-/// Without pairs, or where [`Judge::can_judge`] says no.
-pub fn judge(judge: Judge, scenes: &[Pairs]) -> Result<Verdict> {
+/// Without pairs, or where [`Steganalyzer::can_detect`] says no.
+pub fn judge(judge: Steganalyzer, scenes: &[Pairs]) -> Result<DetectionResult> {
     if let Some(row) = scenes
         .iter()
         .position(|pairs| pairs.clean.len() != pairs.suspicious.len())
@@ -130,19 +130,19 @@ pub fn judge(judge: Judge, scenes: &[Pairs]) -> Result<Verdict> {
     }
     let pairs: Vec<usize> = scenes.iter().map(|pairs| pairs.clean.len()).collect();
     judge
-        .can_judge(&pairs)
+        .can_detect(&pairs)
         .map_err(|reason| bad("detector", format!("{judge} {reason}")))?;
     let clusters = match judge {
-        Judge::Fixed(detector) => {
+        Steganalyzer::Fixed(detector) => {
             let place = Detector::ALL.iter().position(|known| *known == detector).unwrap_or(0);
-            let scores = |of: &[Impression]| of.iter().map(|one| one.scores[place]).collect();
+            let scores = |of: &[DetectorInputs]| of.iter().map(|one| one.scores[place]).collect();
             let cluster = |pairs: &Pairs| Cluster {
                 positives: scores(&pairs.suspicious),
                 negatives: scores(&pairs.clean),
             };
             scenes.iter().map(cluster).collect()
         }
-        Judge::Learned => {
+        Steganalyzer::Learned => {
             let each = scenes.iter().enumerate();
             each.map(|(place, own)| learned(scenes, place, own))
                 .collect::<Result<Vec<_>>>()?
@@ -153,7 +153,7 @@ pub fn judge(judge: Judge, scenes: &[Pairs]) -> Result<Verdict> {
 
 /// Scores of `own`, which is scene `held_out`, by detectors that were trained on all others.
 fn learned(scenes: &[Pairs], held_out: usize, own: &Pairs) -> Result<Cluster> {
-    let others = |of: fn(&Pairs) -> &[Impression]| -> Vec<&Features> {
+    let others = |of: fn(&Pairs) -> &[DetectorInputs]| -> Vec<&Features> {
         let others = scenes.iter().enumerate().filter(|(place, _)| *place != held_out);
         others
             .flat_map(|(_, pairs)| of(pairs))
@@ -165,7 +165,7 @@ fn learned(scenes: &[Pairs], held_out: usize, own: &Pairs) -> Result<Cluster> {
         .iter()
         .map(|seed| learned::train_on(&clean, &suspicious, *seed))
         .collect::<Result<Vec<_>>>()?;
-    let score = |one: &Impression| {
+    let score = |one: &DetectorInputs| {
         let sum: f64 = classifiers
             .iter()
             .map(|classifier| classifier.score_of(&one.features))
@@ -178,7 +178,7 @@ fn learned(scenes: &[Pairs], held_out: usize, own: &Pairs) -> Result<Cluster> {
     })
 }
 
-fn verdict(clusters: &[Cluster]) -> Result<Verdict> {
+fn verdict(clusters: &[Cluster]) -> Result<DetectionResult> {
     let clean: Vec<f64> = clusters.iter().flat_map(|c| c.negatives.clone()).collect();
     let suspicious: Vec<f64> = clusters.iter().flat_map(|c| c.positives.clone()).collect();
     let (area, over_scenes) = clustered_area(clusters, CONFIDENCE)?;
@@ -187,7 +187,7 @@ fn verdict(clusters: &[Cluster]) -> Result<Verdict> {
         Some(interval) => Some(interval),
         None => over_views()?,
     };
-    Ok(Verdict {
+    Ok(DetectionResult {
         area,
         // One view of each says nothing.
         interval: interval.map_or([0.0, 1.0], |ends| [ends.low.min(area), ends.high.max(area)]),
@@ -218,8 +218,8 @@ mod tests {
     fn pairs(clean: &[RgbImage], change: impl Fn(&RgbImage, u64) -> RgbImage) -> Pairs {
         let suspicious: Vec<RgbImage> = clean.iter().zip(0..).map(|(view, seed)| change(view, seed)).collect();
         Pairs {
-            clean: Impression::of_all(clean),
-            suspicious: Impression::of_all(&suspicious),
+            clean: DetectorInputs::of_all(clean),
+            suspicious: DetectorInputs::of_all(&suspicious),
         }
     }
 
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn identical_pictures_are_told_apart_by_nobody() {
         let scenes = scenes(|view, _| view.clone());
-        for one in Judge::ALL {
+        for one in Steganalyzer::ALL {
             let verdict = judge(one, &scenes).unwrap();
             assert!((verdict.area - 0.5).abs() < 1e-12, "{one}: {}", verdict.area);
             assert!(verdict.interval.iter().all(|end| (end - 0.5).abs() < 1e-9), "{one}");
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn replaced_bits_are_found() {
         let scenes = scenes(|view, seed| replace_bits(view, 0.5, seed));
-        for (one, limit) in Judge::ALL.into_iter().zip([0.95, 0.95, 0.5, 0.95, 0.95, 0.95]) {
+        for (one, limit) in Steganalyzer::ALL.into_iter().zip([0.95, 0.95, 0.5, 0.95, 0.95, 0.95]) {
             let verdict = judge(one, &scenes).unwrap();
             eprintln!("{one}: {:.3} {:?}", verdict.area, verdict.interval);
             assert!(verdict.area >= limit, "{one}: {}", verdict.area);
@@ -252,22 +252,24 @@ mod tests {
     #[test]
     fn the_learned_one_needs_other_scenes() {
         let scenes = scenes(|view, seed| replace_bits(view, 0.5, seed));
-        let reason = judge(Judge::Learned, &scenes[..1]).unwrap_err().to_string();
+        let reason = judge(Steganalyzer::Learned, &scenes[..1]).unwrap_err().to_string();
         assert!(reason.contains("learned is trained on other scenes"), "{reason}");
-        let reason = Judge::Learned.can_judge(&[20, 3, 4]).unwrap_err();
+        let reason = Steganalyzer::Learned.can_detect(&[20, 3, 4]).unwrap_err();
         assert!(reason.contains("has 7 pairs"), "{reason}");
         // One scene: the others judge it, and the interval says that it is over views.
-        let verdict = judge(Judge::Fixed(Detector::Fusion), &scenes[..1]).unwrap();
+        let verdict = judge(Steganalyzer::Fixed(Detector::Fusion), &scenes[..1]).unwrap();
         assert_eq!(verdict.clusters, None);
-        assert!(judge(Judge::Learned, &[]).is_err() && judge(Judge::Fixed(Detector::Fusion), &[]).is_err());
+        assert!(
+            judge(Steganalyzer::Learned, &[]).is_err() && judge(Steganalyzer::Fixed(Detector::Fusion), &[]).is_err()
+        );
     }
 
     #[test]
     fn judging_twice_gives_the_same() {
         let scenes = scenes(|view, seed| replace_bits(view, 0.1, seed));
         assert_eq!(
-            judge(Judge::Learned, &scenes).unwrap(),
-            judge(Judge::Learned, &scenes).unwrap()
+            judge(Steganalyzer::Learned, &scenes).unwrap(),
+            judge(Steganalyzer::Learned, &scenes).unwrap()
         );
     }
 }

@@ -24,5 +24,5 @@ mod testing;
 mod tests;
 
 pub use detector::{Detector, NoResult};
-pub use judge::{Impression, Judge, Pairs, Verdict, judge};
+pub use judge::{DetectionResult, DetectorInputs, Pairs, Steganalyzer, judge};
 pub use roc::{DetectorRoc, roc_of};

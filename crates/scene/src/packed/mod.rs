@@ -56,7 +56,7 @@ pub(crate) fn read(
     let reason = |reason| bad(path, reason);
     let layout = Layout::find(parsed).map_err(reason)?;
     layout.check_size(left).map_err(reason)?;
-    let body = crate::rest::rest(path, source, left)?;
+    let body = crate::remaining::read_remaining(path, source, left)?;
     // Again, since a file can shrink between the look at its size and the read.
     layout.check_size(body.len() as u64).map_err(reason)?;
     let chunks = decode::chunks(&layout, &body).map_err(reason)?;
@@ -163,7 +163,7 @@ impl Container for Packed {
         false
     }
 
-    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         let (constant, rest) = coefficients.split_at_mut(3);
         for (value, range) in constant.iter_mut().zip(&self.grids[row / CHUNK]) {
             *value = range.coefficient(range.nearest(*value));

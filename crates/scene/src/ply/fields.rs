@@ -1,7 +1,7 @@
 //! The properties of a Gaussian: which columns of a row they are, and what values they may have.
 use super::header::{bytes, quote};
 use crate::gaussians::{Gaussians, MAX_DEGREE, Sh};
-use crate::ignored::{BadRows, Ignored, Sieve};
+use crate::ignored::{BadRows, Ignored, RowFilter};
 use ply_rs::ply::ScalarType;
 
 /// Properties before the rest coefficients, in the order in which rows are handed to [`Rows::push`].
@@ -107,7 +107,7 @@ pub(crate) struct Rows {
     gaussians: Gaussians,
     /// Rows of the file that came by.
     seen: usize,
-    sieve: Sieve,
+    sieve: RowFilter,
     /// Which value comes at each place of a row of [`Sh`].
     order: Vec<usize>,
 }
@@ -133,7 +133,7 @@ impl Rows {
         Rows {
             gaussians,
             seen: 0,
-            sieve: Sieve::new(bad_rows),
+            sieve: RowFilter::new(bad_rows),
             order,
         }
     }

@@ -11,7 +11,7 @@ mod standard;
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
-use crate::rest::rest;
+use crate::remaining::read_remaining;
 use crate::scene::bad;
 use crate::summary::Summary;
 use crate::{Error, Result, packed};
@@ -53,7 +53,7 @@ pub(crate) fn read(
     }
     let layout = layout::Layout::find(&parsed).map_err(|reason| bad(path, reason))?;
     layout.check_size(left).map_err(|reason| bad(path, reason))?;
-    let body = rest(path, source, left)?;
+    let body = read_remaining(path, source, left)?;
     let (gaussians, ignored) = body::decode(&layout, &body, bad_rows).map_err(|reason| bad(path, reason))?;
     let ply = Ply {
         header,

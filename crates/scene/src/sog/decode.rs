@@ -3,7 +3,7 @@ use super::codebook::Codebook;
 use super::palette::Palette;
 use super::picture::Picture;
 use crate::gaussians::Sh;
-use crate::ignored::Sieve;
+use crate::ignored::RowFilter;
 use std::f64::consts::SQRT_2;
 
 /// The first three values of the alpha of rotations are no component's.
@@ -30,7 +30,7 @@ pub(super) fn positions(lower: &Picture, upper: &Picture, ranges: &[(f64, f64); 
 }
 
 /// Quaternions: alpha says which component was the largest, the others are in red, green and blue.
-pub(super) fn rotations(picture: &Picture, count: usize, sieve: &mut Sieve) -> Result<Vec<[f32; 4]>, String> {
+pub(super) fn rotations(picture: &Picture, count: usize, sieve: &mut RowFilter) -> Result<Vec<[f32; 4]>, String> {
     let rotation = |row| {
         let texel = picture.texel(row);
         let Some(largest) = texel[3].checked_sub(FIRST_COMPONENT) else {
@@ -58,7 +58,7 @@ pub(super) fn log_scales(
     picture: &Picture,
     tables: &[Codebook; 3],
     count: usize,
-    sieve: &mut Sieve,
+    sieve: &mut RowFilter,
 ) -> Result<Vec<[f32; 3]>, String> {
     (0..count)
         .map(|row| look_up(picture.texel(row), tables, "scales", row, sieve))
@@ -76,7 +76,7 @@ pub(super) fn sh(
     tables: &[Codebook; 3],
     palette: Option<&Palette>,
     count: usize,
-    sieve: &mut Sieve,
+    sieve: &mut RowFilter,
 ) -> Result<Sh, String> {
     let mut sh = Sh {
         degree: palette.map_or(0, Palette::degree),
@@ -99,7 +99,7 @@ fn look_up(
     tables: &[Codebook; 3],
     name: &str,
     row: usize,
-    sieve: &mut Sieve,
+    sieve: &mut RowFilter,
 ) -> Result<[f32; 3], String> {
     let values = std::array::from_fn(|i| tables[i].value(texel[i]));
     match values.iter().position(|value: &f32| value.is_nan()) {

@@ -14,7 +14,7 @@ pub(crate) mod picture;
 
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
-use crate::ignored::{BadRows, Ignored, Sieve};
+use crate::ignored::{BadRows, Ignored, RowFilter};
 use crate::scene::bad;
 use crate::{Error, Result};
 use archive::Archive;
@@ -85,7 +85,7 @@ fn parse(file: Vec<u8>, bad_rows: BadRows) -> Result<(Gaussians, Sog), String> {
     let mut archive = Archive::open(&file)?;
     let meta = archive.unpack("meta.json", "meta.json", MAX_META, &mut budget)?;
     let meta = meta::parse(&meta).map_err(|reason| format!("meta.json: {reason}"))?;
-    let mut sieve = Sieve::new(bad_rows);
+    let mut sieve = RowFilter::new(bad_rows);
     let mut size = None;
     let mut picture = |role: Role, name: &str, budget: &mut Budget| -> Result<Picture, String> {
         let webp = archive.unpack(name, role.name(), u64::MAX, budget)?;
@@ -161,7 +161,7 @@ impl Container for Sog {
         0
     }
 
-    fn keep(&self, row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, row: usize, coefficients: &mut [f32]) {
         let row = self.ignored.file_row(row);
         let texel = self.colours.texel(row);
         for ((value, byte), table) in coefficients.iter_mut().zip(texel).zip(&self.dc) {

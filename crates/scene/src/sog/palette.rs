@@ -1,7 +1,7 @@
 //! Higher bands: rows of coefficients that Gaussians share, and which row each has.
 use super::meta::Rest;
 use super::picture::Picture;
-use crate::ignored::Sieve;
+use crate::ignored::RowFilter;
 
 /// Rows of the palette side by side in its picture.
 pub(crate) const SIDE_BY_SIDE: usize = 64;
@@ -23,7 +23,7 @@ impl Palette {
         labels: &Picture,
         centroids: &Picture,
         count: usize,
-        sieve: &mut Sieve,
+        sieve: &mut RowFilter,
     ) -> Result<Option<Palette>, String> {
         let (bands, rows) = layout(rest, centroids)?;
         let stored = coefficients(bands);

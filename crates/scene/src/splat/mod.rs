@@ -8,7 +8,7 @@ use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::ply::fields::Rows;
 use crate::range::{Range, logit};
-use crate::rest::rest;
+use crate::remaining::read_remaining;
 use crate::scene::{UNKNOWN, bad};
 use crate::summary::Summary;
 use std::io::{self, BufReader, Read, Write};
@@ -44,7 +44,7 @@ pub(crate) fn read(
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
     let refused = |reason| bad(path, format!("{}{reason}", UNKNOWN));
     check_size(size).map_err(refused)?;
-    let body = rest(path, source, size)?;
+    let body = read_remaining(path, source, size)?;
     // Again, since a file can shrink between the look at its size and the read.
     check_size(body.len() as u64).map_err(refused)?;
     let (gaussians, ignored) = decode(&body, bad_rows).map_err(refused)?;
@@ -172,7 +172,7 @@ impl Container for Splat {
         false
     }
 
-    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
+    fn quantize_colors(&self, _row: usize, coefficients: &mut [f32]) {
         for value in coefficients {
             *value = Range::UNIT.coefficient(Range::UNIT.nearest(*value));
         }

@@ -72,7 +72,7 @@ fn a_write_changes_colours_and_nothing_else() {
     expected[32 + 25] = 163;
     assert!(written(&scene, &sh) == expected);
     let mut row = sh.coefficients[3..].to_vec();
-    scene.keep(1, &mut row);
+    scene.quantize_colors(1, &mut row);
     assert_eq!(row, read(&expected).unwrap().gaussians.sh.coefficients[3..]);
 }
 
@@ -163,7 +163,7 @@ fn a_real_file_is_what_other_tools_find_in_it() {
     own.coefficients
         .chunks_exact_mut(3)
         .enumerate()
-        .for_each(|(i, colour)| scene.keep(i, colour));
+        .for_each(|(i, colour)| scene.quantize_colors(i, colour));
     assert_eq!(own, g.sh);
 }
 
@@ -180,7 +180,7 @@ proptest! {
         let out = written(&scene, &sh);
         let again = read(&out).unwrap().gaussians;
         for _twice in 0..2 {
-            sh.coefficients.chunks_exact_mut(3).enumerate().for_each(|(i, colour)| scene.keep(i, colour));
+            sh.coefficients.chunks_exact_mut(3).enumerate().for_each(|(i, colour)| scene.quantize_colors(i, colour));
             let bits = |sh: &Sh| sh.coefficients.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             prop_assert_eq!(bits(&sh), bits(&again.sh));
         }

@@ -34,7 +34,7 @@ fn harmonic_byte(value: f32) -> u8 {
 }
 
 /// Replaces the coefficients of one Gaussian by those that bytes stand for.
-pub(super) fn keep(coefficients: &mut [f32]) {
+pub(super) fn quantize_colors(coefficients: &mut [f32]) {
     for (i, value) in coefficients.iter_mut().enumerate() {
         *value = if i < 3 {
             constant(constant_byte(*value))

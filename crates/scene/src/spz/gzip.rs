@@ -132,8 +132,8 @@ impl Container for Gzip {
         false
     }
 
-    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
-        colour::keep(coefficients);
+    fn quantize_colors(&self, _row: usize, coefficients: &mut [f32]) {
+        colour::quantize_colors(coefficients);
     }
 
     fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {

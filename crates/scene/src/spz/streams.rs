@@ -4,7 +4,7 @@ use super::{attributes, colour, limits};
 use crate::Result;
 use crate::container::{Container, Format};
 use crate::gaussians::{Gaussians, Sh};
-use crate::rest::rest;
+use crate::remaining::read_remaining;
 use crate::scene::bad;
 use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
@@ -47,7 +47,7 @@ pub(super) fn read(
     source: &mut BufReader<impl Read>,
     size: u64,
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
-    let file = rest(path, source, size)?;
+    let file = read_remaining(path, source, size)?;
     let (gaussians, streams) = parse(file).map_err(|reason| bad(path, reason))?;
     Ok((gaussians, Arc::new(streams)))
 }
@@ -174,8 +174,8 @@ impl Container for Streams {
         false
     }
 
-    fn keep(&self, _row: usize, coefficients: &mut [f32]) {
-        colour::keep(coefficients);
+    fn quantize_colors(&self, _row: usize, coefficients: &mut [f32]) {
+        colour::quantize_colors(coefficients);
     }
 
     fn write(&self, sh: &Sh, out: &mut dyn Write) -> io::Result<()> {

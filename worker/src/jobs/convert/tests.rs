@@ -1,5 +1,5 @@
 //! What the API says is what the engine does.
-use guardsplat_engine::embed::{Progress, Step, Terms};
+use guardsplat_engine::embed::{LossTerms, Progress, Step};
 use guardsplat_engine::extract::Reading;
 use guardsplat_engine::message::Message;
 
@@ -96,7 +96,7 @@ fn progress_leaves_out_what_is_no_number() {
             total: 200,
             bit_accuracy: 0.75,
             psnr_db,
-            terms: Terms::default(),
+            terms: LossTerms::default(),
             balance: 1.0,
         }))
         .unwrap()
@@ -108,7 +108,7 @@ fn progress_leaves_out_what_is_no_number() {
     let reading = embedding_progress(&Progress::Verifying { done: 2, total: 20 }).unwrap();
     assert_eq!((reading.stage(), reading.done, reading.total), (Stage::Reading, 2, 20));
     assert_eq!(embedding_progress(&Progress::Writing), None);
-    let training = key_progress(NewKey::Decoder(Training::Training(64, 1152)));
+    let training = key_progress(KeyProgress::Decoder(Training::Training(64, 1152)));
     assert_eq!((training.stage(), training.done), (Stage::Optimising, 64));
 }
 
@@ -117,7 +117,7 @@ fn findings_keep_their_figures() {
     let reading = Reading::new(vec![vec![2.0; 32], vec![-1.0; 32]]).unwrap();
     let message = Message::parse("ffffffff", 32).unwrap();
     let comparison = reading.compare(&message).unwrap();
-    let found = verify_result(Findings::new(&reading, Some(&comparison), &[]).unwrap());
+    let found = verify_result(VerificationReport::new(&reading, Some(&comparison), &[]).unwrap());
     assert_eq!(found.verdict(), ApiVerdict::Match);
     assert_eq!((found.matched_bits, found.bits, found.views), (Some(32), 32, 2));
     assert_eq!(
@@ -125,7 +125,7 @@ fn findings_keep_their_figures() {
         (Some(0.5), Some(0.0))
     );
     assert!(found.p_value.unwrap() <= found.threshold.unwrap() && found.reason.is_empty());
-    let alone = verify_result(Findings::new(&reading, None, &[]).unwrap());
+    let alone = verify_result(VerificationReport::new(&reading, None, &[]).unwrap());
     assert_eq!((alone.verdict(), alone.p_value), (ApiVerdict::Inconclusive, None));
     assert_eq!(alone.message, "ffffffff");
     assert!(

@@ -5,7 +5,7 @@ use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{KeySpec, VerifySpec};
 
 use super::*;
-use crate::jobs::signals;
+use crate::jobs::shutdown;
 use guardsplat_engine::device::DeviceChoice;
 
 #[allow(dead_code)] // the other tests use the rest
@@ -22,10 +22,10 @@ async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
             ..Target::default()
         })
         .unwrap(),
-        leaving: signals::listen(false).unwrap(),
-        folder: Folder::new(folder).unwrap(),
+        leaving: shutdown::listen(false).unwrap(),
+        folder: WorkDirectory::new(folder).unwrap(),
         accelerator,
-        offer: Offer::new("test".into(), "cpu", None),
+        capabilities: WorkerCapabilities::new("test".into(), "cpu", None),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::report::record::Detection;
 use crate::report::selection::Selection;
 use crate::report::table::{Cell, Row, Table};
 use crate::statistics::Roc;
-use crate::steganalysis::Judge;
+use crate::steganalysis::Steganalyzer;
 
 /// Corners of the ROC curve: shares of clean and of marked scores at or above each threshold, from the highest down.
 /// Equal scores share a corner, and corners in the middle of a straight step are left out.
@@ -85,7 +85,7 @@ struct Told<'a> {
     detection: &'a Detection,
 }
 
-/// Of each detector and length the detection of most marks, then of most pictures; in the order of [`Judge::ALL`], others
+/// Of each detector and length the detection of most marks, then of most pictures; in the order of [`Steganalyzer::ALL`], others
 /// after those. Controls or marks.
 fn told<'a>(selection: &Selection<'a>, controls: bool) -> Vec<Told<'a>> {
     let mut told: Vec<Told<'a>> = Vec::new();
@@ -111,7 +111,7 @@ fn told<'a>(selection: &Selection<'a>, controls: bool) -> Vec<Told<'a>> {
             None => told.push(one),
         }
     }
-    let place = |name: &str| Judge::ALL.iter().position(|judge| judge.to_string() == name);
+    let place = |name: &str| Steganalyzer::ALL.iter().position(|judge| judge.to_string() == name);
     told.sort_by_key(|one| (one.bits, place(one.name).unwrap_or(usize::MAX)));
     told
 }
@@ -154,11 +154,11 @@ fn section(report: &mut Report, told: &[Told<'_>], prefix: &str, title: String, 
         .iter()
         .map(|one| row(one.name, one.bits, one.detection))
         .collect::<Result<Vec<_>>>()?;
-    for judge in Judge::ALL.map(|judge| judge.to_string()) {
+    for judge in Steganalyzer::ALL.map(|judge| judge.to_string()) {
         if told.iter().any(|one| one.name == judge) {
             continue;
         }
-        let why = if judge == Judge::Learned.to_string() && !told.is_empty() {
+        let why = if judge == Steganalyzer::Learned.to_string() && !told.is_empty() {
             "; it judges scenes by others, so it needs marks of two, and eight pairs of pictures"
         } else {
             ""

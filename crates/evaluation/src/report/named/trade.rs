@@ -3,7 +3,7 @@ use super::{Plot, Report};
 use crate::error::Result;
 use crate::report::interval;
 use crate::report::names::{NONE, TRADE};
-use crate::report::plot::{Axes, Compromise, trade};
+use crate::report::plot::{Axes, TradeOff, trade};
 use crate::report::record::Timing;
 use crate::report::selection::{Run, Selection};
 use crate::report::summary::Summary;
@@ -106,7 +106,7 @@ pub(super) fn fill(report: &mut Report, selection: &Selection<'_>) -> Result<()>
             .tables
             .push(table(title.clone(), rows.collect(), notes(&lines), name));
         let dot = |line: &Line<'_>| {
-            Some(Compromise {
+            Some(TradeOff {
                 label: line.name.into(),
                 named: NAMED.contains(&line.name),
                 x: line.seconds()?,
@@ -115,7 +115,7 @@ pub(super) fn fill(report: &mut Report, selection: &Selection<'_>) -> Result<()>
                 on_front: front.contains(line.name),
             })
         };
-        let dots: Vec<Compromise> = lines.iter().filter_map(dot).collect();
+        let dots: Vec<TradeOff> = lines.iter().filter_map(dot).collect();
         let axes = Axes {
             title: &format!("{} bits, {}", place.bits, place.device),
             x: "seconds of an embedding",

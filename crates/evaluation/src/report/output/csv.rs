@@ -1,5 +1,5 @@
 //! Readings as CSV in long form: one row a reading, with all that is known of its mark.
-use super::whole::write_whole;
+use super::atomic_write::write_whole;
 use crate::error::{Error, Result};
 use crate::report::selection::{Run, Selection};
 use std::collections::BTreeSet;

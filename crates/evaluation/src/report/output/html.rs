@@ -1,6 +1,6 @@
 //! Reports as one page that needs nothing else: tables, plots and pictures, on screens of any size and on paper.
+use super::atomic_write::write_whole;
 use super::picture::inlined;
-use super::whole::write_whole;
 use crate::error::Result;
 use crate::report::named::{Picture, Plot, Report};
 use crate::report::table::{Cell, Row, Table};

@@ -1,5 +1,5 @@
 //! Reports as JSON: every number of every table, to the last digit.
-use super::whole::write_whole;
+use super::atomic_write::write_whole;
 use crate::error::{Error, Result};
 use crate::report::named::Report;
 use std::path::Path;

@@ -1,5 +1,5 @@
 //! Parts of documents that are made from records: what stands between `<!-- BEGIN name -->` and `<!-- END name -->`.
-use super::whole::write_whole;
+use super::atomic_write::write_whole;
 use crate::error::{Error, Result};
 use std::path::Path;
 

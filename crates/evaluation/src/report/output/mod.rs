@@ -1,5 +1,6 @@
 //! Reports as files: JSON and CSV for programs, HTML for people, Markdown for documents. The same records give the same
 //! bytes.
+mod atomic_write;
 mod csv;
 mod html;
 mod json;
@@ -7,7 +8,6 @@ mod markdown;
 mod markers;
 mod picture;
 mod svg;
-mod whole;
 
 pub use csv::{to_csv, write_csv};
 pub use html::{to_html, write_html};

@@ -1,5 +1,5 @@
 //! Plots as a file of their own, which a README can show on light and dark pages.
-use super::whole::write_whole;
+use super::atomic_write::write_whole;
 use crate::error::Result;
 use crate::report::named::Plot;
 use std::fmt::Write;

@@ -8,7 +8,7 @@ mod trade;
 pub use bars::{Bar, bars};
 pub use lines::{Line, Point, lines};
 pub use scatter::{Dot, front, scatter};
-pub use trade::{Compromise, trade};
+pub use trade::{TradeOff, trade};
 
 /// What a plot's axes are called.
 #[derive(Debug, Clone, Copy)]

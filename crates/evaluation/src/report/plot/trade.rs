@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// A dot of the plot.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Compromise {
+pub struct TradeOff {
     /// What it is of.
     pub label: String,
     /// Whether its label must be there; that of others is where there is room.
@@ -37,8 +37,8 @@ const SIZES: [u32; 2] = [14, 12];
 ///
 /// # Errors
 /// [`crate::Error::Codec`] if plotters cannot draw it.
-pub fn trade(names: Axes<'_>, shade_name: &str, dots: &[Compromise]) -> Result<String> {
-    let drawn: Vec<&Compromise> = dots.iter().filter(|dot| drawable(dot)).collect();
+pub fn trade(names: Axes<'_>, shade_name: &str, dots: &[TradeOff]) -> Result<String> {
+    let drawn: Vec<&TradeOff> = dots.iter().filter(|dot| drawable(dot)).collect();
     let x = range(drawn.iter().map(|dot| dot.x.log10()));
     let y = range(drawn.iter().map(|dot| dot.y));
     let shades = || {
@@ -92,7 +92,7 @@ pub fn trade(names: Axes<'_>, shade_name: &str, dots: &[Compromise]) -> Result<S
     })
 }
 
-fn drawable(dot: &Compromise) -> bool {
+fn drawable(dot: &TradeOff) -> bool {
     dot.x.is_finite() && dot.x > 0.0 && dot.y.is_finite()
 }
 
@@ -121,7 +121,7 @@ impl Patch {
 }
 
 /// Names of dots beside them, those that must be there first.
-fn labels(area: &Area<'_>, chart: &Chart<'_, '_>, drawn: &[&Compromise], taken: &mut Vec<Patch>) -> Result<()> {
+fn labels(area: &Area<'_>, chart: &Chart<'_, '_>, drawn: &[&TradeOff], taken: &mut Vec<Patch>) -> Result<()> {
     for (must, size) in [true, false].into_iter().zip(SIZES) {
         for dot in drawn.iter().filter(|dot| dot.named == must) {
             let (x, y) = chart.backend_coord(&(dot.x.log10(), dot.y));
@@ -215,8 +215,8 @@ fn log_ticks(range: &Range<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn dot(label: &str, x: f64, y: f64) -> Compromise {
-        Compromise {
+    fn dot(label: &str, x: f64, y: f64) -> TradeOff {
+        TradeOff {
             label: label.into(),
             named: label == "draft",
             x,

@@ -60,7 +60,7 @@ fn written_files_can_be_marked() {
             for (place, value) in colour[..learnable].iter_mut().enumerate() {
                 *value += if (row + place) % 2 == 0 { 0.05 } else { -0.05 };
             }
-            scene.keep(row, colour);
+            scene.quantize_colors(row, colour);
         }
         assert_ne!(sh, scene.gaussians.sh);
         let mut bytes = Vec::new();

@@ -187,7 +187,8 @@ fn written(scene: &Scene, sh: &Sh) -> Vec<u8> {
 fn kept(scene: &Scene, sh: &Sh) -> Sh {
     let mut kept = sh.clone();
     let rows = kept.coefficients.chunks_exact_mut(sh.per_gaussian());
-    rows.enumerate().for_each(|(row, colour)| scene.keep(row, colour));
+    rows.enumerate()
+        .for_each(|(row, colour)| scene.quantize_colors(row, colour));
     kept
 }
 

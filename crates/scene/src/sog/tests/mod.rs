@@ -208,7 +208,7 @@ fn changed(scene: &Scene, mut change: impl FnMut(usize, f32) -> f32) -> Sh {
         for (channel, value) in colour[..3].iter_mut().enumerate() {
             *value = change(3 * row + channel, *value);
         }
-        scene.keep(row, colour);
+        scene.quantize_colors(row, colour);
     }
     sh
 }

@@ -185,12 +185,12 @@ proptest! {
         for row in 0..7 {
             let colour = &mut sh.coefficients[row * per_gaussian..][..per_gaussian];
             let own = bits(colour);
-            scene.keep(row, colour);
+            scene.quantize_colors(row, colour);
             prop_assert_eq!(&own, &bits(colour), "the file's own");
             colour.copy_from_slice(&colours[27 * row..][..per_gaussian]);
-            scene.keep(row, colour);
+            scene.quantize_colors(row, colour);
             let kept = bits(colour);
-            scene.keep(row, colour);
+            scene.quantize_colors(row, colour);
             prop_assert_eq!(kept, bits(colour), "again");
         }
         let again = read(&written(&scene, &sh)).unwrap().gaussians;
@@ -204,7 +204,7 @@ proptest! {
         let out = read(&written(&scene, &raw)).unwrap().gaussians.sh;
         for row in 0..7 {
             let mut colour = raw.coefficients[row * per_gaussian..][..per_gaussian].to_vec();
-            scene.keep(row, &mut colour);
+            scene.quantize_colors(row, &mut colour);
             prop_assert_eq!(bits(&colour), bits(&out.coefficients[row * per_gaussian..][..per_gaussian]));
         }
     }

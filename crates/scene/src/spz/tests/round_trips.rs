@@ -30,7 +30,7 @@ proptest! {
         let bytes = written(&scene, &sh);
         let mut kept = sh.clone();
         for (row, coefficients) in kept.coefficients.chunks_exact_mut(k).enumerate() {
-            scene.keep(row, coefficients);
+            scene.quantize_colors(row, coefficients);
         }
         // Zeros may have emptied the highest bands.
         let mut expected = kept.clone();
@@ -44,7 +44,7 @@ proptest! {
         // What is kept stays, and is the nearest of what can be kept.
         let once = bits(&kept);
         for (row, coefficients) in kept.coefficients.chunks_exact_mut(k).enumerate() {
-            scene.keep(row, coefficients);
+            scene.quantize_colors(row, coefficients);
         }
         prop_assert_eq!(bits(&kept), once);
         for (i, (given, kept)) in sh.coefficients.iter().zip(&kept.coefficients).enumerate() {
@@ -69,7 +69,7 @@ fn every_byte_of_colour_stays_as_it_is() {
         let scene = file.read().unwrap();
         let mut kept = scene.gaussians.sh.clone();
         for (row, coefficients) in kept.coefficients.chunks_exact_mut(12).enumerate() {
-            scene.keep(row, coefficients);
+            scene.quantize_colors(row, coefficients);
         }
         assert_eq!(kept, scene.gaussians.sh);
         assert_eq!(plain(&written(&scene, &kept)), plain(&file.bytes()));

@@ -1,0 +1,135 @@
+//! Random Fourier feature encoder: which colours a picture has, at several scales, wherever they stand in it.
+//!
+//! The picture at several scales passes a layer of filters of one pixel; the response y of filter i becomes
+//! sin(y + phase_i) and is averaged over the whole picture, and a linear head turns the averages into the feature. The
+//! averages are random Fourier features (Rahimi and Recht 2007) of the distribution of colours, its characteristic
+//! function at random frequencies. The frequencies are so high that natural colours turn the sine many times: the
+//! average over many pixels then varies little from view to view, while a small change of a surface's colour moves it
+//! alike from wherever it is seen. (Quantisation index modulation, Chen and Wornell 2001, rejects the interference of
+//! its host in the same way.) The sine is a whole number of half turns at black and at white, so that a ground of
+//! either adds nothing, and a feature's direction does not depend on how much of the picture a scene fills.
+use super::config::VisionConfig;
+use super::params::param;
+use super::sines::mean_sines;
+use super::weights::set;
+use burn::module::{Module, Param};
+use burn::nn::{Linear, LinearConfig};
+use burn::tensor::module::avg_pool2d;
+use burn::tensor::ops::AvgPoolOptions;
+use burn::tensor::{Device, Tensor};
+use std::ops::Range;
+
+/// Image tower of averaged random Fourier features; configurations call it `statistics`.
+#[derive(Module, Debug)]
+pub struct RandomFourierEncoder {
+    scales: Vec<Scale>,
+    proj: Linear,
+}
+
+/// The filters of one scale.
+#[derive(Module, Debug)]
+struct Scale {
+    /// `[filters, 3, kernel, kernel]`.
+    weight: Param<Tensor<4>>,
+    /// Phases `[filters]`, added before the sine.
+    bias: Param<Tensor<1>>,
+    /// Side of the square that is averaged into one pixel of this scale.
+    size: usize,
+    /// Side of the square whose mean is subtracted from a pixel.
+    surround: usize,
+}
+
+impl RandomFourierEncoder {
+    /// Lays out the tower; `embed_dim` is the width of its features.
+    pub fn new(
+        vision: &VisionConfig,
+        scales: &[usize],
+        kernel: usize,
+        surround: usize,
+        embed_dim: usize,
+        device: &Device,
+    ) -> Self {
+        let filters = vision.width;
+        let scale = |&size: &usize| Scale {
+            weight: param([filters, 3, kernel, kernel], device),
+            bias: param([filters], device),
+            size,
+            surround,
+        };
+        Self {
+            scales: scales.iter().map(scale).collect(),
+            proj: LinearConfig::new(filters * scales.len(), embed_dim).init(device),
+        }
+    }
+
+    /// Average responses `[batch, scales * filters]` of normalised pictures `[batch, 3, h, w]`.
+    pub fn statistics(&self, pictures: &Tensor<4>) -> Tensor<2> {
+        let of_scale = |scale: &Scale| scale.statistics(pictures.clone());
+        Tensor::cat(self.scales.iter().map(of_scale).collect(), 1)
+    }
+
+    /// Average responses `[batch, filters.len()]` of some filters of one scale.
+    pub fn statistics_of(&self, scale: usize, filters: Range<usize>, pictures: &Tensor<4>) -> Tensor<2> {
+        let scale = &self.scales[scale];
+        let weight = scale.weight.val().slice([filters.clone()]);
+        let phases = scale.bias.val().slice([filters]);
+        scale.of(weight, phases, pictures.clone())
+    }
+
+    /// Numbers of filters of each scale.
+    pub fn counts(&self) -> impl Iterator<Item = usize> {
+        self.scales.iter().map(|scale| scale.bias.shape().num_elements())
+    }
+
+    /// Features `[batch, embed_dim]` of normalised pictures.
+    pub fn forward(&self, pictures: &Tensor<4>) -> Tensor<2> {
+        self.proj.forward(self.statistics(pictures))
+    }
+
+    /// Filters `[scales][filters][3][kernel][kernel]` and phases `[scales][filters]`.
+    pub fn with_filters(mut self, weights: &[f32], phases: &[f32]) -> Self {
+        let count = self.scales.len().max(1);
+        let weights = weights.chunks_exact(weights.len() / count);
+        let phases = phases.chunks_exact(phases.len() / count);
+        let fill = |(scale, (weights, phases)): (Scale, (&[f32], &[f32]))| Scale {
+            weight: set(scale.weight, weights.to_vec()),
+            bias: set(scale.bias, phases.to_vec()),
+            size: scale.size,
+            surround: scale.surround,
+        };
+        self.scales = self.scales.into_iter().zip(weights.zip(phases)).map(fill).collect();
+        self
+    }
+
+    /// The linear head: `matrix` is `[scales * filters][embed_dim]`, `bias` is `[embed_dim]`.
+    pub fn with_head(mut self, matrix: Vec<f32>, bias: Vec<f32>) -> Self {
+        self.proj.weight = set(self.proj.weight, matrix);
+        self.proj.bias = self.proj.bias.map(|b| set(b, bias));
+        self
+    }
+}
+
+impl Scale {
+    fn statistics(&self, pictures: Tensor<4>) -> Tensor<2> {
+        self.of(self.weight.val(), self.bias.val(), pictures)
+    }
+
+    fn of(&self, weight: Tensor<4>, phases: Tensor<1>, pictures: Tensor<4>) -> Tensor<2> {
+        let x = match self.size {
+            1 => pictures,
+            n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
+        };
+        let x = match self.surround {
+            1 => x,
+            n => {
+                let inside = AvgPoolOptions::new([n; 2])
+                    .with_stride([1; 2])
+                    .with_padding([n / 2; 2])
+                    .with_count_include_pad(false);
+                x.clone() - avg_pool2d(x, inside)
+            }
+        };
+        let filters = weight.reshape([-1, 3]); // the kernel is one pixel
+        mean_sines(x, filters, phases)
+    }
+}

@@ -1,0 +1,81 @@
+//! Looks at held-out views during an embedding, and decides when the margin is enough.
+use super::progress::Check;
+use super::settings::{EarlyStop, Settings};
+use super::view_pool::PooledView;
+use crate::error::Result;
+use crate::extract::{Engine, Reading, default_size};
+use crate::message::Message;
+use crate::picture::Picture;
+use crate::quality::{Psnr, mean_psnr, psnr};
+use crate::scene::Gaussians;
+use crate::splat::{Changes, sh};
+use crate::view::{Split, ViewSampler};
+
+/// Held-out views, prepared once, and how many checks in a row were passed.
+pub(super) struct EarlyStopping {
+    stop: EarlyStop,
+    views: Vec<PooledView>,
+    passed: usize,
+}
+
+impl EarlyStopping {
+    /// Prepares the views that follow those of the verification, so that no report is made on views that a decision
+    /// was taken on.
+    pub fn new(
+        engine: &Engine,
+        gaussians: &Gaussians,
+        sampler: &ViewSampler,
+        settings: &Settings,
+        stop: EarlyStop,
+    ) -> Result<Self> {
+        let first = settings.verify.views as u64;
+        let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
+        let indices: Vec<u64> = (first..first + stop.views as u64).collect();
+        let views = engine.each(&indices, |&index| {
+            let camera = sampler.camera(Split::HeldOut, index, size);
+            let mut view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?;
+            view.reference = view.reference.to_8_bit();
+            Ok(view)
+        })?;
+        Ok(Self { stop, views, passed: 0 })
+    }
+
+    /// Whether this step is one to look after.
+    pub fn due(&self, step: usize) -> bool {
+        step.is_multiple_of(self.stop.every)
+    }
+
+    /// Reads the views as they are with `changes`; the second value says whether to stop.
+    pub fn check(
+        &mut self,
+        engine: &Engine,
+        gaussians: &Gaussians,
+        changes: Changes<'_>,
+        message: &Message,
+        step: usize,
+    ) -> Result<(Check, bool)> {
+        let pictures: Vec<Picture> = engine.each(&self.views, |v| {
+            let colours = sh::colours(&gaussians.sh, Some(changes), &v.view);
+            Ok(v.draw(engine, &colours)?.to_8_bit())
+        })?;
+        let psnrs = self
+            .views
+            .iter()
+            .zip(&pictures)
+            .map(|(view, picture)| psnr(&view.reference, picture))
+            .collect::<Result<Vec<Psnr>>>()?;
+        let reading = Reading::new(engine.read_logits(&pictures)?)?;
+        let check = Check {
+            step,
+            bit_accuracy: reading.compare(message)?.bit_accuracy,
+            psnr_db: mean_psnr(&psnrs)?.psnr_db.unwrap_or(f64::INFINITY),
+            margin: reading.margin(message),
+        };
+        let stop = &self.stop;
+        let holds =
+            check.bit_accuracy >= stop.bit_accuracy && check.margin >= stop.margin && check.psnr_db >= stop.psnr_db;
+        self.passed = if holds { self.passed + 1 } else { 0 };
+        let enough = self.passed >= stop.patience && step >= stop.min_steps;
+        Ok((check, enough))
+    }
+}

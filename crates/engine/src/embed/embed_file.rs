@@ -1,0 +1,266 @@
+//! Embedding from file to file: the marked scene is written aside, read back and verified before it gets its name.
+use std::path::Path;
+
+use tempfile::TempPath;
+
+use super::learned_offsets::LearnedOffsets;
+use super::optimise::optimise;
+use super::progress::Progress;
+use super::resources::{measure_view, model_bytes, predict_memory};
+use super::settings::Settings;
+use super::verify::{Verification, verify};
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+use crate::memory::{MemoryRequirements, SceneSize, admission};
+use crate::message::Message;
+use crate::scene::{BadRows, Format, Gaussians, Ignored, Scene};
+
+/// Times that a mark is made weaker where held-out views show it more than they may. Once is enough where the file keeps
+/// changes as they are; where it rounds them, what is left is not as much less as was asked for.
+const WEAKENED: usize = 2;
+
+/// What to embed where.
+pub struct Job<'a> {
+    /// The scene file to mark.
+    pub input: &'a Path,
+    /// Where the marked scene goes, in the format of the input; a file there is replaced.
+    pub output: &'a Path,
+    /// The message, of the key's length.
+    pub message: &'a Message,
+    /// How.
+    pub settings: &'a Settings,
+    /// Writes a scene that misses its target all the same.
+    pub force: bool,
+    /// What becomes of rows with values that are not legal; ignored ones are in the output as they were.
+    pub bad_rows: BadRows,
+}
+
+/// What became of a job.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What the verification of the file found.
+    pub verification: Verification,
+    /// What misses the target, in words.
+    pub missed: Vec<String>,
+    /// Whether the output was written.
+    pub written: bool,
+    /// The format of input and output.
+    pub format: Format,
+    /// Steps taken.
+    pub steps: usize,
+    /// Views drawn in all steps.
+    pub view_steps: usize,
+    /// MemoryRequirements that was predicted.
+    pub memory: MemoryRequirements,
+    /// Gaussians of the scene.
+    pub gaussians: usize,
+    /// Rows of the file that are none, where some were ignored.
+    pub ignored: Option<Ignored>,
+    /// Gaussians that training views show; the others were left alone.
+    pub seen: usize,
+    /// Training views that it took to find them.
+    pub covering_views: usize,
+    /// Gaussians whose colours changed.
+    pub changed: usize,
+}
+
+/// Marks a scene file. A result that misses its target is not written, unless the job forces it.
+///
+/// # Errors
+/// Whatever reading, optimising, verifying and writing may fail with, [`Error::Stopped`] when the engine is asked to
+/// stop; the output is then as it was before.
+pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
+    job.settings.check()?;
+    let settings = job.settings;
+    let stop = &engine.stop;
+    stop.check()?;
+    let rest = MemoryRequirements {
+        models: model_bytes(engine, settings).learning,
+        ..MemoryRequirements::of_program()
+    };
+    admission::admit_marking(job.input, &engine.limits, rest)?;
+    let scene = Scene::read_with(job.input, job.bad_rows)?;
+    stop.check()?;
+    let memory = admit(engine, &scene, settings)?;
+    let aside = reserve(job, &scene)?;
+    progress(Progress::Admitted(memory));
+    let mut optimised = optimise(engine, &scene, job.message, settings, progress)?;
+    let (mut verification, mut missed);
+    let mut weakened = 0;
+    loop {
+        stop.check()?;
+        progress(Progress::Writing);
+        let marked = write(job, &scene, &optimised.learned, &aside)?;
+        let total = settings.verify.views;
+        verification = verify(engine, &scene.gaussians, &marked, job.message, settings, |done| {
+            progress(Progress::Verifying { done, total })
+        })?;
+        missed = settings.target.missed(&verification);
+        match settings.target.weaken(&verification) {
+            Some(factor) if weakened < WEAKENED => optimised.learned.scale(factor, &scene),
+            _ => break,
+        }
+        weakened += 1;
+    }
+    let written = missed.is_empty() || job.force;
+    if written {
+        aside.persist(job.output).map_err(|e| Error::io(job.output)(e.error))?;
+    }
+    Ok(Outcome {
+        verification,
+        missed,
+        written,
+        format: scene.format(),
+        steps: optimised.steps,
+        view_steps: optimised.view_steps,
+        gaussians: scene.gaussians.len(),
+        ignored: scene.ignored().cloned(),
+        memory,
+        seen: optimised.learned.learnable.rows().len(),
+        covering_views: optimised.covering_views,
+        changed: optimised.learned.changed(&scene.gaussians.sh),
+    })
+}
+
+/// Writes the scene with what was learned to the file aside, and reads back what it shows.
+fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Path) -> Result<Gaussians> {
+    let colours = learned.colours(&scene.gaussians.sh);
+    // The new file is complete before it replaces the reserved one, so free that one's space first.
+    std::fs::write(aside, []).map_err(Error::io(job.output))?;
+    scene.write(aside, &colours).map_err(|e| named(e, job.output))?;
+    drop(colours);
+    // The rows that were bad are so in the marked file too, and no others may be.
+    let marked = Scene::read_with(aside, job.bad_rows).map_err(|e| named(e, job.output))?;
+    check_geometry(job.output, scene, &marked)?;
+    Ok(marked.into_gaussians())
+}
+
+/// Predicts what memory the job will need, and refuses one that does not fit.
+fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<MemoryRequirements> {
+    let view = measure_view(engine, &scene.gaussians, settings)?;
+    let memory = predict_memory(SceneSize::of(scene), view, settings, model_bytes(engine, settings));
+    engine.limits.admit(&memory)?;
+    Ok(memory)
+}
+
+/// A file beside the output that holds as much as the output will; about as much in formats that are compressed. A
+/// folder that is missing, read-only or full is thereby known before the work, not after it, as is a name that says
+/// another format. It is deleted when dropped.
+fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
+    let suits = scene.format().check_name(job.output);
+    suits.map_err(|reason| Error::BadOption { field: "OUT", reason })?;
+    let refuse = |reason: &str| Err(Error::io(job.output)(std::io::Error::other(reason.to_owned())));
+    match std::fs::metadata(job.output) {
+        Ok(there) if !there.is_file() => return refuse("exists and is not a regular file"),
+        Ok(_) if same_file(job.input, job.output) => {
+            return refuse("is the input; the unmarked scene would be lost");
+        }
+        _ => {}
+    }
+    let folder = match job.output.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let aside = tempfile::Builder::new()
+        .prefix(".guardsplat-")
+        .suffix(".part")
+        .tempfile_in(folder)
+        .map_err(Error::io(job.output))?
+        .into_temp_path();
+    scene
+        .write(&aside, &scene.gaussians.sh)
+        .map_err(|e| named(e, job.output))?;
+    Ok(aside)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// The error of the file aside, told of the output that the user knows.
+fn named(error: impl Into<Error>, output: &Path) -> Error {
+    match error.into() {
+        Error::Io { source, .. } => Error::io(output)(source),
+        Error::BadScene { reason, .. } => Error::BadScene {
+            path: output.into(),
+            reason,
+        },
+        other => other,
+    }
+}
+
+fn check_geometry(output: &Path, scene: &Scene, read_back: &Scene) -> Result<()> {
+    let (original, marked) = (&scene.gaussians, &read_back.gaussians);
+    let same = scene.ignored() == read_back.ignored()
+        && original.positions == marked.positions
+        && original.rotations == marked.rotations
+        && original.log_scales == marked.log_scales
+        && original.opacity_logits == marked.opacity_logits
+        && original.sh.degree >= marked.sh.degree;
+    if same {
+        return Ok(());
+    }
+    Err(Error::BadScene {
+        path: output.into(),
+        reason: "the file reads back with other geometry than was written; the disk may be failing".into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::Preset;
+    use crate::sample::sample;
+
+    #[test]
+    fn places_that_cannot_be_written_are_known_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = sample(10, 0, 1).unwrap();
+        let input = folder.path().join("in.ply");
+        scene.write(&input, &scene.gaussians.sh).unwrap();
+        let message = Message::parse("a", 4).unwrap();
+        let settings = Preset::Draft.settings();
+        let reserve = |output: &Path| {
+            let job = Job {
+                input: &input,
+                output,
+                message: &message,
+                settings: &settings,
+                force: false,
+                bad_rows: BadRows::Refuse,
+            };
+            reserve(&job, &scene)
+        };
+        let reason = |output: &Path| reserve(output).unwrap_err().to_string();
+        assert!(reason(&input).contains("is the input"));
+        assert!(reason(folder.path()).contains("not a regular file"));
+        let other = reason(&folder.path().join("out.spz"));
+        assert!(
+            other.contains("out.spz would pass for SPZ") && other.contains("PLY: name it *.ply"),
+            "{other}"
+        );
+        let missing = folder.path().join("none/out.ply");
+        assert!(reason(&missing).starts_with(missing.to_str().unwrap()));
+        let aside = reserve(&folder.path().join("out.ply")).unwrap();
+        assert_eq!(
+            std::fs::metadata(&aside).unwrap().len(),
+            std::fs::metadata(&input).unwrap().len()
+        );
+        drop(aside);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn other_geometry_is_noticed() {
+        let scene = sample(10, 0, 1).unwrap();
+        let mut marked = scene.clone();
+        marked.gaussians.sh.coefficients[0] += 1.0;
+        let output = Path::new("out.ply");
+        check_geometry(output, &scene, &marked).unwrap();
+        marked.gaussians.positions[3][1] += 1e-3;
+        assert!(check_geometry(output, &scene, &marked).is_err());
+    }
+}

@@ -1,0 +1,197 @@
+//! Augmentation of training views in the picture: the distortions that a mark is to stand.
+//!
+//! People compress pictures of some 800 pixels, and training views have 160: squares of JPEG's eight pixels would be five
+//! times too large there, and every pixel would have the noise of twenty-five. So a view that something is done to is
+//! enlarged first, and CLIP takes it in at its own size as always.
+use burn::tensor::{Int, Tensor, TensorData};
+use guardsplat_distortion::{Draw, Layer};
+use rand_chacha::ChaCha8Rng;
+
+use super::settings::Settings;
+use crate::clip::resize;
+use crate::error::{Error, Result};
+use crate::extract::Engine;
+
+/// What rotated pictures show in their corners.
+pub(super) const CORNERS: [f32; 3] = [1.0; 3];
+
+/// How far a ground may be from black or white.
+const GROUND: f32 = 1e-3;
+
+/// Distorts training views before their messages are read.
+pub(super) struct ImageAugmentation {
+    layer: Layer,
+    /// Side of the pictures that are distorted.
+    side: usize,
+}
+
+impl ImageAugmentation {
+    /// Tones that whoever reads a picture guesses and undoes ([`crate::extract::guesses`]) are left as they are.
+    pub fn new(settings: &Settings, engine: &Engine) -> Self {
+        let mut layer = settings.layer();
+        if engine.extractor.reads_exact_colours() {
+            (layer.ranges.brightness, layer.ranges.contrast) = ([1.0; 2], [1.0; 2]);
+        }
+        Self {
+            layer,
+            side: settings.distorted_size.max(settings.size) as usize,
+        }
+    }
+
+    /// Logits `[b, bits]` of pictures `[b, 3, h, w]`, each as it is or distorted; differentiable.
+    ///
+    /// # Errors
+    /// Draws outside of their limits, which checked settings rule out.
+    pub fn logits(&self, engine: &Engine, pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Result<Tensor<2>> {
+        if self.layer.robust_to.of_pictures().next().is_none() {
+            return engine.logits(pictures);
+        }
+        let draws = self.layer.draw(pictures.dims()[0], rng);
+        let (clean, distorted): (Vec<usize>, Vec<usize>) = (0..draws.len()).partition(|&i| draws[i] == Draw::Clean);
+        let device = pictures.device();
+        let some = |positions: &[usize]| {
+            let positions: Vec<i64> = positions.iter().map(|i| *i as i64).collect();
+            let count = positions.len();
+            let positions = Tensor::<1, Int>::from_data(TensorData::new(positions, [count]), &device);
+            pictures.clone().select(0, positions)
+        };
+        let mut parts = Vec::new();
+        if !clean.is_empty() {
+            parts.push(engine.logits(some(&clean))?);
+        }
+        if !distorted.is_empty() {
+            let chosen: Vec<Draw> = distorted.iter().map(|&i| draws[i].clone()).collect();
+            let large = resize(some(&distorted), self.side, self.side);
+            let done = self.layer.apply_with(&chosen, large.clone(), CORNERS);
+            let done = done.map_err(|e| Error::BadOption {
+                field: "distortions",
+                reason: e.to_string(),
+            })?;
+            parts.push(engine.logits(with_ground(&large, done, &chosen))?);
+        }
+        // Back in order: where each picture's row is among the parts.
+        let mut order = vec![0_i64; draws.len()];
+        for (row, &position) in clean.iter().chain(&distorted).enumerate() {
+            order[position] = row as i64;
+        }
+        let order = Tensor::<1, Int>::from_data(TensorData::new(order, [draws.len()]), &device);
+        Ok(Tensor::cat(parts, 0).select(0, order))
+    }
+}
+
+/// Distorted pictures with the ground that they had, where it is black or white and has not moved: whoever reads a picture
+/// makes its ground white ([`crate::extract::Guess::Ground`]). Noise that is cut at white would shift all of it.
+fn with_ground(before: &Tensor<4>, after: Tensor<4>, draws: &[Draw]) -> Tensor<4> {
+    let [b, _, h, w] = before.dims();
+    let stays = |draw: &Draw| f32::from(matches!(draw, Draw::Noise(_) | Draw::Jpeg(_) | Draw::EightBit));
+    let stays: Vec<f32> = draws.iter().map(stays).collect();
+    let device = before.device();
+    let stays = Tensor::<1>::from_data(TensorData::new(stays, [b]), &device).reshape([b, 1, 1, 1]);
+    let plain = before.clone().detach();
+    let black = plain.clone().max_dim(1).lower_equal_elem(GROUND);
+    let white = plain.clone().min_dim(1).greater_equal_elem(1.0 - GROUND);
+    let ground = black.float() + white.float();
+    let ground = (ground * stays).expand([b, 3, h, w]);
+    after.clone() + (plain - after) * ground
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clip::{Clip, ClipModel, ImageTower, Parts};
+    use crate::device::{DeviceChoice, open};
+    use crate::embed::Preset;
+    use crate::message::key::Secret;
+    use crate::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
+    use crate::train::{TrainOptions, config, filters};
+    use rand::SeedableRng;
+
+    /// A small CLIP of the shipped kind and an untrained decoder of 8 bits.
+    fn engine() -> Engine {
+        let compute = open(DeviceChoice::Cpu).unwrap();
+        let options = TrainOptions {
+            filters: 16,
+            dims: 8,
+            text_width: 64,
+            ..TrainOptions::default()
+        };
+        let config = config(&options);
+        let mut model = ClipModel::init(&config, Parts::Image, &compute.device, 5);
+        if let Some(ImageTower::RandomFourier(tower)) = model.visual {
+            let (weights, phases) = filters(16 * 3, options.norm, options.luma, 1);
+            model.visual = Some(ImageTower::RandomFourier(tower.with_filters(&weights, &phases)));
+        }
+        let nobody = ClipIdentity {
+            name: String::new(),
+            hash: String::new(),
+        };
+        let key = Key {
+            secret: Secret::from_seed(1),
+            bits_per_token: 1,
+            seed: None,
+            clip: nobody,
+            decoding: Decoding::Clip {
+                projection: Projection::identity(8),
+                decoder: DecoderWeights::seeded(8, 8, 1),
+            },
+            accuracy_unseen: None,
+            accuracy_unseen_noisy: None,
+        };
+        Engine::new(compute, Clip::from_model(config, String::new(), model), &key, None).unwrap()
+    }
+
+    #[test]
+    fn noise_leaves_white_and_black_grounds_alone_and_nothing_else() {
+        let device = engine().compute.device;
+        // Left half white, a quarter black, a quarter grey.
+        let level = |i: usize| match i % 8 {
+            0..4 => 1.0,
+            4..6 => 0.0,
+            _ => 0.5,
+        };
+        let values: Vec<f32> = (0..2 * 3 * 64).map(level).collect();
+        let before = Tensor::<4>::from_data(TensorData::new(values.clone(), [2, 3, 8, 8]), &device);
+        let after = before.clone() * 0.9 + 0.02;
+        let noise = Draw::Noise(guardsplat_distortion::Noise { sigma: 0.1, seed: 1 });
+        let kept = with_ground(&before, after.clone(), &[noise, Draw::Blur(1.0)]);
+        let (kept, after) = (
+            kept.try_to_vec_as::<f32>().unwrap(),
+            after.try_to_vec_as::<f32>().unwrap(),
+        );
+        for (i, value) in values.iter().enumerate() {
+            let stays = i < 3 * 64 && *value != 0.5;
+            assert_eq!(kept[i], if stays { *value } else { after[i] }, "{i}");
+        }
+    }
+
+    #[test]
+    fn pictures_keep_their_order_and_those_that_nothing_is_done_to_their_bytes() {
+        let engine = engine();
+        let settings = Settings {
+            robust_to: "jpeg,brightness".parse().unwrap(),
+            distorted_size: 320,
+            ..Preset::Standard.settings()
+        };
+        let shown = ImageAugmentation::new(&settings, &engine);
+        let values: Vec<f32> = (0..6 * 3 * 64 * 64)
+            .map(|i| 0.5 + 0.4 * (i as f32 * 0.013).sin() * (i as f32 * 0.0007).cos())
+            .collect();
+        let pictures = Tensor::<4>::from_data(TensorData::new(values, [6, 3, 64, 64]), &engine.compute.device);
+        let host = |t: Tensor<2>| engine.to_host(t).unwrap();
+        let plain = host(engine.logits(pictures.clone()).unwrap());
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let draws = shown.layer.draw(6, &mut rng.clone());
+        let seen = host(shown.logits(&engine, pictures, &mut rng).unwrap());
+        assert!(draws.contains(&Draw::Clean) && draws.iter().any(|d| matches!(d, Draw::Jpeg(_))));
+        for (row, draw) in draws.iter().enumerate() {
+            let (plain, seen) = (&plain[8 * row..][..8], &seen[8 * row..][..8]);
+            let off = plain.iter().zip(seen).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let size = plain.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
+            match draw {
+                Draw::Clean => assert!(off < 1e-4 * size, "{row}: {off}"),
+                Draw::Brightness(factor) => assert_eq!(*factor, 1.0),
+                _ => assert!(off > 1e-2 * size, "{row}: {off}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! How much memory an embedding will need, by its settings.
+use super::settings::Settings;
+use super::view_pool::PooledView;
+use crate::error::Result;
+use crate::extract::{Engine, cpu_weight_cache};
+use crate::memory::{EmbeddingWorkload, MemoryRequirements, ModelBytes, SceneSize, ViewSize, embedding_requirements};
+use crate::scene::Gaussians;
+use crate::splat::{PreparedView, prepare};
+use crate::view::{Split, ViewSampler};
+
+/// Predicts the most memory that an embedding with these settings has in use at once.
+pub fn predict_memory(scene: SceneSize, view: ViewSize, settings: &Settings, models: ModelBytes) -> MemoryRequirements {
+    let distorts_pictures = settings.robust_to.of_pictures().next().is_some();
+    let work = EmbeddingWorkload {
+        size: settings.size,
+        distorted_size: distorts_pictures.then_some(settings.distorted_size),
+        views_per_step: settings.views_per_step,
+        fresh_per_step: settings.fresh_per_step,
+        pool_views: settings.pool_views,
+        pool_bytes: settings.pool_mebibytes << 20,
+        early_stop_views: settings.early_stop.map_or(0, |stop| stop.views),
+        verification_views: settings.verify.views,
+    };
+    embedding_requirements(scene, view, &work, models)
+}
+
+/// Measures one training view that stands for a picture of its own size: those of larger ones have narrower splats.
+///
+/// # Errors
+/// An empty scene, a failing device.
+pub fn measure_view(engine: &Engine, gaussians: &Gaussians, settings: &Settings) -> Result<ViewSize> {
+    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+    let camera = sampler.camera(Split::Training, 0, settings.size);
+    let view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?.view;
+    Ok(view_size(&view))
+}
+
+/// Measures the same view as the CPU keeps it, without an engine.
+///
+/// # Errors
+/// An empty scene.
+pub fn measure_view_on_cpu(gaussians: &Gaussians, settings: &Settings) -> Result<ViewSize> {
+    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+    let camera = sampler.camera(Split::Training, 0, settings.size);
+    let cache = cpu_weight_cache(camera.width, settings.half_weights);
+    Ok(view_size(&prepare(gaussians, &camera, cache)?))
+}
+
+fn view_size(view: &PreparedView) -> ViewSize {
+    let weights = view.weight_bytes() as f64;
+    let side = f64::from(view.camera.width);
+    ViewSize {
+        visible: view.bytes() as f64 - weights,
+        pixel: weights / (side * side),
+    }
+}
+
+/// Bytes of an engine's models with these settings.
+pub(super) fn model_bytes(engine: &Engine, settings: &Settings) -> ModelBytes {
+    ModelBytes {
+        learning: engine.model_bytes(settings.lambda.lpips > 0.0),
+        verifying: engine.model_bytes(true),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::Preset;
+    use crate::memory::Limits;
+    use crate::memory::admission::{admit_marking, admit_reading};
+    use crate::sample::sample;
+    use crate::scene::Scene;
+
+    fn up_to(memory: u64) -> Limits {
+        Limits {
+            memory,
+            budget: true,
+            buffer: None,
+        }
+    }
+
+    /// What is foreseen is never more than what is predicted once the scene is read.
+    #[test]
+    fn what_is_foreseen_is_less_than_what_is_predicted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("in.ply");
+        let view = ViewSize {
+            visible: 0.0,
+            pixel: 0.0,
+        };
+        for degree in 0..=3 {
+            let scene = sample(2000, degree, 1).unwrap();
+            scene.write(&path, &scene.gaussians.sh).unwrap();
+            let scene = Scene::read(&path).unwrap();
+            let needed = predict_memory(
+                SceneSize::of(&scene),
+                view,
+                &Preset::Draft.settings(),
+                ModelBytes::default(),
+            );
+            admit_marking(&path, &up_to(needed.total()), MemoryRequirements::of_program()).unwrap();
+            admit_reading(
+                &path,
+                &up_to(needed.program + needed.scene),
+                MemoryRequirements::of_program(),
+            )
+            .unwrap();
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `embed` jobs: the same bytes as the command's for the same seed.
+use std::time::{Duration, Instant};
+
+use guardsplat_engine::Error as EngineError;
+use guardsplat_engine::embed::{Job, Outcome, embed};
+use guardsplat_engine::extract::Framing;
+use guardsplat_engine::message::Key;
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::{PictureFormat, encode_picture};
+use guardsplat_engine::scene::BadRows;
+use guardsplat_proto::v1::complete_job_request::Result as Done;
+use guardsplat_proto::v1::{EmbedResult, EmbedSpec, SeenView};
+
+use super::attempt::{Attempt, Outcome as Finished};
+use super::convert;
+use super::error::{Error, Result};
+use super::transfer::Content;
+use crate::operations::comparison_sheet;
+use crate::operations::thumbnails::small_png;
+
+/// Views of the evidence.
+const SHOWN: usize = 3;
+
+/// A scene that was marked.
+struct Marked {
+    outcome: Outcome,
+    sheet: Vec<u8>,
+    views: Vec<SeenView>,
+    device: String,
+    clip: String,
+    duration: Duration,
+}
+
+/// Fetches scene and key, marks, stores the marked scene and a picture of what changed.
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Finished> {
+    let settings = convert::settings(spec)?;
+    let input = attempt.download(&[&spec.scene]).await?.swap_remove(0);
+    let key_file = attempt.download_key().await?;
+    // Its format, and so its name, is known when it is there.
+    let output = attempt.folder.join("marked");
+    // The word of an asset is not told, nor what is read in its place.
+    let secret = !spec.asset.is_empty();
+    let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
+    let bad_rows = BadRows::ignored_if(spec.ignore_bad_rows);
+    let marked_file = Content::File(output.clone());
+    let work = attempt.compute(move |cache, stop, reporter| {
+        let start = Instant::now();
+        let key = Key::from_bytes(&name, &key_file)?;
+        drop(key_file);
+        let message = key.message(&message)?;
+        let device = cache.device().to_owned();
+        let engine = cache.engine(&name, &key, stop)?;
+        let job = Job {
+            input: &input,
+            output: &output,
+            message: &message,
+            settings: &settings,
+            force,
+            bad_rows,
+        };
+        let outcome = embed(engine, &job, &mut |progress| {
+            if let Some(progress) = convert::embedding_progress(&progress) {
+                reporter.tell(progress);
+            }
+        })?;
+        if !outcome.written {
+            return Err(Error::TargetMissed(outcome.missed.join(", ")));
+        }
+        let sheet = comparison_sheet::of(&outcome.verification.pairs)?;
+        let sheet = encode_picture(&sheet, PictureFormat::Png).map_err(|reason| EngineError::BadPicture {
+            path: comparison_sheet::NAME.into(),
+            reason,
+        })?;
+        // Only the evidence of an asset shows them.
+        let shown = if secret { SHOWN } else { 0 };
+        let pairs = outcome.verification.pairs.iter().take(shown).enumerate();
+        let view = |(index, (original, read)): (usize, &(Picture, Picture))| {
+            Ok(SeenView {
+                name: format!("view {}", index + 1),
+                read: small_png(read)?,
+                original: small_png(original)?,
+            })
+        };
+        let views = pairs.map(view).collect::<guardsplat_engine::Result<_>>()?;
+        Ok(Marked {
+            outcome,
+            sheet,
+            views,
+            device,
+            clip: key.clip.name.clone(),
+            duration: start.elapsed(),
+        })
+    });
+    let marked = work.await?;
+    let marked_name = format!("marked.{}", marked.outcome.format.extension());
+    let scene = attempt.upload(&marked_name, marked_file, false).await?;
+    let comparison = attempt
+        .upload(comparison_sheet::NAME, Content::Bytes(marked.sheet), false)
+        .await?;
+    // What was read back of all views, for the evidence of an asset.
+    let readings = vec![convert::framed(
+        Framing::default(),
+        &marked.outcome.verification.reading,
+    )];
+    let result = Done::EmbedResult(EmbedResult {
+        scene,
+        comparison,
+        duration: convert::duration(marked.duration),
+        device: marked.device,
+        clip: marked.clip,
+        ..convert::embed_result(&marked.outcome)
+    });
+    Ok(Finished {
+        result,
+        readings,
+        views: marked.views,
+    })
+}

@@ -1,0 +1,92 @@
+//! `verify` jobs: whose is this scene, or are these pictures?
+use std::time::{Duration, Instant};
+
+use guardsplat_engine::extract::{MAX_PICTURES, find_source};
+use guardsplat_engine::message::Key;
+use guardsplat_proto::v1::complete_job_request::Result as Done;
+use guardsplat_proto::v1::progress::Stage;
+use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
+
+use super::attempt::{Attempt, Outcome};
+use super::convert;
+use super::error::{Error, Result};
+use crate::operations::thumbnails::Thumbnails;
+use crate::operations::verification::{VerificationReport, read_and_compare, read_framed};
+
+/// A reading that was compared, or is for the server to decide on.
+struct Verified {
+    findings: VerificationReport,
+    readings: Vec<FramedReading>,
+    shown: Thumbnails,
+    device: String,
+    clip: String,
+    duration: Duration,
+}
+
+/// Fetches suspects and key, reads and compares.
+pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<Outcome> {
+    let views = convert::views(spec)?;
+    if spec.suspects.is_empty() || spec.suspects.len() > MAX_PICTURES {
+        let count = spec.suspects.len();
+        return Err(Error::BadJob(format!(
+            "suspects: {count} are outside 1 to {MAX_PICTURES}"
+        )));
+    }
+    let names: Vec<&str> = spec.suspects.iter().map(String::as_str).collect();
+    let paths = attempt.download(&names).await?;
+    let key_file = attempt.download_key().await?;
+    let (name, message) = (spec.key.clone(), spec.message.clone());
+    let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
+    let work = attempt.compute(move |cache, stop, reporter| {
+        let start = Instant::now();
+        let source = find_source(&paths)?;
+        let key = Key::from_bytes(&name, &key_file)?;
+        drop(key_file);
+        // Nothing to compare with is no message of no bits.
+        let message = Some(message).filter(|text| !text.is_empty());
+        let message = message.map(|text| key.message(&text)).transpose()?;
+        let device = cache.device().to_owned();
+        let engine = cache.engine(&name, &key, stop)?;
+        let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
+        let mut shown = Thumbnails::default();
+        let (findings, framed) = if claim {
+            let (framed, ignored) = read_framed(engine, &source, &views, &mut shown, progress)?;
+            // As given comes first.
+            let reading = framed.first().map(|(_, reading)| reading);
+            let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
+            (VerificationReport::new(reading, None, &ignored)?, framed)
+        } else {
+            let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
+            (VerificationReport::of(&compared)?, Vec::new())
+        };
+        Ok(Verified {
+            findings,
+            // Of a raw message all is said in the findings.
+            readings: framed
+                .iter()
+                .map(|(framing, reading)| convert::framed(*framing, reading))
+                .collect(),
+            shown,
+            device,
+            clip: key.clip.name.clone(),
+            duration: start.elapsed(),
+        })
+    });
+    let verified = work.await?;
+    let result = Done::VerifyResult(VerifyResult {
+        duration: convert::duration(verified.duration),
+        device: verified.device,
+        clip: verified.clip,
+        ..convert::verify_result(verified.findings)
+    });
+    let view = |(name, read)| SeenView {
+        name,
+        read,
+        original: Vec::new(),
+    };
+    Ok(Outcome {
+        result,
+        readings: verified.readings,
+        views: verified.shown.0.into_iter().map(view).collect(),
+    })
+}

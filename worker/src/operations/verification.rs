@@ -1,0 +1,258 @@
+//! What a verification finds: reads scenes and pictures, and says whether the message is there.
+use guardsplat_engine::Result;
+use guardsplat_engine::extract::{
+    Comparison, Engine, Framed, Framing, Reading, Source, default_size, framings, read_scene,
+};
+use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
+use guardsplat_engine::message::{Message, Verdict};
+use guardsplat_engine::picture::Picture;
+use guardsplat_engine::quality::read_picture;
+use guardsplat_engine::scene::{BadRows, Ignored, Scene};
+use serde::Serialize;
+
+use super::thumbnails::Thumbnails;
+
+/// Why a reading that has nothing to be compared with decides nothing.
+const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
+
+/// From where a scene is read.
+pub struct Views {
+    /// How many views.
+    pub count: usize,
+    /// Their side in pixels; what CLIP takes in unless given.
+    pub size: Option<u32>,
+    /// What is behind the scene, or shows through transparent pixels of pictures.
+    pub background: [f32; 3],
+    /// Decides them.
+    pub seed: u64,
+    /// What becomes of rows of the scene with values that are not legal.
+    pub bad_rows: BadRows,
+}
+
+/// Logits of views or pictures.
+type Logits = Vec<Vec<f32>>;
+
+/// Reads all scenes and pictures of `source` together, and tells of rows of scenes that were ignored; `shown` keeps the first
+/// pictures, and `progress` hears how many views and pictures are done, and of how many.
+pub fn read(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    shown: &mut Thumbnails,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<(Reading, Vec<Ignored>)> {
+    let (mut logits, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
+    let (before, total) = (logits.len(), count(source, views));
+    // One at a time: thousands of large pictures need not fit in memory.
+    for (index, path) in source.pictures.iter().enumerate() {
+        let picture = read_picture(path, views.background)?;
+        shown.see("picture", index, &picture)?;
+        logits.extend(engine.read_logits(&[picture])?);
+        progress(before + index + 1, total);
+    }
+    Ok((Reading::new(logits)?, ignored))
+}
+
+/// Views and pictures that are read.
+fn count(source: &Source, views: &Views) -> usize {
+    source.scenes.len() * views.count + source.pictures.len()
+}
+
+fn read_scenes(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    shown: &mut Thumbnails,
+    progress: &mut impl FnMut(usize, usize),
+) -> Result<(Logits, Vec<Ignored>)> {
+    let (mut logits, mut ignored) = (Logits::new(), Vec::new());
+    let total = count(source, views);
+    for path in &source.scenes {
+        let size = views.size.unwrap_or_else(|| default_size(engine));
+        let rest = MemoryRequirements {
+            models: engine.model_bytes(false),
+            pictures: picture_bytes(size, size),
+            ..MemoryRequirements::of_program()
+        };
+        admission::admit_reading(path, &engine.limits, rest)?;
+        let scene = Scene::read_with(path, views.bad_rows)?;
+        ignored.extend(scene.ignored().cloned());
+        let gaussians = scene.into_gaussians();
+        let before = logits.len();
+        let seen = |done: usize, picture: &Picture| {
+            progress(before + done, total);
+            shown.see("view", before + done - 1, picture)
+        };
+        let (background, seed) = (views.background, views.seed);
+        let reading = read_scene(engine, &gaussians, views.count, size, background, seed, seen)?;
+        logits.extend(reading.views);
+    }
+    Ok((logits, ignored))
+}
+
+/// A reading in each framing, as given first, and rows of scenes that were ignored.
+pub type InFramings = (Vec<(Framing, Reading)>, Vec<Ignored>);
+
+/// As [`read`], in every framing that pictures may be in; views of scenes are as they are in all of them, and without
+/// pictures there is one framing only. Framings without borders are there only if some picture has any: others would be
+/// the same once more.
+pub fn read_framed(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    shown: &mut Thumbnails,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<InFramings> {
+    let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
+    if source.pictures.is_empty() {
+        return Ok((vec![(Framing::default(), Reading::new(of_scenes)?)], ignored));
+    }
+    let mut pictures = Vec::with_capacity(source.pictures.len());
+    for (index, path) in source.pictures.iter().enumerate() {
+        let picture = read_picture(path, views.background)?;
+        shown.see("picture", index, &picture)?;
+        pictures.push(Framed::read(engine, &picture)?);
+        progress(of_scenes.len() + index + 1, count(source, views));
+    }
+    let together = |(framing, reading): (Framing, Reading)| {
+        let all = of_scenes.iter().cloned().chain(reading.views).collect();
+        Ok((framing, Reading::new(all)?))
+    };
+    let read = framings(engine, &pictures)?.into_iter().map(together);
+    Ok((read.collect::<Result<_>>()?, ignored))
+}
+
+/// What was read, and how it compares with a raw message.
+pub struct Compared {
+    /// The reading that agrees best.
+    pub reading: Reading,
+    /// How it compares, if there is a message.
+    pub comparison: Option<Comparison>,
+    /// How the pictures were looked at for it.
+    pub framing: Framing,
+    /// Ways in which they were looked at.
+    pub framings: usize,
+    /// Rows of scenes that were ignored.
+    pub ignored: Vec<Ignored>,
+}
+
+/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read in every framing
+/// besides. Half of the rate of false positives is for pictures as they are, the other half for all other framings
+/// together, so that those who change nothing hardly pay for those who do.
+pub fn read_and_compare(
+    engine: &Engine,
+    source: &Source,
+    views: &Views,
+    message: Option<&Message>,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Compared> {
+    // Nobody looks at what was compared with a raw message.
+    let mut shown = Thumbnails::default();
+    let (reading, ignored) = read(engine, source, views, &mut shown, &mut progress)?;
+    let mut best = Compared {
+        reading,
+        comparison: None,
+        framing: Framing::default(),
+        framings: 1,
+        ignored,
+    };
+    let Some(message) = message else {
+        return Ok(best);
+    };
+    let halves = if source.pictures.is_empty() { 1 } else { 2 };
+    let as_given = best.reading.compare_among(message, halves)?;
+    let decided = halves == 1 || as_given.decision.verdict != Verdict::NoMatch;
+    let mut p_value = as_given.decision.p_value;
+    best.comparison = Some(as_given);
+    if decided {
+        return Ok(best);
+    }
+    let (framed, _) = read_framed(engine, source, views, &mut shown, progress)?;
+    best.framings = framed.len();
+    let others = halves * (framed.len() as u32 - 1).max(1);
+    for (framing, reading) in framed.into_iter().skip(1) {
+        let comparison = reading.compare_among(message, others)?;
+        if comparison.decision.p_value < p_value {
+            p_value = comparison.decision.p_value;
+            (best.reading, best.framing, best.comparison) = (reading, framing, Some(comparison));
+        }
+    }
+    Ok(best)
+}
+
+/// The outcome, with the names of the program's JSON.
+#[derive(Serialize)]
+pub struct VerificationReport {
+    /// Whether the message is there.
+    pub verdict: Verdict,
+    /// Probability that as many bits match by chance.
+    pub p_value: Option<f64>,
+    /// A match needs a p-value at or below this.
+    pub threshold: Option<f64>,
+    /// Bits that match.
+    pub matched_bits: Option<u32>,
+    /// Matches that the verdict needs.
+    pub needed_bits: Option<u32>,
+    /// Bits compared.
+    pub bits: usize,
+    /// Views or pictures read.
+    pub views: usize,
+    /// The message read.
+    pub message: String,
+    /// Mean share of bits of a view that match.
+    pub bit_accuracy: Option<f64>,
+    /// The same of the worst view.
+    pub bit_accuracy_worst_view: Option<f64>,
+    /// Mean distance of the bits' logits from the threshold.
+    pub mean_abs_logit: f64,
+    /// Mean share of views that agree with the decision on a bit.
+    pub view_agreement: f64,
+    /// Ways in which pictures were looked at, each of which the p-value pays for.
+    pub framings: usize,
+    /// The way that agreed best, where it is not the first: what was undone, whether borders were cut off.
+    pub framing: Option<String>,
+    /// Rows of the scene that are no Gaussians of it and were ignored.
+    pub ignored_rows: usize,
+    /// Why nothing could be decided.
+    pub reason: Option<String>,
+}
+
+impl VerificationReport {
+    /// What a comparison says.
+    pub fn of(compared: &Compared) -> Result<Self> {
+        let found = Self::new(&compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
+        let as_given = compared.framing == Framing::default();
+        Ok(Self {
+            framings: compared.framings,
+            framing: (!as_given).then(|| compared.framing.to_string()),
+            ..found
+        })
+    }
+
+    /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
+    /// were ignored for it.
+    pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: &[Ignored]) -> Result<Self> {
+        let decision = comparison.map(|c| &c.decision);
+        Ok(Self {
+            verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
+            p_value: decision.map(|d| d.p_value),
+            threshold: decision.map(|d| d.threshold),
+            matched_bits: decision.map(|d| d.matched_bits),
+            needed_bits: decision.and_then(|d| d.needed_bits),
+            bits: reading.summed.len(),
+            views: reading.views.len(),
+            message: reading.message()?.to_string(),
+            bit_accuracy: comparison.map(|c| c.bit_accuracy),
+            bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
+            mean_abs_logit: reading.mean_abs_logit(),
+            view_agreement: reading.agreement(),
+            framings: 1,
+            framing: None,
+            ignored_rows: ignored.iter().map(Ignored::count).sum(),
+            reason: match decision {
+                Some(decision) => decision.reason.clone(),
+                None => Some(NOTHING_TO_COMPARE.into()),
+            },
+        })
+    }
+}
