@@ -1,5 +1,5 @@
 //! Everything that can go wrong with words and claims, by what happened.
-use crate::word::MAX_BITS;
+use crate::message::MAX_BITS;
 
 /// Result of operations on words and claims.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

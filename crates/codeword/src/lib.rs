@@ -14,7 +14,7 @@ mod payload;
 mod reading;
 mod search;
 mod whiten;
-mod word;
+mod message;
 
 pub use claim::{Answer, Claim, Comparison, Confidences, Framing, ReadPayload, Target, Tested, Verdict};
 pub use code::{Code, Decoded, PAPER_LENGTHS, Scheme};
@@ -23,4 +23,4 @@ pub use payload::{Layout, Payload, VERSION};
 pub use reading::Reading;
 pub use search::{Hit, Index};
 pub use whiten::{Mark, NONCE_BYTES, Whitening, mark};
-pub use word::{MAX_BITS, Word, WordLength};
+pub use message::{MAX_BITS, Word, WordLength};

@@ -1,6 +1,6 @@
 //! The word that logits decide for, once, and the bits that they leave undecided.
 use crate::error::{Error, Result};
-use crate::word::{LIMBS, Word, WordLength};
+use crate::message::{LIMBS, Word, WordLength};
 
 /// A word that was read.
 ///

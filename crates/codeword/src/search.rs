@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::reading::Reading;
-use crate::word::{Word, WordLength};
+use crate::message::{Word, WordLength};
 
 /// Words of one length, as compact as their bits allow: 8, 16 or 24 bytes each.
 ///

@@ -8,7 +8,7 @@ use sha2::Sha256;
 use crate::code::Code;
 use crate::error::{Error, Result};
 use crate::payload::Payload;
-use crate::word::{MAX_BITS, Word, WordLength};
+use crate::message::{MAX_BITS, Word, WordLength};
 
 /// Fewest bytes of a nonce.
 pub const NONCE_BYTES: usize = 16;

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::payload::Payload;
 use crate::reading::Reading;
-use crate::word::Word;
+use crate::message::Word;
 
 /// The outcome of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use crate::chance;
 use crate::code::Scheme;
 use crate::error::{Error, Result};
 use crate::reading::Reading;
-use crate::word::Word;
+use crate::message::Word;
 pub use answer::{Answer, Comparison, Confidences, ReadPayload, Tested, Verdict};
 
 /// Pictures of the suspect in one framing, read.

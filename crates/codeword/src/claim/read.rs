@@ -4,7 +4,7 @@ use super::{Scheme, Target};
 use crate::code::Code;
 use crate::error::Result;
 use crate::payload::Payload;
-use crate::word::Word;
+use crate::message::Word;
 
 /// What a match says: `None` for raw words, and for targets whose pad was not given.
 pub fn payload(scheme: Scheme, target: &Target, logits: &[f32]) -> Result<Option<ReadPayload>> {

@@ -3,7 +3,7 @@ use super::*;
 use crate::code::Code;
 use crate::payload::Payload;
 use crate::whiten::{Whitening, mark};
-use crate::word::WordLength;
+use crate::message::WordLength;
 use proptest::prelude::*;
 
 fn raw(bits: usize) -> Scheme {

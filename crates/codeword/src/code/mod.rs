@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::payload::Payload;
 use crate::reading::Reading;
-use crate::word::{Word, WordLength};
+use crate::message::{Word, WordLength};
 use bch::Bch;
 pub use scheme::{PAPER_LENGTHS, Scheme};
 

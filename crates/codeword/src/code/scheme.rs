@@ -2,7 +2,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Code;
-use crate::word::WordLength;
+use crate::message::WordLength;
 
 /// The lengths that the paper reports, in bits.
 pub const PAPER_LENGTHS: [u32; 5] = [16, 32, 48, 64, 72];

@@ -1,23 +1,23 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
 mod extractor;
-mod framed;
-mod framing;
-mod kind;
+mod picture_logits;
+mod hypothesis;
+mod suspect_kind;
 mod pictures;
-mod reading;
-mod restore;
+mod pooled;
+mod photometric;
 mod window;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
-pub use framed::{Framed, framings};
-pub use framing::{Framing, without_borders};
-pub use kind::Kind;
+pub use picture_logits::{Framed, framings};
+pub use hypothesis::{Framing, without_borders};
+pub use suspect_kind::Kind;
 pub use pictures::{MAX_PICTURES, Source, find_source};
-pub use reading::{Comparison, Reading};
-pub use restore::{Guess, Tone, guesses, read_guesses};
+pub use pooled::{Comparison, Reading};
+pub use photometric::{Guess, Tone, guesses, read_guesses};
 pub use window::Window;
 
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! What there is to read on disk: scenes, picture files and folders of them.
 use std::path::{Path, PathBuf};
 
-use super::kind::Kind;
+use super::suspect_kind::Kind;
 use crate::error::{Error, Result};
 use crate::quality::PictureFormat;
 use crate::scene::is_loose_sog;

@@ -2,7 +2,7 @@
 //!
 //! Each is read for itself, and each is a hypothesis of its own: whoever decides on the best of them pays for all.
 use super::Engine;
-use super::restore::{Guess, guesses, read_guesses};
+use super::photometric::{Guess, guesses, read_guesses};
 use super::window::Window;
 use crate::error::Result;
 use crate::picture::Picture;
