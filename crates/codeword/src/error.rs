@@ -8,8 +8,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A word would have no bits, or more than there is room for.
-    #[error("a word of {bits} bits is outside 1 to {MAX_BITS}")]
+    /// A message would have no bits, or more than there is room for.
+    #[error("bits: {bits} is outside 1 to {MAX_BITS}")]
     Length {
         /// The bits asked for.
         bits: usize,
@@ -24,8 +24,8 @@ pub enum Error {
         /// The bits that it should have.
         expected: u32,
     },
-    /// A text is not a word in hexadecimal.
-    #[error("word: {reason}")]
+    /// A text is not a message in hexadecimal.
+    #[error("message: {reason}")]
     Digits {
         /// What is wrong.
         reason: String,

@@ -1,22 +1,25 @@
-//! Words of up to 150 bits, most significant first, told in hexadecimal.
+//! Messages of up to 150 bits, most significant first, told in hexadecimal.
+//!
+//! A codeword, a pad and whatever else is embedded or read bit by bit are messages, too.
 use std::fmt;
 
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// Most bits that a word can have: what the token tables of keys have room for.
+/// Most bits that a message can have: what the token tables of keys have room for.
 pub const MAX_BITS: u32 = 150;
 
 /// Limbs of 64 bits that hold [`MAX_BITS`].
 pub(crate) const LIMBS: usize = MAX_BITS.div_ceil(64) as usize;
 
-/// The number of bits of a word, 1 to [`MAX_BITS`].
+/// The number of bits of a message, 1 to [`MAX_BITS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u32", into = "u32")]
-pub struct WordLength(u8);
+pub struct MessageLength(u8);
 
-impl WordLength {
+impl MessageLength {
     /// A length of 64, that of the codes.
     pub const CODED: Self = Self(64);
 
@@ -36,13 +39,13 @@ impl WordLength {
         u32::from(self.0)
     }
 
-    /// Limbs of 64 bits that a word of this length takes, 1 to 3.
+    /// Limbs of 64 bits that a message of this length takes, 1 to 3.
     pub(crate) fn limbs(self) -> usize {
         usize::from(self.0).div_ceil(64)
     }
 }
 
-impl TryFrom<u32> for WordLength {
+impl TryFrom<u32> for MessageLength {
     type Error = Error;
 
     fn try_from(bits: u32) -> Result<Self> {
@@ -50,8 +53,8 @@ impl TryFrom<u32> for WordLength {
     }
 }
 
-impl From<WordLength> for u32 {
-    fn from(length: WordLength) -> Self {
+impl From<MessageLength> for u32 {
+    fn from(length: MessageLength) -> Self {
         length.bits()
     }
 }
@@ -61,96 +64,123 @@ impl From<WordLength> for u32 {
 /// Serialised as its length and its hexadecimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
-pub struct Word {
-    length: WordLength,
-    /// The word as an integer, least significant limb first. What lies above the length is 0.
+pub struct Message {
+    length: MessageLength,
+    /// The message as an integer, least significant limb first. What lies above the length is 0.
     limbs: [u64; LIMBS],
 }
 
-/// A word as reports hold it.
+/// A message as reports hold it.
 #[derive(Serialize, Deserialize)]
 struct Written {
-    bits: WordLength,
+    bits: MessageLength,
     hex: String,
 }
 
-impl Word {
-    /// A word of zeros.
-    pub fn zeros(length: WordLength) -> Self {
+impl Message {
+    /// A message of zeros.
+    pub fn zeros(length: MessageLength) -> Self {
         Self {
             length,
             limbs: [0; LIMBS],
         }
     }
 
-    /// A word of these bits, most significant first.
+    /// A message of these bits, most significant first.
     ///
     /// # Errors
     /// [`Error::Length`] unless there are 1 to [`MAX_BITS`].
     pub fn from_bits(bits: &[bool]) -> Result<Self> {
-        let mut word = Self::zeros(WordLength::new(bits.len())?);
+        let mut message = Self::zeros(MessageLength::new(bits.len())?);
         for (position, &bit) in bits.iter().enumerate() {
-            word.set(position as u32, bit);
+            message.set(position as u32, bit);
         }
-        Ok(word)
+        Ok(message)
     }
 
     /// The first `length` bits of `bytes`, most significant first, or `None` when there are not so many.
-    pub(crate) fn from_bytes(bytes: &[u8], length: WordLength) -> Option<Self> {
-        let mut word = Self::zeros(length);
+    pub(crate) fn from_bytes(bytes: &[u8], length: MessageLength) -> Option<Self> {
+        let mut message = Self::zeros(length);
         for position in 0..length.bits() {
             let byte = bytes.get(position as usize / 8)?;
-            word.set(position, byte >> (7 - position % 8) & 1 == 1);
+            message.set(position, byte >> (7 - position % 8) & 1 == 1);
         }
-        Some(word)
+        Some(message)
     }
 
     /// The 64 bits of an integer, most significant first.
     pub fn from_u64(value: u64) -> Self {
-        let mut word = Self::zeros(WordLength::CODED);
-        word.limbs[0] = value;
-        word
+        let mut message = Self::zeros(MessageLength::CODED);
+        message.limbs[0] = value;
+        message
     }
 
-    /// The integer of a word of 64 bits; `None` for other lengths.
+    /// The integer of a message of 64 bits; `None` for other lengths.
     pub fn to_u64(&self) -> Option<u64> {
-        (self.length == WordLength::CODED).then_some(self.limbs[0])
+        (self.length == MessageLength::CODED).then_some(self.limbs[0])
     }
 
-    /// Reads a word from exactly ceil(`length` / 4) hexadecimal digits, without a prefix.
+    /// Reads `bits` bits from exactly ceil(`bits` / 4) hexadecimal digits, with or without `0x`.
     ///
     /// # Errors
-    /// [`Error::Digits`] for too few or too many digits, one that is none, or a value that needs more bits.
-    pub fn parse(text: &str, length: WordLength) -> Result<Self> {
-        let bad = |reason: String| Error::Digits { reason };
-        let (count, wanted) = (text.chars().count(), length.bits().div_ceil(4) as usize);
-        if count != wanted {
-            return Err(bad(format!(
-                "{count} hexadecimal digits, but {} bits take {wanted}",
-                length.bits()
-            )));
+    /// [`Error::Length`], and [`Error::Digits`] for too few or too many digits, one that is none, or a value that needs
+    /// more than `bits` bits.
+    pub fn parse(text: &str, bits: usize) -> Result<Self> {
+        let length = MessageLength::new(bits)?;
+        let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+        Self::from_digits(digits.unwrap_or(text), length)
+    }
+
+    fn from_digits(digits: &str, length: MessageLength) -> Result<Self> {
+        let bad = |reason: String| Err(Error::Digits { reason });
+        let (bits, wanted) = (length.bits(), length.bits().div_ceil(4) as usize);
+        let wrong = digits.chars().enumerate().find(|(_, c)| !c.is_ascii_hexdigit());
+        if let Some((index, digit)) = wrong {
+            return bad(format!("character {} is {digit:?}, not a hexadecimal digit", index + 1));
         }
-        let spare = wanted as u32 * 4 - length.bits();
-        let mut word = Self::zeros(length);
-        for (index, digit) in text.chars().enumerate() {
-            let value = digit
-                .to_digit(16)
-                .ok_or_else(|| bad(format!("character {} is {digit:?}, not a hexadecimal digit", index + 1)))?;
+        let count = digits.len();
+        if count != wanted {
+            let how = if count > wanted { "longer" } else { "shorter" };
+            return bad(format!(
+                "{count} hexadecimal digits are {how} than the key's {bits} bits, which take {wanted}"
+            ));
+        }
+        let spare = wanted as u32 * 4 - bits;
+        let mut message = Self::zeros(length);
+        for (index, value) in digits.chars().filter_map(|digit| digit.to_digit(16)).enumerate() {
             for bit in 0..4 {
                 let set = value >> (3 - bit) & 1 == 1;
                 match (4 * index as u32 + bit).checked_sub(spare) {
-                    Some(position) => word.set(position, set),
-                    None if set => return Err(bad(format!("the value needs more than {} bits", length.bits()))),
+                    Some(position) => message.set(position, set),
+                    None if set => return bad(format!("the value needs more than the key's {bits} bits")),
                     None => {}
                 }
             }
         }
-        Ok(word)
+        Ok(message)
+    }
+
+    /// `bits` bits drawn from `rng`: the lowest of one 32-bit number each, most significant first.
+    ///
+    /// # Errors
+    /// [`Error::Length`] unless there are 1 to [`MAX_BITS`].
+    pub fn random(bits: usize, rng: &mut impl Rng) -> Result<Self> {
+        let mut message = Self::zeros(MessageLength::new(bits)?);
+        for position in 0..message.length.bits() {
+            message.set(position, rng.next_u32() & 1 == 1);
+        }
+        Ok(message)
     }
 
     /// The number of bits.
-    pub fn length(&self) -> WordLength {
+    pub fn length(&self) -> MessageLength {
         self.length
+    }
+
+    /// The number of bits, at least 1.
+    #[allow(clippy::len_without_is_empty)] // a message is never empty
+    pub fn len(&self) -> usize {
+        self.length.bits() as usize
     }
 
     /// Bits, most significant first.
@@ -163,19 +193,24 @@ impl Word {
         self.limbs.iter().map(|limb| limb.count_ones()).sum()
     }
 
-    /// Bits that differ between two words, as a word.
+    /// The bits as the numbers 0 and 1, for a loss.
+    pub fn targets(&self) -> impl Iterator<Item = f32> + '_ {
+        self.bits().map(|bit| f32::from(u8::from(bit)))
+    }
+
+    /// Bits that differ between two messages, as a message.
     ///
     /// # Errors
-    /// [`Error::OtherLength`] for words of different lengths.
-    pub fn xor(&self, other: &Word) -> Result<Word> {
-        self.require("the other word", other)?;
-        let mut word = *self;
-        word.limbs.iter_mut().zip(other.limbs).for_each(|(a, b)| *a ^= b);
-        Ok(word)
+    /// [`Error::OtherLength`] for messages of different lengths.
+    pub fn xor(&self, other: &Message) -> Result<Message> {
+        self.require("the other message", other)?;
+        let mut message = *self;
+        message.limbs.iter_mut().zip(other.limbs).for_each(|(a, b)| *a ^= b);
+        Ok(message)
     }
 
     /// Fails unless `other`, called `what` in the message, is of the same length.
-    pub(crate) fn require(&self, what: &str, other: &Word) -> Result<()> {
+    pub(crate) fn require(&self, what: &str, other: &Message) -> Result<()> {
         if self.length == other.length {
             return Ok(());
         }
@@ -186,7 +221,7 @@ impl Word {
         })
     }
 
-    /// The word as an integer, least significant limb first; zeros follow.
+    /// The message as an integer, least significant limb first; zeros follow.
     pub(crate) fn limbs(&self) -> &[u64; LIMBS] {
         &self.limbs
     }
@@ -211,7 +246,7 @@ impl Word {
     }
 }
 
-impl fmt::Display for Word {
+impl fmt::Display for Message {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = self.length.bits().div_ceil(4) as usize;
         for digit in (0..digits).rev() {
@@ -221,19 +256,19 @@ impl fmt::Display for Word {
     }
 }
 
-impl TryFrom<Written> for Word {
+impl TryFrom<Written> for Message {
     type Error = Error;
 
     fn try_from(written: Written) -> Result<Self> {
-        Self::parse(&written.hex, written.bits)
+        Self::from_digits(&written.hex, written.bits)
     }
 }
 
-impl From<Word> for Written {
-    fn from(word: Word) -> Self {
+impl From<Message> for Written {
+    fn from(message: Message) -> Self {
         Self {
-            bits: word.length,
-            hex: word.to_string(),
+            bits: message.length,
+            hex: message.to_string(),
         }
     }
 }
@@ -242,58 +277,82 @@ impl From<Word> for Written {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn most_significant_bits_come_first() {
-        let word = Word::from_bits(&[true, false, false, false, false, true]).unwrap();
+        let word = Message::from_bits(&[true, false, false, false, false, true]).unwrap();
         assert_eq!(word.to_string(), "21");
-        assert_eq!(Word::from_u64(1 << 63).bits().position(|bit| bit), Some(0));
-        assert_eq!(Word::from_u64(0xa5).to_string(), "00000000000000a5");
-        let bytes = Word::from_bytes(&[0x80, 0xff], WordLength::new(9).unwrap()).unwrap();
+        assert_eq!(Message::from_u64(1 << 63).bits().position(|bit| bit), Some(0));
+        assert_eq!(Message::from_u64(0xa5).to_string(), "00000000000000a5");
+        let bytes = Message::from_bytes(&[0x80, 0xff], MessageLength::new(9).unwrap()).unwrap();
         assert_eq!(bytes.to_string(), "101");
-        assert_eq!(Word::from_bytes(&[0x80], WordLength::new(9).unwrap()), None);
+        assert_eq!(Message::from_bytes(&[0x80], MessageLength::new(9).unwrap()), None);
     }
 
     #[test]
-    fn what_is_no_word_is_an_error() {
+    fn what_is_no_message_is_an_error() {
         for bits in [0, 151, 256, usize::MAX] {
             assert_eq!(
-                Word::from_bits(&vec![true; bits.min(300)]).is_err(),
-                WordLength::new(bits).is_err()
+                Message::from_bits(&vec![true; bits.min(300)]).is_err(),
+                MessageLength::new(bits).is_err()
             );
-            assert_eq!(WordLength::new(bits), Err(Error::Length { bits }));
+            assert_eq!(MessageLength::new(bits), Err(Error::Length { bits }));
+            assert!(Message::random(bits, &mut ChaCha8Rng::seed_from_u64(1)).is_err());
         }
-        let six = WordLength::new(6).unwrap();
-        for (text, part) in [
-            ("1", "1 hexadecimal digits, but 6 bits take 2"),
-            ("40", "more than 6"),
-            ("1g", "'g'"),
+        let reason = |text: &str, bits| Message::parse(text, bits).unwrap_err().to_string();
+        assert!(reason("123456789", 32).contains("longer than the key's 32 bits"));
+        assert!(reason("1234567", 32).contains("shorter"));
+        assert!(reason("", 32).contains("shorter"));
+        assert!(reason("0x", 4).contains("shorter"));
+        assert!(reason("1234567g", 32).contains("character 8 is 'g'"));
+        assert!(reason("8", 3).contains("more than the key's 3 bits"));
+        assert!(reason("2", 1).contains("more than the key's 1 bits"));
+        assert!(reason("0", 0).contains("1 to 150"));
+        assert!(reason("0", 151).contains("1 to 150"));
+        assert!(reason(&"f".repeat(1_000_000), 75).contains("1000000 hexadecimal digits"));
+        assert!(reason("é", 4).contains("character 1"));
+        for text in [
+            r#"{"bits":0,"hex":""}"#,
+            r#"{"bits":4,"hex":"10"}"#,
+            r#"{"bits":4,"hex":"0x1"}"#,
         ] {
-            let error = Word::parse(text, six).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            assert!(serde_json::from_str::<Message>(text).is_err());
         }
-        assert!(serde_json::from_str::<Word>(r#"{"bits":0,"hex":""}"#).is_err());
-        assert!(serde_json::from_str::<Word>(r#"{"bits":4,"hex":"10"}"#).is_err());
-        assert!(Word::from_u64(1).xor(&Word::zeros(six)).is_err());
+        let six = MessageLength::new(6).unwrap();
+        assert!(Message::from_u64(1).xor(&Message::zeros(six)).is_err());
+    }
+
+    #[test]
+    fn random_messages_are_what_they_always_were() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let drawn = Message::random(64, &mut rng).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let bits: Vec<bool> = (0..64).map(|_| rng.next_u32() & 1 == 1).collect();
+        assert_eq!(drawn, Message::from_bits(&bits).unwrap());
+        assert_eq!(drawn.targets().map(|target| target > 0.5).collect::<Vec<_>>(), bits);
     }
 
     proptest! {
         #[test]
         fn bits_come_back_from_text_and_json(bits in prop::collection::vec(any::<bool>(), 1..=150)) {
-            let word = Word::from_bits(&bits).unwrap();
+            let word = Message::from_bits(&bits).unwrap();
             prop_assert_eq!(word.bits().collect::<Vec<_>>(), bits.clone());
             prop_assert_eq!(word.count_ones() as usize, bits.iter().filter(|&&bit| bit).count());
-            prop_assert_eq!(Word::parse(&word.to_string(), word.length()).unwrap(), word);
+            prop_assert_eq!(Message::parse(&word.to_string(), word.len()).unwrap(), word);
+            let upper = format!("0x{}", word.to_string().to_uppercase());
+            prop_assert_eq!(Message::parse(&upper, word.len()).unwrap(), word);
             let json = serde_json::to_string(&word).unwrap();
-            prop_assert_eq!(serde_json::from_str::<Word>(&json).unwrap(), word);
+            prop_assert_eq!(serde_json::from_str::<Message>(&json).unwrap(), word);
             prop_assert_eq!(word.xor(&word).unwrap().count_ones(), 0);
         }
 
         #[test]
         fn any_text_is_read_or_refused(text in ".{0,40}", bits in 1_usize..=150) {
-            let length = WordLength::new(bits).unwrap();
-            if let Ok(word) = Word::parse(&text, length) {
-                prop_assert_eq!(word.to_string(), text.to_lowercase());
+            if let Ok(message) = Message::parse(&text, bits) {
+                let digits = text.to_lowercase();
+                prop_assert_eq!(message.to_string(), digits.strip_prefix("0x").unwrap_or(&digits));
             }
         }
     }

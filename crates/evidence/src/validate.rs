@@ -5,7 +5,8 @@ use crate::embedding::Embedding;
 use crate::error::{Error, Result};
 use crate::evidence::{Evidence, Kind, SCHEMA, VERSION};
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
-use crate::verification::{Decision, Verdict, Verification};
+use crate::verification::{Decision, Verification};
+use guardsplat_codeword::Verdict;
 
 impl Evidence {
     /// Whether everything is in range; see [`Evidence::to_json`].

@@ -1,6 +1,7 @@
 //! Checks a `CreateJob` request, all of it, before anything is queued.
 use std::collections::HashSet;
 
+use guardsplat_codeword::MessageLength;
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
@@ -9,7 +10,6 @@ use uuid::Uuid;
 
 use super::claims::{self, Claim};
 use super::fingerprint;
-use super::message::MAX_BITS;
 use super::names::Kind;
 use super::problems::Problems;
 use super::text;
@@ -195,7 +195,7 @@ fn verify(spec: &VerifySpec, problems: &mut Problems) -> Result<Option<Wanted>> 
 
 fn create_key(spec: &KeySpec, problems: &mut Problems) {
     problems.check(
-        (1..=MAX_BITS).contains(&spec.bits),
+        MessageLength::try_from(spec.bits).is_ok(),
         "job.create_key.bits",
         "must be 1 to 150",
     );

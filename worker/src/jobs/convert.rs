@@ -1,12 +1,13 @@
 //! Between the API's messages and the engine's types.
 use std::time::Duration;
 
+use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
 use guardsplat_distortion::{Kind, RobustTo};
 use guardsplat_engine::Error as EngineError;
 use guardsplat_engine::embed::{self, NewKey, Outcome, Preset, Settings};
-use guardsplat_engine::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
+use guardsplat_engine::extract::{DEFAULT_VIEWS, PooledLogits};
+use guardsplat_engine::message::Key;
 use guardsplat_engine::message::training::Progress as Training;
-use guardsplat_engine::message::{Key, Verdict};
 use guardsplat_engine::scene::{BadRows, Ignored};
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
@@ -147,6 +148,7 @@ pub fn verify_result(found: Findings) -> api::VerifyResult {
         Verdict::Match => ApiVerdict::Match,
         Verdict::NoMatch => ApiVerdict::NoMatch,
         Verdict::Inconclusive => ApiVerdict::Inconclusive,
+        Verdict::UnknownKey => ApiVerdict::UnknownKey,
     };
     api::VerifyResult {
         verdict: verdict.into(),
@@ -163,22 +165,22 @@ pub fn verify_result(found: Findings) -> api::VerifyResult {
         view_agreement: found.view_agreement,
         reason: found.reason.unwrap_or_default(),
         ignored_rows: found.ignored_rows as u64,
-        framings: found.framings as u32,
-        framing: found.framing.unwrap_or_default(),
+        framings: found.hypotheses as u32,
+        framing: found.hypothesis.unwrap_or_default(),
         ..api::VerifyResult::default()
     }
 }
 
-/// What was read in one framing.
-pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
+/// What was read under one hypothesis.
+pub fn framed_reading(hypothesis: Hypothesis, logits: &PooledLogits) -> api::FramedReading {
     api::FramedReading {
-        quarter_turns: framing.quarter_turns.into(),
-        mirrored: framing.mirrored,
-        trimmed: framing.trimmed,
-        views: reading.views.len() as u32,
-        logits: reading.summed.clone(),
-        undone: undone(framing.undone),
-        part: framing.window.map(|window| api::PicturePart {
+        quarter_turns: hypothesis.quarter_turns.into(),
+        mirrored: hypothesis.mirrored,
+        trimmed: hypothesis.trimmed,
+        views: logits.views.len() as u32,
+        logits: logits.summed.clone(),
+        undone: undone(hypothesis.correction),
+        part: hypothesis.window.map(|window| api::PicturePart {
             left_twelfths: window.left,
             top_twelfths: window.top,
             side_twelfths: window.side,
@@ -186,15 +188,15 @@ pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
     }
 }
 
-fn undone(guess: Guess) -> Option<api::Undone> {
+fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
     use api::undone::Kind;
-    let (kind, factor) = match guess {
-        Guess::Nothing => return None,
-        Guess::Ground => (Kind::Ground, 1.0),
-        Guess::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
-        Guess::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
-        Guess::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
-        Guess::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
+    let (kind, factor) = match correction {
+        PhotometricCorrection::None => return None,
+        PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
+        PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
+        PhotometricCorrection::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
+        PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
+        PhotometricCorrection::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
     };
     Some(api::Undone {
         kind: kind.into(),

@@ -5,11 +5,11 @@ use sha2::{Digest, Sha256};
 
 use crate::device::Compute;
 use crate::error::Result;
-use crate::message::bits::check_bits;
 use crate::message::key::Secret;
 use crate::message::tokens::{fewest_bits_per_token, hmac_sha256};
 use crate::message::{ClipIdentity, Decoding, Key};
 use crate::stop::Stop;
+use guardsplat_codeword::MessageLength;
 
 /// What keys name in place of a CLIP.
 pub const HIDDEN: &str = "hidden";
@@ -70,7 +70,7 @@ pub fn create_hidden_key(
     stop: &Stop,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Key> {
-    check_bits(options.bits)?;
+    MessageLength::new(options.bits)?;
     let secret = match options.seed {
         Some(seed) => Secret::from_seed(seed),
         None => Secret::random()?,

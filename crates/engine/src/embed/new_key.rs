@@ -47,7 +47,7 @@ pub fn create_key(
     stop: &Stop,
     mut progress: impl FnMut(NewKey),
 ) -> Result<Key> {
-    crate::message::bits::check_bits(options.bits)?;
+    guardsplat_codeword::MessageLength::new(options.bits)?;
     let bits_per_token = options.bits_per_token();
     let secret = match options.seed {
         Some(seed) => Secret::from_seed(seed),

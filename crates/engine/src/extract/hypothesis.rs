@@ -1,9 +1,11 @@
-//! Ways to look at a picture that somebody may have turned, mirrored, or put into a frame.
+//! Hypotheses about what was done to a picture (turned, mirrored, put into a frame, its tones changed), and their undoing.
 //!
-//! Each is read for itself, and each is a hypothesis of its own: whoever decides on the best of them pays for all.
-use super::Engine;
-use super::photometric::{Guess, guesses, read_guesses};
-use super::window::Window;
+//! Each is read for itself, and is paid for by whoever decides on the best of them.
+use guardsplat_codeword::Hypothesis;
+
+use super::photometric::{corrections, read_corrections};
+use super::window::windows;
+use super::{Engine, Extractor};
 use crate::error::Result;
 use crate::picture::Picture;
 
@@ -12,115 +14,92 @@ const TOLERANCE: f32 = 8.0 / 255.0;
 /// Pixels a side that are left at least; less is nothing to read.
 const LEAST_SIDE: u32 = 16;
 
-/// What is done to a picture before it is read: borders are cut off, then it is turned, then mirrored.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Framing {
-    /// Counterclockwise, 0 to 3.
-    pub quarter_turns: u8,
-    /// Left and right are exchanged.
-    pub mirrored: bool,
-    /// Borders of one colour are cut off.
-    pub trimmed: bool,
-    /// What is guessed to have been done to its tones, and undone.
-    pub undone: Guess,
-    /// A part of it is read, the rest is not.
-    pub window: Option<Window>,
+/// All hypotheses under which this extractor reads one picture that has borders and is large enough to be read in parts:
+/// the most that a claim about a picture pays for.
+pub fn searched_hypotheses(extractor: &dyn Extractor) -> Vec<Hypothesis> {
+    let whole = [false, true].map(|trimmed| whole_hypotheses(extractor, trimmed));
+    whole.into_iter().flatten().chain(part_hypotheses(extractor)).collect()
 }
 
-impl std::fmt::Display for Framing {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.undone.fmt(f)?;
-        if self.quarter_turns > 0 {
-            write!(f, ", turned by {} degrees", 90 * u32::from(self.quarter_turns))?;
-        }
-        if self.mirrored {
-            f.write_str(", mirrored")?;
-        }
-        if self.trimmed {
-            f.write_str(", without borders")?;
-        }
-        if let Some(window) = self.window {
-            write!(f, ", {window}")?;
-        }
-        Ok(())
+/// Hypotheses under which a whole picture is read, nothing done first; with borders or `trimmed`. How a picture lies makes
+/// no difference to an average over its pixels, so where exact colours are read it is changed tones that are undone.
+pub(super) fn whole_hypotheses(extractor: &dyn Extractor, trimmed: bool) -> Vec<Hypothesis> {
+    if !extractor.reads_exact_colours() {
+        return orientations(trimmed).collect();
     }
+    let corrected = corrections(extractor).into_iter().map(|correction| Hypothesis {
+        trimmed,
+        correction,
+        ..Hypothesis::default()
+    });
+    corrected.collect()
 }
 
-impl Framing {
-    /// The eight ways to lay a picture on a table, as given first; with borders or `trimmed`.
-    pub fn laid(trimmed: bool) -> impl Iterator<Item = Self> {
-        [false, true].into_iter().flat_map(move |mirrored| {
-            (0..4).map(move |quarter_turns| Self {
-                quarter_turns,
-                mirrored,
-                trimmed,
-                ..Self::default()
-            })
-        })
-    }
+/// Hypotheses under which parts of a picture are read; none where the extractor does not read parts.
+pub(super) fn part_hypotheses(extractor: &dyn Extractor) -> impl Iterator<Item = Hypothesis> {
+    let part = |window| Hypothesis {
+        window: Some(window),
+        ..Hypothesis::default()
+    };
+    windows().filter(|_| extractor.reads_exact_colours()).map(part)
+}
 
-    /// A part of a picture, as it is.
-    pub fn of(window: Window) -> Self {
-        Self {
-            window: Some(window),
-            ..Self::default()
-        }
+/// Logits of a picture under each of [`whole_hypotheses`], in their order; its borders, if they are to go, were cut off
+/// before.
+///
+/// # Errors
+/// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
+pub(super) fn read_whole(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
+    if engine.extractor.reads_exact_colours() {
+        return read_corrections(engine, picture);
     }
+    // One at a time: a large picture need not fit in memory eight times.
+    let turned = orientations(false).map(|way| Ok(engine.read_logits(&[reorient(way, picture)])?.swap_remove(0)));
+    turned.collect()
+}
 
-    /// The ways that this engine tries on a picture, as given first; with borders or `trimmed`. How a picture lies makes no
-    /// difference to an average over its pixels, so where exact colours are read it is tones that are guessed.
-    pub fn tried(engine: &Engine, trimmed: bool) -> Vec<Self> {
-        if !engine.extractor.reads_exact_colours() {
-            return Self::laid(trimmed).collect();
-        }
-        let guessed = guesses(engine).into_iter().map(|undone| Self {
+/// The eight ways to lay a picture on a table, as given first; with borders or `trimmed`.
+fn orientations(trimmed: bool) -> impl Iterator<Item = Hypothesis> {
+    [false, true].into_iter().flat_map(move |mirrored| {
+        (0..4).map(move |quarter_turns| Hypothesis {
+            quarter_turns,
+            mirrored,
             trimmed,
-            undone,
-            ..Self::default()
-        });
-        guessed.collect()
-    }
+            ..Hypothesis::default()
+        })
+    })
+}
 
-    /// Logits of a picture in each of these ways, in their order; its borders, if they are to go, were cut off before.
-    ///
-    /// # Errors
-    /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
-    pub fn read(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
-        if engine.extractor.reads_exact_colours() {
-            return read_guesses(engine, picture);
+/// The picture turned and mirrored; its borders, if they are to go, were cut off before.
+fn reorient(hypothesis: Hypothesis, picture: &Picture) -> Picture {
+    let (w, h) = (picture.width as usize, picture.height as usize);
+    let (width, height) = match hypothesis.quarter_turns % 2 {
+        0 => (w, h),
+        _ => (h, w),
+    };
+    let mut pixels = Vec::with_capacity(picture.pixels.len());
+    for y in 0..height {
+        for column in 0..width {
+            let x = if hypothesis.mirrored {
+                width - 1 - column
+            } else {
+                column
+            };
+            // Where a pixel of the turned picture was before.
+            let (x, y) = match hypothesis.quarter_turns % 4 {
+                0 => (x, y),
+                1 => (w - 1 - y, x),
+                2 => (w - 1 - x, h - 1 - y),
+                _ => (y, h - 1 - x),
+            };
+            let at = 3 * (y * w + x);
+            pixels.extend_from_slice(&picture.pixels[at..at + 3]);
         }
-        // One at a time: a large picture need not fit in memory eight times.
-        let laid = Self::laid(false).map(|framing| Ok(engine.read_logits(&[framing.lay(picture)])?.swap_remove(0)));
-        laid.collect()
     }
-
-    /// The picture turned and mirrored; its borders, if they are to go, were cut off before.
-    fn lay(self, picture: &Picture) -> Picture {
-        let (w, h) = (picture.width as usize, picture.height as usize);
-        let (width, height) = match self.quarter_turns % 2 {
-            0 => (w, h),
-            _ => (h, w),
-        };
-        let mut pixels = Vec::with_capacity(picture.pixels.len());
-        for y in 0..height {
-            for column in 0..width {
-                let x = if self.mirrored { width - 1 - column } else { column };
-                // Where a pixel of the turned picture was before.
-                let (x, y) = match self.quarter_turns % 4 {
-                    0 => (x, y),
-                    1 => (w - 1 - y, x),
-                    2 => (w - 1 - x, h - 1 - y),
-                    _ => (y, h - 1 - x),
-                };
-                let at = 3 * (y * w + x);
-                pixels.extend_from_slice(&picture.pixels[at..at + 3]);
-            }
-        }
-        Picture {
-            width: width as u32,
-            height: height as u32,
-            pixels,
-        }
+    Picture {
+        width: width as u32,
+        height: height as u32,
+        pixels,
     }
 }
 
@@ -170,7 +149,36 @@ fn is_plain(picture: &Picture, columns: std::ops::Range<u32>, rows: std::ops::Ra
 
 #[cfg(test)]
 mod tests {
+    use burn::tensor::Tensor;
+
     use super::*;
+
+    /// Reads nothing.
+    struct Fake {
+        exact: bool,
+    }
+
+    impl Extractor for Fake {
+        fn bits(&self) -> usize {
+            64
+        }
+
+        fn side(&self) -> usize {
+            32
+        }
+
+        fn parameters(&self) -> usize {
+            0
+        }
+
+        fn reads_exact_colours(&self) -> bool {
+            self.exact
+        }
+
+        fn logits(&self, _: Tensor<4>) -> Result<Tensor<2>> {
+            unreachable!("nothing is read")
+        }
+    }
 
     /// A picture whose pixels tell their places.
     fn places(width: u32, height: u32) -> Picture {
@@ -193,22 +201,22 @@ mod tests {
     #[test]
     fn a_quarter_turn_is_counterclockwise_and_four_are_none() {
         let picture = places(3, 2);
-        let turn = Framing {
+        let turn = Hypothesis {
             quarter_turns: 1,
-            ..Framing::default()
+            ..Hypothesis::default()
         };
-        let turned = turn.lay(&picture);
+        let turned = reorient(turn, &picture);
         assert_eq!((turned.width, turned.height), (2, 3));
         // What was at the top right is at the top left.
         assert_eq!(turned.pixels[..3], picture.pixels[6..9]);
         let mut again = picture.clone();
         for quarter_turns in 0..4 {
-            let at_once = Framing {
+            let at_once = Hypothesis {
                 quarter_turns,
-                ..Framing::default()
+                ..Hypothesis::default()
             };
-            assert_eq!(at_once.lay(&picture), again, "{quarter_turns}");
-            again = turn.lay(&again);
+            assert_eq!(reorient(at_once, &picture), again, "{quarter_turns}");
+            again = reorient(turn, &again);
         }
         assert_eq!(again, picture);
     }
@@ -216,7 +224,7 @@ mod tests {
     #[test]
     fn the_eight_ways_are_different_and_the_first_is_as_given() {
         let picture = places(5, 5);
-        let all: Vec<_> = Framing::laid(false).map(|framing| framing.lay(&picture)).collect();
+        let all: Vec<_> = orientations(false).map(|way| reorient(way, &picture)).collect();
         assert_eq!(all[0], picture);
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a != b), "{i}");
@@ -240,5 +248,17 @@ mod tests {
         let plain = framed(&places(0, 0), [30, 30, 0, 0], 0.5);
         assert_eq!(without_borders(&plain), None);
         assert_eq!(without_borders(&framed(&places(8, 8), [20; 4], 0.9)), None);
+    }
+
+    #[test]
+    fn as_many_hypotheses_are_searched_as_claims_about_pictures_are_told_to_pay_for() {
+        let exact = searched_hypotheses(&Fake { exact: true });
+        // 72 tones with borders and without, and 34 parts (docs/verify.md).
+        assert_eq!(exact.len(), 178);
+        assert_eq!(searched_hypotheses(&Fake { exact: false }).len(), 16);
+        assert_eq!(exact[0], Hypothesis::default());
+        for (place, hypothesis) in exact.iter().enumerate() {
+            assert!(!exact[..place].contains(hypothesis), "{hypothesis}");
+        }
     }
 }

@@ -1,12 +1,15 @@
-//! One picture read in every framing, and pictures of one suspect taken together.
-use super::window::Window;
-use super::{Engine, Framing, Reading, without_borders};
+//! One picture read under every hypothesis, and pictures of one suspect taken together.
+use guardsplat_codeword::Hypothesis;
+
+use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
+use super::window::read_windows;
+use super::{Engine, PooledLogits, without_borders};
 use crate::error::Result;
 use crate::picture::Picture;
 
-/// What was read of one picture in each framing.
+/// What was read of one picture under each hypothesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Framed {
+pub struct PictureLogits {
     whole: Vec<Vec<f32>>,
     /// Without its borders, if it has any.
     trimmed: Option<Vec<Vec<f32>>>,
@@ -14,18 +17,18 @@ pub struct Framed {
     parts: Option<Vec<Vec<f32>>>,
 }
 
-impl Framed {
-    /// Reads a picture in every framing that the engine tries.
+impl PictureLogits {
+    /// Reads a picture under every hypothesis that the engine searches.
     ///
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture) -> Result<Self> {
-        let whole = Framing::read(engine, picture)?;
+        let whole = read_whole(engine, picture)?;
         let trimmed = without_borders(picture)
-            .map(|trimmed| Framing::read(engine, &trimmed))
+            .map(|trimmed| read_whole(engine, &trimmed))
             .transpose()?;
         let parts = match engine.extractor.reads_exact_colours() {
-            true => Window::read(engine, picture)?,
+            true => read_windows(engine, picture)?,
             false => None,
         };
         Ok(Self { whole, trimmed, parts })
@@ -37,31 +40,38 @@ impl Framed {
     }
 }
 
-/// Readings of pictures of one suspect, all in the same framing, as given first. Framings without borders are there only
-/// if some picture has any, and parts if some picture is large enough: others would be the same once more.
+/// Logits of pictures of one suspect, pooled under each hypothesis, nothing done first. Those without borders are there
+/// only if some picture has any, and parts if some picture is large enough: others would be the same once more. All of
+/// them together are [`searched_hypotheses`](super::searched_hypotheses).
 ///
 /// # Errors
 /// No pictures, or logits that are not finite.
-pub fn framings(engine: &Engine, pictures: &[Framed]) -> Result<Vec<(Framing, Reading)>> {
+pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hypothesis, PooledLogits)>> {
+    let extractor = engine.extractor.as_ref();
     let borders = pictures.iter().any(|picture| picture.trimmed.is_some());
     let mut readings = Vec::new();
     for trimmed in [false, true].into_iter().filter(|trimmed| borders || !trimmed) {
-        for (place, framing) in Framing::tried(engine, trimmed).into_iter().enumerate() {
-            let of_picture = |picture: &Framed| match (&picture.trimmed, trimmed) {
+        for (place, hypothesis) in whole_hypotheses(extractor, trimmed).into_iter().enumerate() {
+            let of_picture = |picture: &PictureLogits| match (&picture.trimmed, trimmed) {
                 (Some(logits), true) => logits[place].clone(),
                 _ => picture.whole[place].clone(),
             };
-            readings.push((framing, Reading::new(pictures.iter().map(of_picture).collect())?));
+            readings.push((
+                hypothesis,
+                PooledLogits::new(pictures.iter().map(of_picture).collect())?,
+            ));
         }
     }
     if pictures.iter().any(|picture| picture.parts.is_some()) {
-        for (place, window) in Window::tried().enumerate() {
-            let of_picture = |picture: &Framed| match &picture.parts {
+        for (place, hypothesis) in part_hypotheses(extractor).enumerate() {
+            let of_picture = |picture: &PictureLogits| match &picture.parts {
                 Some(logits) => logits[place].clone(),
                 None => picture.as_given().to_vec(),
             };
-            let reading = Reading::new(pictures.iter().map(of_picture).collect())?;
-            readings.push((Framing::of(window), reading));
+            readings.push((
+                hypothesis,
+                PooledLogits::new(pictures.iter().map(of_picture).collect())?,
+            ));
         }
     }
     Ok(readings)

@@ -1,14 +1,14 @@
 //! A key: the secret, the decoder trained for it, and the CLIP that both belong to.
-use guardsplat_distortion::RobustTo;
 use std::fmt;
 use std::path::Path;
 
 use burn::tensor::Device;
+use guardsplat_codeword::{Message, MessageLength};
+use guardsplat_distortion::RobustTo;
 use rand::TryRng;
 use rand::rngs::SysRng;
 use serde::{Deserialize, Serialize};
 
-use super::bits::{Message, check_bits};
 use super::decoder::DecoderWeights;
 use super::key_file;
 use super::projection::Projection;
@@ -29,7 +29,7 @@ pub struct ClipIdentity {
 /// What a key is made from, besides a CLIP.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyOptions {
-    /// Bits of its messages, 1 to [`MAX_BITS`](super::bits::MAX_BITS).
+    /// Bits of its messages, 1 to [`MAX_BITS`](guardsplat_codeword::MAX_BITS).
     pub bits: usize,
     /// Bits that one CLIP token stands for; `None` takes the fewest that make room.
     pub bits_per_token: Option<usize>,
@@ -133,7 +133,7 @@ impl Key {
         stop: &Stop,
         progress: impl FnMut(Progress),
     ) -> Result<Self> {
-        check_bits(options.bits)?;
+        MessageLength::new(options.bits)?;
         projection.check().map_err(|reason| Error::BadOption {
             field: "projection",
             reason,
@@ -198,7 +198,7 @@ impl Key {
 
     /// Parses a message of the key's length from hexadecimal.
     pub fn message(&self, text: &str) -> Result<Message> {
-        Message::parse(text, self.bits())
+        Ok(Message::parse(text, self.bits())?)
     }
 
     /// Fails unless the key belongs to the CLIP with these weights; `path` is the key's file, for the message.

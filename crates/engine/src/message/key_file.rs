@@ -7,13 +7,14 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::bits::MAX_BITS;
 use super::decoder::{DecoderWeights, HIDDEN, LayerWeights};
 use super::key::{ClipIdentity, Decoding, Key, Secret};
 use super::projection::Projection;
 use super::tokens::check_bits_per_token;
 use crate::clip::check_header;
 use crate::error::{Error, Result};
+use guardsplat_codeword::MAX_BITS;
+use guardsplat_codeword::MessageLength;
 
 /// The format's version; another one is refused.
 const VERSION: u32 = 1;
@@ -198,7 +199,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
         ));
     }
     let header: Header = serde_json::from_str(json).map_err(bad_header)?;
-    if !(1..=MAX_BITS).contains(&header.bits) {
+    if MessageLength::new(header.bits).is_err() {
         return Err(format!("{} bits are outside 1 to {MAX_BITS}", header.bits));
     }
     check_bits_per_token(header.bits, header.bits_per_token).map_err(|e| e.to_string())?;

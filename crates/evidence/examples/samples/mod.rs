@@ -1,7 +1,7 @@
 //! Made-up reports, plausible and always the same, for examples and tests.
 use guardsplat_evidence::{
-    Audience, Bit, Decision, Embedding, Evidence, Found, Framing, FramingKind, Input, Key, Kind, Model, Picture,
-    Reason, Role, SCHEMA, Sha256, SigningKey, Target, Tried, VERSION, Verdict, Verification, View,
+    Audience, Bit, Decision, Embedding, Evidence, Found, HypothesisGroup, HypothesisKind, Input, Key, Kind, Model,
+    Picture, Reason, Role, SCHEMA, Sha256, SigningKey, Target, Tried, VERSION, Verdict, Verification, View,
 };
 
 /// The service's key; of examples, so everybody's.
@@ -29,14 +29,14 @@ pub fn all() -> Vec<(&'static str, Evidence)> {
 
 /// A match found by a search over ten assets in several framings.
 pub fn matching() -> Evidence {
-    let framing = |kind, variants, pooled| Framing { kind, variants, pooled };
+    let framing = |kind, variants, pooled| HypothesisGroup { kind, variants, pooled };
     let tried = Tried {
         framings: vec![
-            framing(FramingKind::AsGiven, 1, false),
-            framing(FramingKind::Crop, 5, true),
-            framing(FramingKind::QuarterTurn, 3, false),
-            framing(FramingKind::Mirrored, 1, false),
-            framing(FramingKind::Scaling, 2, true),
+            framing(HypothesisKind::AsGiven, 1, false),
+            framing(HypothesisKind::Crop, 5, true),
+            framing(HypothesisKind::QuarterTurn, 3, false),
+            framing(HypothesisKind::Mirrored, 1, false),
+            framing(HypothesisKind::Scaling, 2, true),
         ],
         owners: 2,
         assets: 10,

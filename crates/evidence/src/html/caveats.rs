@@ -1,6 +1,6 @@
 //! What a report does not prove, said before somebody else says it.
 use crate::evidence::{Evidence, Kind};
-use crate::verification::Verdict;
+use guardsplat_codeword::Verdict;
 use maud::{Markup, html};
 
 /// What does not follow from this report.

@@ -1,8 +1,9 @@
 //! The verdict: what everybody reads, and some read only.
 use super::text::{sent, visible};
 use crate::evidence::{Audience, Evidence, Kind};
-use crate::verification::{Reason, Verdict, Verification};
+use crate::verification::{Reason, Verification};
 use crate::words::{chance, counted};
+use guardsplat_codeword::Verdict;
 use maud::{Markup, html};
 
 /// The verdict in a few words, for the title of the window.

@@ -1,7 +1,7 @@
 //! Marking assets and claims about them, from submission to evidence; workers are played by the tests.
 use std::time::Duration;
 
-use guardsplat_codeword::Word;
+use guardsplat_codeword::Message;
 use guardsplat_evidence::{Checked, Picture, Verdict as Told, VerifyingKey, check};
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::complete_job_request::Result as Output;
@@ -74,7 +74,7 @@ fn embed(key: &str, scene: &str, asset: &str) -> EmbedSpec {
 }
 
 fn logits(word: &str, wrong: usize) -> Vec<f32> {
-    let word = Word::from_u64(u64::from_str_radix(word, 16).unwrap());
+    let word = Message::from_u64(u64::from_str_radix(word, 16).unwrap());
     let sign = |(i, bit): (usize, bool)| {
         if bit != (i % 10 == 3 && i / 10 < wrong) {
             4.0

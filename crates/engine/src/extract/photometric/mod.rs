@@ -1,76 +1,52 @@
-//! Guesses at what was done to the tones of a picture, each undone and read.
+//! Photometric corrections: what may have been done to the tones of a picture, each undone and read.
 //!
 //! The shipped CLIP reads exact colours: a picture that was brightened by a twentieth reads as another one. What was done
-//! is not known, so it is guessed. Logits do not tell which guess is right (a smooth unmarked surface has large ones,
-//! too): the message that is claimed does, **and every guess is another chance to match it, which a claim must count**.
+//! is not known, so much is tried. Logits do not tell which correction is right (a smooth unmarked surface has large ones,
+//! too): the message that is claimed does, **and every correction is another chance to match it, which a claim must
+//! count**.
 mod ground;
 mod tone;
 
-pub use tone::Tone;
+use guardsplat_codeword::PhotometricCorrection;
 
-use super::Engine;
+use super::{Engine, Extractor};
 use crate::error::Result;
 use crate::picture::Picture;
 
-/// Guesses that are read together.
+/// Corrected pictures that are read together.
 const BATCH: usize = 8;
 
-/// What may have been done to a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Guess {
-    /// Nothing: it is read as it is.
-    #[default]
-    Nothing,
-    /// Something that left its ground neither black nor white, such as noise.
-    Ground,
-    /// Its tones were changed, and with them its ground.
-    Tone(Tone),
-}
-
-/// All guesses, nothing first: what [`read_guesses`] reads.
-pub fn guesses(engine: &Engine) -> Vec<Guess> {
-    let mut all = vec![Guess::Nothing];
-    if engine.extractor.reads_exact_colours() {
-        all.push(Guess::Ground);
-        all.extend(tone::all().into_iter().map(Guess::Tone));
+/// All corrections that this extractor needs, none first: what [`read_corrections`] reads.
+pub fn corrections(extractor: &dyn Extractor) -> Vec<PhotometricCorrection> {
+    let mut all = vec![PhotometricCorrection::None];
+    if extractor.reads_exact_colours() {
+        all.push(PhotometricCorrection::WhiteBackground);
+        all.extend(tone::all().into_iter().map(PhotometricCorrection::Tone));
     }
     all
 }
 
-/// Logits of a picture under each guess, in the order of [`guesses`].
+/// Logits of a picture after each correction, in the order of [`corrections`].
 ///
 /// # Errors
 /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
-pub fn read_guesses(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
+pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
     let mut logits = engine.read_logits(std::slice::from_ref(picture))?;
     let small = engine.resized(picture)?;
-    for chunk in guesses(engine)[1..].chunks(BATCH) {
-        let pictures: Vec<Picture> = chunk.iter().map(|guess| guess.undone(&small)).collect();
+    for chunk in corrections(engine.extractor.as_ref())[1..].chunks(BATCH) {
+        let pictures: Vec<Picture> = chunk.iter().map(|correction| corrected(*correction, &small)).collect();
         logits.extend(engine.read_logits(&pictures)?);
     }
     Ok(logits)
 }
 
-impl std::fmt::Display for Guess {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Nothing => f.write_str("as it is"),
-            Self::Ground => f.write_str("ground made white"),
-            Self::Tone(tone) => write!(f, "{tone} undone"),
-        }
-    }
-}
-
-impl Guess {
-    /// The picture before that was done to it, over white where its ground is seen.
-    fn undone(self, picture: &Picture) -> Picture {
-        let toned = match self {
-            Self::Nothing => return picture.clone(),
-            Self::Ground => None,
-            Self::Tone(tone) => Some(tone.undone(picture)),
-        };
-        let toned = toned.as_ref().unwrap_or(picture);
-        ground::whitened(toned).unwrap_or_else(|| toned.clone())
-    }
+/// The picture before that was done to it, over white where its background is seen.
+fn corrected(correction: PhotometricCorrection, picture: &Picture) -> Picture {
+    let toned = match correction {
+        PhotometricCorrection::None => return picture.clone(),
+        PhotometricCorrection::WhiteBackground => None,
+        PhotometricCorrection::Tone(tone) => Some(tone::undone(tone, picture)),
+    };
+    let toned = toned.as_ref().unwrap_or(picture);
+    ground::whitened(toned).unwrap_or_else(|| toned.clone())
 }
