@@ -12,14 +12,14 @@ const HEAD: u64 = 12;
 
 /// What a file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum FileKind {
     /// A scene of this format, be it a damaged one.
     Scene(Format),
     /// A picture, be it a damaged one.
     Picture,
 }
 
-impl Kind {
+impl FileKind {
     /// What the file is; fails where it is neither, with the reasons.
     pub fn of(path: &Path) -> Result<Self> {
         let bad = |reason: String| Error::io(path)(std::io::Error::other(reason));
@@ -59,17 +59,22 @@ mod tests {
         let kind = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            Kind::of(&path)
+            FileKind::of(&path)
         };
         for bytes in [
             &b"\x89PNG\r\n\x1a\nIHDR"[..],
             b"\xff\xd8\xff\xe0",
             b"RIFF\0\0\0\0WEBPVP8 ",
         ] {
-            assert_eq!(kind("a.ply", bytes).unwrap(), Kind::Picture, "{}", bytes.escape_ascii());
+            assert_eq!(
+                kind("a.ply", bytes).unwrap(),
+                FileKind::Picture,
+                "{}",
+                bytes.escape_ascii()
+            );
         }
         for (bytes, format) in [(&b"ply\n"[..], Format::Ply), (b"\x1f\x8b", Format::Spz)] {
-            assert_eq!(kind("a.png", bytes).unwrap(), Kind::Scene(format));
+            assert_eq!(kind("a.png", bytes).unwrap(), FileKind::Scene(format));
         }
         let reason = |name: &str, bytes: &[u8]| kind(name, bytes).unwrap_err().to_string();
         for bytes in [&b""[..], b"Dear diary", b"RIFF\0\0\0\0WAVE", b"GIF89a"] {
@@ -80,11 +85,16 @@ mod tests {
             );
         }
         assert!(
-            Kind::of(&folder.path().join("none.ply"))
+            FileKind::of(&folder.path().join("none.ply"))
                 .unwrap_err()
                 .to_string()
                 .contains("none.ply")
         );
-        assert!(Kind::of(folder.path()).unwrap_err().to_string().contains("not a file"));
+        assert!(
+            FileKind::of(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("not a file")
+        );
     }
 }

@@ -14,7 +14,7 @@ use crate::create::{create_with, leave, missed_target, no_result, succeeded, wai
 use crate::distortion::{self, Distortion};
 use crate::error::{Error, Result};
 use crate::interrupt::Stage;
-use crate::kind::Kind;
+use crate::kind::FileKind;
 use crate::names;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
@@ -155,7 +155,7 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
 
 /// Whether the file is a scene, and what comes of it may be called so.
 fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
-    let Kind::Scene(format) = Kind::of(input)? else {
+    let FileKind::Scene(format) = FileKind::of(input)? else {
         return Err(Error::io(input)(std::io::Error::other("a picture, and no scene")));
     };
     let suits = output.map_or(Ok(()), |output| format.check_name(output));

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
+use crate::kind::FileKind;
 use crate::names;
 use crate::transfer::{Source, discard, upload};
 
@@ -100,7 +100,7 @@ pub fn find(paths: &[String]) -> Result<Vec<Input>> {
             continue;
         }
         // What is neither a scene nor a picture is better known before it is sent.
-        Kind::of(&path)?;
+        FileKind::of(&path)?;
         found.push(Input::File(path));
     }
     if found.len() > MOST {

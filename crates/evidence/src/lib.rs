@@ -25,7 +25,7 @@ pub use check::{Altered, Answer, Checked, check};
 pub use ed25519_dalek::{SigningKey, VerifyingKey};
 pub use embedding::{Embedding, Target};
 pub use error::{Error, Result};
-pub use evidence::{Audience, Evidence, Input, Key, Kind, Model, Role, SCHEMA, VERSION};
+pub use evidence::{Audience, Evidence, EvidenceKind, Input, Key, Model, Role, SCHEMA, VERSION};
 pub use guardsplat_codeword::Verdict;
 pub use hash::Sha256;
 pub use jiff::Timestamp;

@@ -2,7 +2,7 @@
 use std::time::Duration;
 
 use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
-use guardsplat_distortion::{Kind, RobustTo};
+use guardsplat_distortion::{DistortionKind, RobustTo};
 use guardsplat_engine::Error as EngineError;
 use guardsplat_engine::embed::{self, NewKey, Outcome, Preset, Settings};
 use guardsplat_engine::extract::{DEFAULT_VIEWS, PooledLogits};
@@ -43,22 +43,22 @@ pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
 fn robust_to(numbers: &[i32]) -> Result<RobustTo> {
     let kind = |number: &i32| {
         Ok(match Distortion::try_from(*number) {
-            Ok(Distortion::Crop) => Kind::Crop,
-            Ok(Distortion::Scaling) => Kind::Scaling,
-            Ok(Distortion::Rotation) => Kind::Rotation,
-            Ok(Distortion::Brightness) => Kind::Brightness,
-            Ok(Distortion::Contrast) => Kind::Contrast,
-            Ok(Distortion::Jpeg) => Kind::Jpeg,
-            Ok(Distortion::Noise) => Kind::Noise,
-            Ok(Distortion::Blur) => Kind::Blur,
-            Ok(Distortion::Mask) => Kind::Mask,
-            Ok(Distortion::EightBit) => Kind::EightBit,
-            Ok(Distortion::Combined) => Kind::Combined,
-            Ok(Distortion::ShNoise) => Kind::ShNoise,
-            Ok(Distortion::ShTruncation) => Kind::ShTruncation,
-            Ok(Distortion::Spz) => Kind::Spz,
-            Ok(Distortion::Sog) => Kind::Sog,
-            Ok(Distortion::Pruning) => Kind::Pruning,
+            Ok(Distortion::Crop) => DistortionKind::Crop,
+            Ok(Distortion::Scaling) => DistortionKind::Scaling,
+            Ok(Distortion::Rotation) => DistortionKind::Rotation,
+            Ok(Distortion::Brightness) => DistortionKind::Brightness,
+            Ok(Distortion::Contrast) => DistortionKind::Contrast,
+            Ok(Distortion::Jpeg) => DistortionKind::Jpeg,
+            Ok(Distortion::Noise) => DistortionKind::Noise,
+            Ok(Distortion::Blur) => DistortionKind::Blur,
+            Ok(Distortion::Mask) => DistortionKind::Mask,
+            Ok(Distortion::EightBit) => DistortionKind::EightBit,
+            Ok(Distortion::Combined) => DistortionKind::Combined,
+            Ok(Distortion::ShNoise) => DistortionKind::ShNoise,
+            Ok(Distortion::ShTruncation) => DistortionKind::ShTruncation,
+            Ok(Distortion::Spz) => DistortionKind::Spz,
+            Ok(Distortion::Sog) => DistortionKind::Sog,
+            Ok(Distortion::Pruning) => DistortionKind::Pruning,
             Ok(Distortion::Unspecified) | Err(_) => {
                 return Err(Error::BadJob(format!("robust_to: {number} is no distortion")));
             }

@@ -20,7 +20,7 @@ use crate::commands::{key, suspects};
 use crate::context::Context;
 use crate::create::create_with;
 use crate::error::{Error, Result};
-use crate::kind::Kind;
+use crate::kind::FileKind;
 use crate::output::{Exit, print_line, printable, say};
 use crate::webhook::fetch::{Fetched, Prefix};
 use crate::webhook::http;
@@ -227,9 +227,9 @@ async fn submit(
     object: &Object,
     path: &Path,
 ) -> Result<Outcome> {
-    match Kind::of(path) {
-        Ok(Kind::Scene(_)) => {}
-        Ok(Kind::Picture) => return Ok(Outcome::Never("a picture, and no scene".into())),
+    match FileKind::of(path) {
+        Ok(FileKind::Scene(_)) => {}
+        Ok(FileKind::Picture) => return Ok(Outcome::Never("a picture, and no scene".into())),
         Err(error) => return Ok(Outcome::Never(error.to_string())),
     }
     let message = match (program, &arguments.message) {
