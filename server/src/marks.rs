@@ -3,7 +3,7 @@
 //! Nonce and blinding, which the ledger keeps sealed and a commitment holds the hash of, decide the pad. So it was
 //! settled when the original was registered, nobody who reads a scene first can choose an asset to fit, and whoever is
 //! shown both can compute the word again. Formulas are in `docs/registry.md`.
-use guardsplat_codeword::{Code, Layout, Mark, Payload, Whitening, WordLength};
+use guardsplat_codeword::{Code, Layout, Mark, MessageLength, Payload, Whitening};
 use guardsplat_commitment::Opening;
 use secrecy::zeroize::Zeroizing;
 use sha2::{Digest, Sha256};
@@ -18,7 +18,7 @@ pub const CODE: Code = Code::Bch36;
 
 /// Bits that a key must have for its assets to be marked.
 pub fn bits() -> u32 {
-    WordLength::CODED.bits()
+    MessageLength::CODED.bits()
 }
 
 /// The payload of a number of a key. Keys have no numbers: theirs is taken from the hash of their id, which is enough,

@@ -31,6 +31,12 @@ impl Error {
     }
 }
 
+impl From<guardsplat_codeword::Error> for Error {
+    fn from(error: guardsplat_codeword::Error) -> Self {
+        Self::Engine(error.into())
+    }
+}
+
 impl From<guardsplat_scene::Error> for Error {
     fn from(error: guardsplat_scene::Error) -> Self {
         Self::Engine(error.into())

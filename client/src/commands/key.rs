@@ -1,5 +1,6 @@
 //! `key create` and `key list`, and which key a name means.
 use clap::{Args, Subcommand};
+use guardsplat_codeword::{MAX_BITS, Message};
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
 use guardsplat_proto::v1::key_service_client::KeyServiceClient;
 use guardsplat_proto::v1::{GetKeyRequest, Key, KeySpec, ListKeysRequest};
@@ -27,7 +28,7 @@ pub enum Command {
 #[derive(Args)]
 pub struct Create {
     /// Bits of its messages, 1 to 150
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=150))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_BITS)))]
     bits: u32,
     /// Makes the key reproducible, and no more secret than this number; without it, it is drawn at random
     #[arg(long, value_name = "NUMBER")]
@@ -143,19 +144,16 @@ fn wrong(reason: String) -> Error {
 /// The message as the server is sent it, in lower case and without `0x`. It must have the length that the key wants,
 /// which is better known before anything large is sent.
 pub fn message(key: &Key, given: &str) -> Result<String> {
-    let message = given.to_ascii_lowercase();
-    let message = message.strip_prefix("0x").unwrap_or(&message);
-    let digits = key.bits.div_ceil(4) as usize;
-    if message.len() == digits && message.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return Ok(message.to_owned());
-    }
-    Err(Error::BadOption {
+    let message = Message::parse(given, key.bits as usize).map_err(|error| Error::BadOption {
         field: "--message",
         reason: format!(
-            "must be {digits} hexadecimal digits, for the {} bits of {}",
-            key.bits, key.name
+            "must be {} hexadecimal digits, for the {} bits of {} ({error})",
+            key.bits.div_ceil(4),
+            key.bits,
+            key.name
         ),
-    })
+    })?;
+    Ok(message.to_string())
 }
 
 async fn get(context: &Context, name: String) -> Result<Key> {
@@ -192,5 +190,6 @@ mod tests {
         assert!(message(&key(32), "c0ffee4x").is_err());
         assert!(message(&key(32), "0xc0ffee").is_err());
         assert!(message(&key(32), "").is_err());
+        assert!(message(&key(30), "f0ffee42").is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! `owner`, `asset`, `report`, and `embed` and `verify` with what is registered.
 use guardsplat_evidence::{
-    Audience, Evidence, Key, Kind, Model, SCHEMA, Sha256, SigningKey, Timestamp, Tried, VERSION, Verdict as Told,
-    Verification, sign,
+    Audience, Evidence, EvidenceKind, Key, Model, SCHEMA, Sha256, SigningKey, Timestamp, Tried, VERSION,
+    Verdict as Told, Verification, sign,
 };
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
@@ -130,7 +130,7 @@ fn report(key: &SigningKey) -> guardsplat_evidence::Signed {
         schema: SCHEMA.into(),
         version: VERSION,
         audience: Audience::Owner,
-        kind: Kind::Verify,
+        kind: EvidenceKind::Verify,
         job: "jobs/1".into(),
         started: now,
         finished: now,

@@ -1,17 +1,17 @@
-//! How long it takes to find the nearest of 10,000 and of 1,000,000 registered words, for six framings of a suspect.
+//! How long it takes to find the nearest of 10,000 and of 1,000,000 registered words, for six hypotheses of a suspect.
 use std::time::Instant;
 
-use guardsplat_codeword::{Index, Reading, Result, Word, WordLength};
+use guardsplat_codeword::{Index, Message, MessageLength, Reading, Result};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn main() -> Result<()> {
-    println!("bits      words   best of 6 framings, ms: least, median of 21   a word, ns");
+    println!("bits      words   best of 6 hypotheses, ms: least, median of 21   a word, ns");
     for bits in [64, 128, 150] {
         for words in [10_000_u64, 1_000_000] {
             let mut rng = ChaCha8Rng::seed_from_u64(1);
-            let mut random = || Word::from_bits(&(0..bits).map(|_| rng.random()).collect::<Vec<bool>>());
-            let mut index = Index::new(WordLength::new(bits)?);
+            let mut random = || Message::from_bits(&(0..bits).map(|_| rng.random()).collect::<Vec<bool>>());
+            let mut index = Index::new(MessageLength::new(bits)?);
             for _ in 0..words {
                 index.push(&random()?)?;
             }

@@ -4,7 +4,7 @@
 //! argument says. The column "wrong" is the share that was decoded to another payload than was sent.
 use std::time::Instant;
 
-use guardsplat_codeword::{Code, Decoded, Word};
+use guardsplat_codeword::{Code, Decoded, Message};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -32,7 +32,7 @@ fn main() {
                 let information = rng.random::<u64>() >> (64 - code.information_bits());
                 let Ok(word) = code.encode(information) else { continue };
                 let read: Vec<f32> = word.bits().map(|bit| noisy(bit, mean, &mut rng)).collect();
-                let hard = Word::from_bits(&read.iter().map(|&l| l > 0.0).collect::<Vec<_>>());
+                let hard = Message::from_bits(&read.iter().map(|&l| l > 0.0).collect::<Vec<_>>());
                 let hard = hard.and_then(|word| code.decode(&word)).ok().flatten();
                 let started = Instant::now();
                 let soft = code.decode_logits(&read).ok().flatten();

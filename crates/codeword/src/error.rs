@@ -1,5 +1,5 @@
 //! Everything that can go wrong with words and claims, by what happened.
-use crate::word::MAX_BITS;
+use crate::message::MAX_BITS;
 
 /// Result of operations on words and claims.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -8,8 +8,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A word would have no bits, or more than there is room for.
-    #[error("a word of {bits} bits is outside 1 to {MAX_BITS}")]
+    /// A message would have no bits, or more than there is room for.
+    #[error("bits: {bits} is outside 1 to {MAX_BITS}")]
     Length {
         /// The bits asked for.
         bits: usize,
@@ -24,8 +24,8 @@ pub enum Error {
         /// The bits that it should have.
         expected: u32,
     },
-    /// A text is not a word in hexadecimal.
-    #[error("word: {reason}")]
+    /// A text is not a message in hexadecimal.
+    #[error("message: {reason}")]
     Digits {
         /// What is wrong.
         reason: String,

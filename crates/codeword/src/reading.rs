@@ -1,6 +1,6 @@
 //! The word that logits decide for, once, and the bits that they leave undecided.
 use crate::error::{Error, Result};
-use crate::word::{LIMBS, Word, WordLength};
+use crate::message::{LIMBS, Message, MessageLength};
 
 /// A word that was read.
 ///
@@ -9,9 +9,9 @@ use crate::word::{LIMBS, Word, WordLength};
 /// p-values stay true; guessing such bits would let a reader that read nothing match half of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    word: Word,
+    word: Message,
     /// Ones where a bit was decided.
-    decided: Word,
+    decided: Message,
 }
 
 impl Reading {
@@ -20,8 +20,8 @@ impl Reading {
     /// # Errors
     /// [`Error::Length`] unless there are 1 to [`MAX_BITS`](crate::MAX_BITS) of them.
     pub fn from_logits(logits: &[f32]) -> Result<Self> {
-        let length = WordLength::new(logits.len())?;
-        let (mut word, mut decided) = (Word::zeros(length), Word::zeros(length));
+        let length = MessageLength::new(logits.len())?;
+        let (mut word, mut decided) = (Message::zeros(length), Message::zeros(length));
         for (position, &logit) in logits.iter().enumerate() {
             word.set(position as u32, logit > 0.0);
             decided.set(position as u32, logit.abs() > 0.0); // false for NaN
@@ -30,14 +30,14 @@ impl Reading {
     }
 
     /// A reading that decided every bit.
-    pub fn of(word: Word) -> Self {
-        let mut decided = Word::zeros(word.length());
+    pub fn of(word: Message) -> Self {
+        let mut decided = Message::zeros(word.length());
         (0..word.length().bits()).for_each(|position| decided.set(position, true));
         Self { word, decided }
     }
 
     /// The bits read; undecided ones are 0.
-    pub fn word(&self) -> Word {
+    pub fn message(&self) -> Message {
         self.word
     }
 
@@ -55,10 +55,18 @@ impl Reading {
     ///
     /// # Errors
     /// [`Error::OtherLength`] for a target of another length.
-    pub fn matches(&self, target: &Word) -> Result<u32> {
+    pub fn matches(&self, target: &Message) -> Result<u32> {
         self.word.require("the target", target)?;
         let differ = self.differ(target.limbs());
         Ok(self.decided_bits() - differ)
+    }
+
+    /// [`Reading::matches`] as a share of all bits.
+    ///
+    /// # Errors
+    /// [`Error::OtherLength`] for a target of another length.
+    pub fn bit_accuracy(&self, target: &Message) -> Result<f64> {
+        Ok(f64::from(self.matches(target)?) / f64::from(target.length().bits()))
     }
 
     /// Decided bits that differ from those of the first limbs of a word of the same length.
@@ -75,7 +83,7 @@ impl Reading {
     }
 
     /// Fails unless the reading has `length`; `what` names it in the message.
-    pub(crate) fn require(&self, what: &str, length: WordLength) -> Result<()> {
+    pub(crate) fn require(&self, what: &str, length: MessageLength) -> Result<()> {
         if self.word.length() == length {
             return Ok(());
         }
@@ -105,15 +113,18 @@ mod tests {
             f32::MIN_POSITIVE,
         ];
         let reading = Reading::from_logits(&logits).unwrap();
-        assert_eq!(reading.word().to_string(), "85");
+        assert_eq!(reading.message().to_string(), "85");
         assert_eq!((reading.decided_bits(), reading.undecided_bits()), (5, 3));
         // Whatever a target says in the three undecided places.
         for target in ["85", "b5", "95", "bd"] {
-            let target = Word::parse(target, reading.word().length()).unwrap();
+            let target = Message::parse(target, 8).unwrap();
             assert_eq!(reading.matches(&target).unwrap(), 5);
         }
         let none = Reading::from_logits(&[f32::NAN; 150]).unwrap();
-        assert_eq!(none.matches(&Word::zeros(WordLength::new(150).unwrap())).unwrap(), 0);
+        assert_eq!(
+            none.matches(&Message::zeros(MessageLength::new(150).unwrap())).unwrap(),
+            0
+        );
     }
 
     proptest! {
@@ -123,7 +134,7 @@ mod tests {
         ) {
             let (logits, bits): (Vec<f32>, Vec<bool>) = pairs.iter().copied().unzip();
             let reading = Reading::from_logits(&logits).unwrap();
-            let target = Word::from_bits(&bits).unwrap();
+            let target = Message::from_bits(&bits).unwrap();
             let expected = pairs.iter().filter(|&&(logit, bit)| if bit { logit > 0.0 } else { logit < 0.0 }).count();
             prop_assert_eq!(reading.matches(&target).unwrap() as usize, expected);
             prop_assert_eq!(Reading::of(target).matches(&target).unwrap(), target.length().bits());

@@ -5,8 +5,8 @@ use std::collections::BinaryHeap;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::message::{Message, MessageLength};
 use crate::reading::Reading;
-use crate::word::{Word, WordLength};
 
 /// Words of one length, as compact as their bits allow: 8, 16 or 24 bytes each.
 ///
@@ -14,7 +14,7 @@ use crate::word::{Word, WordLength};
 /// [`Claim::targets_tried`](crate::Claim::targets_tried) when the nearest are put to the test.
 #[derive(Clone, Debug)]
 pub struct Index {
-    length: WordLength,
+    length: MessageLength,
     /// Words one after the other, as integers, least significant limb first.
     limbs: Vec<u64>,
 }
@@ -35,7 +35,7 @@ type Rank = (u32, Reverse<u32>, Reverse<u64>);
 
 impl Index {
     /// An index without words.
-    pub fn new(length: WordLength) -> Self {
+    pub fn new(length: MessageLength) -> Self {
         Self {
             length,
             limbs: Vec::new(),
@@ -46,7 +46,7 @@ impl Index {
     ///
     /// # Errors
     /// [`Error::OtherLength`] for a word of another length.
-    pub fn push(&mut self, word: &Word) -> Result<u64> {
+    pub fn push(&mut self, word: &Message) -> Result<u64> {
         if word.length() != self.length {
             return Err(Error::OtherLength {
                 what: "the word".into(),
@@ -134,11 +134,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn word(bits: &[bool], length: usize) -> Word {
-        Word::from_bits(&bits[..length]).unwrap()
+    fn word(bits: &[bool], length: usize) -> Message {
+        Message::from_bits(&bits[..length]).unwrap()
     }
 
-    fn naive(words: &[Word], readings: &[Reading], count: usize) -> Vec<Hit> {
+    fn naive(words: &[Message], readings: &[Reading], count: usize) -> Vec<Hit> {
         let mut hits = Vec::new();
         for (reading, read) in (0..).zip(readings) {
             for (row, word) in (0..).zip(words) {
@@ -162,13 +162,13 @@ mod tests {
             logits in prop::collection::vec(prop::collection::vec(-1_i8..=1, 150), 0..4),
             count in 0_usize..20,
         ) {
-            let words: Vec<Word> = words.iter().map(|bits| word(bits, length)).collect();
+            let words: Vec<Message> = words.iter().map(|bits| word(bits, length)).collect();
             let readings: Vec<Reading> = logits
                 .iter()
                 .map(|logits| logits[..length].iter().map(|&l| f32::from(l)).collect::<Vec<_>>())
                 .map(|logits| Reading::from_logits(&logits).unwrap())
                 .collect();
-            let mut index = Index::new(WordLength::new(length).unwrap());
+            let mut index = Index::new(MessageLength::new(length).unwrap());
             for (row, word) in words.iter().enumerate() {
                 prop_assert_eq!(index.push(word).unwrap(), row as u64);
             }
@@ -180,12 +180,14 @@ mod tests {
 
     #[test]
     fn other_lengths_are_errors_and_words_are_compact() {
-        let mut index = Index::new(WordLength::CODED);
+        let mut index = Index::new(MessageLength::CODED);
         assert!(index.push(&word(&[true; 150], 63)).is_err());
-        index.push(&Word::from_u64(5)).unwrap();
+        index.push(&Message::from_u64(5)).unwrap();
         assert_eq!(size_of_val(index.limbs.as_slice()), 8);
         let other = Reading::of(word(&[true; 150], 65));
-        let error = index.nearest(&[Reading::of(Word::from_u64(0)), other], 1).unwrap_err();
+        let error = index
+            .nearest(&[Reading::of(Message::from_u64(0)), other], 1)
+            .unwrap_err();
         assert_eq!(error.to_string(), "reading 1 has 65 bits, not 64");
     }
 }

@@ -7,8 +7,8 @@ use sha2::Sha256;
 
 use crate::code::Code;
 use crate::error::{Error, Result};
+use crate::message::{MAX_BITS, Message, MessageLength};
 use crate::payload::Payload;
-use crate::word::{MAX_BITS, Word, WordLength};
 
 /// Fewest bytes of a nonce.
 pub const NONCE_BYTES: usize = 16;
@@ -34,9 +34,9 @@ pub struct Whitening<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// What is embedded: the codeword under the pad.
-    pub word: Word,
+    pub word: Message,
     /// The pad; secret.
-    pub pad: Word,
+    pub pad: Message,
 }
 
 impl Whitening<'_> {
@@ -45,7 +45,7 @@ impl Whitening<'_> {
     ///
     /// # Errors
     /// [`Error::TooShort`] for an empty asset or a nonce below [`NONCE_BYTES`].
-    pub fn pad(&self, length: WordLength) -> Result<Word> {
+    pub fn pad(&self, length: MessageLength) -> Result<Message> {
         require("asset", self.asset, 1)?;
         require("nonce", self.nonce, NONCE_BYTES)?;
         // A key of a whole block: HMAC itself puts zeros behind shorter ones, and this way nothing can fail.
@@ -57,7 +57,7 @@ impl Whitening<'_> {
             mac.update(part);
         }
         mac.update(&u64::from(length.bits()).to_be_bytes());
-        Word::from_bytes(&mac.finalize().into_bytes(), length).ok_or(Error::Length {
+        Message::from_bytes(&mac.finalize().into_bytes(), length).ok_or(Error::Length {
             bits: length.bits() as usize,
         })
     }
@@ -74,7 +74,7 @@ impl std::fmt::Debug for Whitening<'_> {
 /// # Errors
 /// Those of [`Payload::pack`] and [`Whitening::pad`].
 pub fn mark(code: Code, payload: Payload, whitening: &Whitening<'_>) -> Result<Mark> {
-    let pad = whitening.pad(WordLength::CODED)?;
+    let pad = whitening.pad(MessageLength::CODED)?;
     let word = code.codeword(payload)?.xor(&pad)?;
     Ok(Mark { word, pad })
 }

@@ -30,10 +30,10 @@ fn one_test_a_claim_is_calibrated() {
 }
 
 #[test]
-fn framings_that_are_counted_are_calibrated_and_others_are_not() {
-    let counts = run(Method::SeveralFramings, CLAIMS / 2, 2);
+fn hypotheses_that_are_counted_are_calibrated_and_others_are_not() {
+    let counts = run(Method::SeveralHypotheses, CLAIMS / 2, 2);
     assert!(holds(counts), "{counts:?}");
-    let (low, _) = interval(run(Method::BestFramingOnly, CLAIMS / 2, 2)[1], CLAIMS / 2);
+    let (low, _) = interval(run(Method::BestHypothesisOnly, CLAIMS / 2, 2)[1], CLAIMS / 2);
     assert!(low > 0.015, "{low}");
 }
 

@@ -1,5 +1,5 @@
 //! The codes as they are used: every pattern that they promise to correct, and how often they are wrong.
-use guardsplat_codeword::{Code, Word};
+use guardsplat_codeword::{Code, Message};
 use proptest::prelude::*;
 use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
@@ -13,7 +13,7 @@ fn random(code: Code, rng: &mut ChaCha8Rng) -> (u64, u64) {
 }
 
 fn logits(word: u64, size: f32) -> Vec<f32> {
-    Word::from_u64(word)
+    Message::from_u64(word)
         .bits()
         .map(|bit| if bit { size } else { -size })
         .collect()
@@ -43,10 +43,10 @@ fn all_errors_up_to_t_are_corrected_and_counted() {
     for code in Code::ALL {
         for pattern in patterns(code.corrects(), 2000, &mut rng) {
             let (information, word) = random(code, &mut rng);
-            let decoded = code.decode(&Word::from_u64(word ^ pattern)).unwrap().unwrap();
+            let decoded = code.decode(&Message::from_u64(word ^ pattern)).unwrap().unwrap();
             assert_eq!(decoded.information, information, "{code:?} {pattern:x}");
             assert_eq!((decoded.corrected_bits, decoded.filled_bits), (pattern.count_ones(), 0));
-            assert_eq!(decoded.codeword, Word::from_u64(word));
+            assert_eq!(decoded.codeword, Message::from_u64(word));
         }
     }
 }
@@ -76,7 +76,7 @@ fn one_error_more_than_t_is_seen_and_not_miscorrected() {
             let pattern = sample(&mut rng, 64, code.corrects() as usize + 1)
                 .into_iter()
                 .fold(0_u64, |m, i| m | 1 << i);
-            assert_eq!(code.decode(&Word::from_u64(word ^ pattern)).unwrap(), None);
+            assert_eq!(code.decode(&Message::from_u64(word ^ pattern)).unwrap(), None);
         }
     }
 }
@@ -115,7 +115,7 @@ fn random_words_are_accepted_as_often_as_theory_says() {
         let theory = accepted_by_theory(code);
         assert!((theory / published - 1.0).abs() < 0.005, "{theory}");
         let accepted = (0..trials)
-            .filter(|_| code.decode(&Word::from_u64(rng.random())).unwrap().is_some())
+            .filter(|_| code.decode(&Message::from_u64(rng.random())).unwrap().is_some())
             .count();
         let (measured, sigma) = (accepted as f64 / trials as f64, (theory / trials as f64).sqrt());
         assert!(
@@ -158,7 +158,7 @@ fn confidences_save_payloads_that_are_lost_without() {
         let bits: Vec<bool> = read.iter().map(|&logit| logit > 0.0).collect();
         let right =
             |decoded: Option<guardsplat_codeword::Decoded>| decoded.is_some_and(|d| d.information == information);
-        hard += u32::from(!right(Code::Bch36.decode(&Word::from_bits(&bits).unwrap()).unwrap()));
+        hard += u32::from(!right(Code::Bch36.decode(&Message::from_bits(&bits).unwrap()).unwrap()));
         soft += u32::from(!right(Code::Bch36.decode_logits(&read).unwrap()));
     }
     // P(Bin(64, 0.05) > 5) = 0.098.
@@ -168,7 +168,7 @@ fn confidences_save_payloads_that_are_lost_without() {
 
 #[test]
 fn other_lengths_and_too_much_information_are_errors() {
-    let short = Word::from_bits(&[true; 63]).unwrap();
+    let short = Message::from_bits(&[true; 63]).unwrap();
     for code in Code::ALL {
         assert_eq!(
             code.decode(&short).unwrap_err().to_string(),
@@ -183,9 +183,9 @@ proptest! {
     #[test]
     fn what_is_decoded_is_a_codeword_near_the_word(word: u64) {
         for code in Code::ALL {
-            if let Some(decoded) = code.decode(&Word::from_u64(word)).unwrap() {
+            if let Some(decoded) = code.decode(&Message::from_u64(word)).unwrap() {
                 prop_assert_eq!(code.encode(decoded.information).unwrap(), decoded.codeword);
-                let differ = decoded.codeword.xor(&Word::from_u64(word)).unwrap().count_ones();
+                let differ = decoded.codeword.xor(&Message::from_u64(word)).unwrap().count_ones();
                 prop_assert_eq!(differ, decoded.corrected_bits);
                 prop_assert!(differ <= code.corrects());
             }

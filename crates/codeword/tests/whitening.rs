@@ -1,14 +1,14 @@
 //! Pads against an independent computation, and what whitening promises.
 use std::collections::HashSet;
 
-use guardsplat_codeword::{Code, Error, NONCE_BYTES, Payload, Whitening, Word, WordLength, mark};
+use guardsplat_codeword::{Code, Error, Message, MessageLength, NONCE_BYTES, Payload, Whitening, mark};
 use proptest::prelude::*;
 
 /// Lines of secret, asset, nonce, bits, pad; made by `python3 pads.py > pads.txt`.
 const PADS: &str = include_str!("fixtures/pads.txt");
 
-fn length(bits: usize) -> WordLength {
-    WordLength::new(bits).unwrap()
+fn length(bits: usize) -> MessageLength {
+    MessageLength::new(bits).unwrap()
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn too_little_to_whiten_with_is_an_error() {
         nonce: &[2; NONCE_BYTES - 1],
         ..whitening
     };
-    let text = |w: Whitening<'_>| w.pad(WordLength::CODED).unwrap_err().to_string();
+    let text = |w: Whitening<'_>| w.pad(MessageLength::CODED).unwrap_err().to_string();
     assert_eq!(text(empty), "asset: 0 bytes are fewer than 1");
     assert_eq!(text(short), "nonce: 15 bytes are fewer than 16");
     assert_eq!(format!("{whitening:?}"), "Whitening(..)");
@@ -53,13 +53,13 @@ fn too_little_to_whiten_with_is_an_error() {
 #[test]
 fn a_byte_moved_between_asset_and_nonce_makes_another_pad() {
     let bytes: Vec<u8> = (0..40).collect();
-    let pads: HashSet<Word> = (1..=24)
+    let pads: HashSet<Message> = (1..=24)
         .map(|cut| Whitening {
             secret: &[7; 32],
             asset: &bytes[..cut],
             nonce: &bytes[cut..],
         })
-        .map(|whitening| whitening.pad(WordLength::CODED).unwrap())
+        .map(|whitening| whitening.pad(MessageLength::CODED).unwrap())
         .collect();
     assert_eq!(pads.len(), 24);
 }

@@ -5,14 +5,14 @@
 use std::time::{Duration, Instant};
 
 use burn::tensor::{Device, Tensor, TensorData};
-use guardsplat_distortion::{Chroma, Draw, Jpeg, JpegRange, Kind, Layer, Ranges, RobustTo};
+use guardsplat_distortion::{Chroma, DistortionKind, Draw, Jpeg, JpegRange, Layer, Ranges, RobustTo};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const BATCH: usize = 8;
 
 /// Draws of one kind for a whole batch, from the default ranges.
-fn draws(kind: Kind, ranges: Ranges) -> Vec<Draw> {
+fn draws(kind: DistortionKind, ranges: Ranges) -> Vec<Draw> {
     let layer = Layer {
         robust_to: RobustTo::from_iter([kind]),
         ranges,
@@ -36,7 +36,7 @@ fn best(seconds: f64, mut run: impl FnMut()) -> f64 {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seconds = std::env::args().nth(1).map_or(Ok(0.5), |text| text.parse::<f64>())?;
-    let mut cases: Vec<(String, Vec<Draw>)> = Kind::ALL
+    let mut cases: Vec<(String, Vec<Draw>)> = DistortionKind::ALL
         .into_iter()
         .filter(|kind| !kind.acts_on_scene())
         .map(|kind| (kind.to_string(), draws(kind, Ranges::default())))
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
         ..Ranges::default()
     };
-    cases.push(("jpeg 4:4:4".into(), draws(Kind::Jpeg, full)));
+    cases.push(("jpeg 4:4:4".into(), draws(DistortionKind::Jpeg, full)));
     let noisy = Jpeg {
         quality: 10,
         chroma: Chroma::Half,

@@ -7,7 +7,7 @@ use crate::combined::Combined;
 use crate::crop::Crop;
 use crate::error::{Result, within};
 use crate::jpeg::Jpeg;
-use crate::kind::Kind;
+use crate::kind::DistortionKind;
 use crate::mask::{MAX_RECTANGLES, Rectangle};
 use crate::noise::Noise;
 use crate::ranges::{Ranges, limits, widen};
@@ -45,20 +45,20 @@ pub enum Draw {
 
 impl Draw {
     /// Which distortion it is; `None` for a clean picture.
-    pub fn kind(&self) -> Option<Kind> {
+    pub fn kind(&self) -> Option<DistortionKind> {
         Some(match self {
             Self::Clean => return None,
-            Self::Crop(_) => Kind::Crop,
-            Self::Scaling(_) => Kind::Scaling,
-            Self::Rotation(_) => Kind::Rotation,
-            Self::Brightness(_) => Kind::Brightness,
-            Self::Contrast(_) => Kind::Contrast,
-            Self::Jpeg(_) => Kind::Jpeg,
-            Self::Noise(_) => Kind::Noise,
-            Self::Blur(_) => Kind::Blur,
-            Self::Mask(_) => Kind::Mask,
-            Self::EightBit => Kind::EightBit,
-            Self::Combined(_) => Kind::Combined,
+            Self::Crop(_) => DistortionKind::Crop,
+            Self::Scaling(_) => DistortionKind::Scaling,
+            Self::Rotation(_) => DistortionKind::Rotation,
+            Self::Brightness(_) => DistortionKind::Brightness,
+            Self::Contrast(_) => DistortionKind::Contrast,
+            Self::Jpeg(_) => DistortionKind::Jpeg,
+            Self::Noise(_) => DistortionKind::Noise,
+            Self::Blur(_) => DistortionKind::Blur,
+            Self::Mask(_) => DistortionKind::Mask,
+            Self::EightBit => DistortionKind::EightBit,
+            Self::Combined(_) => DistortionKind::Combined,
         })
     }
 
@@ -102,7 +102,7 @@ impl Draw {
     /// One of clean and `kinds`, each as likely as the others, within `ranges`. Takes two numbers from `rng`, whatever
     /// is drawn; each distortion has a stream of its own that begins at the second, so that no range and no choice
     /// changes what the others draw. Kinds that act on the scene leave the picture clean.
-    pub(crate) fn random(kinds: &[Kind], ranges: &Ranges, rng: &mut ChaCha8Rng) -> Self {
+    pub(crate) fn random(kinds: &[DistortionKind], ranges: &Ranges, rng: &mut ChaCha8Rng) -> Self {
         let (choice, seed) = (rng.random::<f64>(), rng.random::<u64>());
         // 0 is the clean picture.
         let choice = (choice * (kinds.len() + 1) as f64) as usize;
@@ -113,30 +113,34 @@ impl Draw {
     }
 
     /// A distortion of this kind, drawn by `seed`.
-    fn of(kind: Kind, ranges: &Ranges, seed: u64) -> Self {
+    fn of(kind: DistortionKind, ranges: &Ranges, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(kind as u64);
         let rng = &mut rng;
         match kind {
-            Kind::Crop => Self::Crop(crop(ranges, rng)),
-            Kind::Scaling => Self::Scaling(between(ranges.scaling, rng)),
-            Kind::Rotation => Self::Rotation(between(ranges.rotation, rng)),
-            Kind::Brightness => Self::Brightness(between(ranges.brightness, rng)),
-            Kind::Contrast => Self::Contrast(between(ranges.contrast, rng)),
-            Kind::Jpeg => Self::Jpeg(jpeg(ranges, rng)),
-            Kind::Noise => Self::Noise(Noise {
+            DistortionKind::Crop => Self::Crop(crop(ranges, rng)),
+            DistortionKind::Scaling => Self::Scaling(between(ranges.scaling, rng)),
+            DistortionKind::Rotation => Self::Rotation(between(ranges.rotation, rng)),
+            DistortionKind::Brightness => Self::Brightness(between(ranges.brightness, rng)),
+            DistortionKind::Contrast => Self::Contrast(between(ranges.contrast, rng)),
+            DistortionKind::Jpeg => Self::Jpeg(jpeg(ranges, rng)),
+            DistortionKind::Noise => Self::Noise(Noise {
                 sigma: between(ranges.noise, rng),
                 seed: rng.random(),
             }),
-            Kind::Blur => Self::Blur(between(ranges.blur, rng)),
-            Kind::Mask => Self::Mask(rectangles(ranges, rng)),
-            Kind::EightBit => Self::EightBit,
-            Kind::Combined => Self::Combined(Combined {
+            DistortionKind::Blur => Self::Blur(between(ranges.blur, rng)),
+            DistortionKind::Mask => Self::Mask(rectangles(ranges, rng)),
+            DistortionKind::EightBit => Self::EightBit,
+            DistortionKind::Combined => Self::Combined(Combined {
                 crop: crop(ranges, rng),
                 brightness: between(ranges.brightness, rng),
                 jpeg: jpeg(ranges, rng),
             }),
-            Kind::ShNoise | Kind::ShTruncation | Kind::Spz | Kind::Sog | Kind::Pruning => Self::Clean,
+            DistortionKind::ShNoise
+            | DistortionKind::ShTruncation
+            | DistortionKind::Spz
+            | DistortionKind::Sog
+            | DistortionKind::Pruning => Self::Clean,
         }
     }
 }

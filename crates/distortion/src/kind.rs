@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Kind {
+pub enum DistortionKind {
     /// A window of the picture is all that is left.
     Crop,
     /// The picture is stored smaller or larger.
@@ -46,7 +46,7 @@ pub enum Kind {
     Pruning,
 }
 
-impl Kind {
+impl DistortionKind {
     /// All of them, in order.
     pub const ALL: [Self; 16] = [
         Self::Crop,
@@ -95,13 +95,13 @@ impl Kind {
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for DistortionKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for DistortionKind {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
@@ -121,16 +121,16 @@ mod tests {
 
     #[test]
     fn names_are_the_same_everywhere_and_all_is_in_order() {
-        for kind in Kind::ALL {
-            assert_eq!(kind.to_string().parse::<Kind>().unwrap(), kind);
+        for kind in DistortionKind::ALL {
+            assert_eq!(kind.to_string().parse::<DistortionKind>().unwrap(), kind);
             assert_eq!(serde_json::to_string(&kind).unwrap(), format!("\"{kind}\""));
-            let read: Kind = serde_json::from_str(&format!("\"{kind}\"")).unwrap();
+            let read: DistortionKind = serde_json::from_str(&format!("\"{kind}\"")).unwrap();
             assert_eq!(read, kind);
         }
-        assert!(Kind::ALL.is_sorted());
-        let scene = Kind::ALL.into_iter().filter(|k| k.acts_on_scene());
+        assert!(DistortionKind::ALL.is_sorted());
+        let scene = DistortionKind::ALL.into_iter().filter(|k| k.acts_on_scene());
         assert_eq!(
-            scene.map(Kind::name).collect::<Vec<_>>(),
+            scene.map(DistortionKind::name).collect::<Vec<_>>(),
             ["sh-noise", "sh-truncation", "spz", "sog", "pruning"]
         );
     }

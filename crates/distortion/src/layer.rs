@@ -14,7 +14,7 @@ use crate::draw::Draw;
 use crate::error::{Error, Result};
 use crate::groups::{Group, assemble, take};
 use crate::jpeg::jpeg;
-use crate::kind::Kind;
+use crate::kind::DistortionKind;
 use crate::mask::mask;
 use crate::noise::noise;
 use crate::ranges::Ranges;
@@ -79,7 +79,7 @@ impl Layer {
 /// Distorts pictures of one kind together and puts them back in order.
 fn distort(draws: &[Draw], pictures: Tensor<4>, background: [f32; 3]) -> Tensor<4> {
     let [_, _, h, w] = pictures.dims();
-    let mut alike: BTreeMap<Option<Kind>, Vec<usize>> = BTreeMap::new();
+    let mut alike: BTreeMap<Option<DistortionKind>, Vec<usize>> = BTreeMap::new();
     for (i, draw) in draws.iter().enumerate() {
         alike.entry(draw.kind()).or_default().push(i);
     }
@@ -100,7 +100,7 @@ fn distort(draws: &[Draw], pictures: Tensor<4>, background: [f32; 3]) -> Tensor<
 }
 
 /// Applies draws of one kind to their pictures.
-fn alike_distorted(kind: Kind, draws: &[&Draw], pictures: Tensor<4>, background: [f32; 3]) -> Tensor<4> {
+fn alike_distorted(kind: DistortionKind, draws: &[&Draw], pictures: Tensor<4>, background: [f32; 3]) -> Tensor<4> {
     macro_rules! each {
         ($variant:ident) => {
             &draws
@@ -113,17 +113,21 @@ fn alike_distorted(kind: Kind, draws: &[&Draw], pictures: Tensor<4>, background:
         };
     }
     match kind {
-        Kind::Crop => crop(pictures, each!(Crop)),
-        Kind::Scaling => scaling(pictures, each!(Scaling)),
-        Kind::Rotation => rotation(pictures, each!(Rotation), background),
-        Kind::Brightness => brightness(pictures, each!(Brightness)),
-        Kind::Contrast => contrast(pictures, each!(Contrast)),
-        Kind::Jpeg => jpeg(pictures, each!(Jpeg)),
-        Kind::Noise => noise(pictures, each!(Noise)),
-        Kind::Blur => blur(pictures, each!(Blur)),
-        Kind::Mask => mask(pictures, each!(Mask)),
-        Kind::EightBit => eight_bit(pictures),
-        Kind::Combined => combined(pictures, each!(Combined)),
-        Kind::ShNoise | Kind::ShTruncation | Kind::Spz | Kind::Sog | Kind::Pruning => pictures,
+        DistortionKind::Crop => crop(pictures, each!(Crop)),
+        DistortionKind::Scaling => scaling(pictures, each!(Scaling)),
+        DistortionKind::Rotation => rotation(pictures, each!(Rotation), background),
+        DistortionKind::Brightness => brightness(pictures, each!(Brightness)),
+        DistortionKind::Contrast => contrast(pictures, each!(Contrast)),
+        DistortionKind::Jpeg => jpeg(pictures, each!(Jpeg)),
+        DistortionKind::Noise => noise(pictures, each!(Noise)),
+        DistortionKind::Blur => blur(pictures, each!(Blur)),
+        DistortionKind::Mask => mask(pictures, each!(Mask)),
+        DistortionKind::EightBit => eight_bit(pictures),
+        DistortionKind::Combined => combined(pictures, each!(Combined)),
+        DistortionKind::ShNoise
+        | DistortionKind::ShTruncation
+        | DistortionKind::Spz
+        | DistortionKind::Sog
+        | DistortionKind::Pruning => pictures,
     }
 }

@@ -1,8 +1,9 @@
 //! Differentiable distortions of pictures, for training marks that stand them.
 //!
-//! A [`Layer`] distorts a batch of pictures, each in its own way: which distortions there are is told by [`Kind`], which
-//! a mark has to stand by [`RobustTo`], how strong they are by [`Ranges`], and what one picture got by [`Draw`]. A
-//! [`Vae`] does to pictures what a learned codec does to them. Evaluation uses real codecs on 8-bit pictures instead.
+//! A [`Layer`] distorts a batch of pictures, each in its own way: which distortions there are is told by
+//! [`DistortionKind`], which a mark has to stand by [`RobustTo`], how strong they are by [`Ranges`], and what one picture
+//! got by [`Draw`]. A [`Vae`] does to pictures what a learned codec does to them. Evaluation uses real codecs on 8-bit
+//! pictures instead.
 //!
 //! Pictures are tensors `[b, 3, h, w]` in [0, 1] on any device. Random numbers come from the caller, and noise is drawn
 //! on the host, so that the same seed gives the same distortions on every device.
@@ -36,7 +37,7 @@ pub use crop::Crop;
 pub use draw::Draw;
 pub use error::{Error, Result};
 pub use jpeg::{Chroma, Jpeg};
-pub use kind::Kind;
+pub use kind::DistortionKind;
 pub use layer::Layer;
 pub use mask::{MAX_RECTANGLES, Rectangle};
 pub use noise::Noise;

@@ -5,14 +5,14 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::kind::Kind;
+use crate::kind::DistortionKind;
 
 /// A set of distortions. In files it is a sorted list of names.
 ///
 /// As text it is a list with commas, `all` or `none`. It is shown as a list even if it has all, so that what was written
 /// down keeps its meaning when more distortions become known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(from = "Vec<Kind>", into = "Vec<Kind>")]
+#[serde(from = "Vec<DistortionKind>", into = "Vec<DistortionKind>")]
 pub struct RobustTo(u32); // a bit for each kind
 
 impl RobustTo {
@@ -23,12 +23,12 @@ impl RobustTo {
 
     /// All that are known, those that act on the scene included.
     pub fn all() -> Self {
-        Kind::ALL.into_iter().collect()
+        DistortionKind::ALL.into_iter().collect()
     }
 
     /// What it contains, sorted.
-    pub fn kinds(self) -> impl Iterator<Item = Kind> {
-        Kind::ALL.into_iter().filter(move |kind| self.contains(*kind))
+    pub fn kinds(self) -> impl Iterator<Item = DistortionKind> {
+        DistortionKind::ALL.into_iter().filter(move |kind| self.contains(*kind))
     }
 
     /// Whether it contains nothing.
@@ -37,39 +37,39 @@ impl RobustTo {
     }
 
     /// Whether it contains `kind`.
-    pub fn contains(self, kind: Kind) -> bool {
+    pub fn contains(self, kind: DistortionKind) -> bool {
         self.0 & bit(kind) != 0
     }
 
     /// Those that act on pictures, sorted.
-    pub fn of_pictures(self) -> impl Iterator<Item = Kind> {
+    pub fn of_pictures(self) -> impl Iterator<Item = DistortionKind> {
         self.kinds().filter(|kind| !kind.acts_on_scene())
     }
 
     /// Those that act on the scene, sorted.
-    pub fn of_scenes(self) -> impl Iterator<Item = Kind> {
+    pub fn of_scenes(self) -> impl Iterator<Item = DistortionKind> {
         self.kinds().filter(|kind| kind.acts_on_scene())
     }
 }
 
-fn bit(kind: Kind) -> u32 {
+fn bit(kind: DistortionKind) -> u32 {
     1 << kind as u32
 }
 
-impl From<Vec<Kind>> for RobustTo {
-    fn from(kinds: Vec<Kind>) -> Self {
+impl From<Vec<DistortionKind>> for RobustTo {
+    fn from(kinds: Vec<DistortionKind>) -> Self {
         kinds.into_iter().collect()
     }
 }
 
-impl From<RobustTo> for Vec<Kind> {
+impl From<RobustTo> for Vec<DistortionKind> {
     fn from(robust_to: RobustTo) -> Self {
         robust_to.kinds().collect()
     }
 }
 
-impl FromIterator<Kind> for RobustTo {
-    fn from_iter<I: IntoIterator<Item = Kind>>(kinds: I) -> Self {
+impl FromIterator<DistortionKind> for RobustTo {
+    fn from_iter<I: IntoIterator<Item = DistortionKind>>(kinds: I) -> Self {
         Self(kinds.into_iter().fold(0, |bits, kind| bits | bit(kind)))
     }
 }
@@ -79,7 +79,7 @@ impl fmt::Display for RobustTo {
         if self.is_empty() {
             return f.pad("none");
         }
-        let names: Vec<_> = self.kinds().map(Kind::name).collect();
+        let names: Vec<_> = self.kinds().map(DistortionKind::name).collect();
         f.pad(&names.join(","))
     }
 }
@@ -92,7 +92,10 @@ impl FromStr for RobustTo {
         match text.trim() {
             "none" => Ok(Self::none()),
             "all" => Ok(Self::all()),
-            list => list.split(',').map(|name| name.trim().parse::<Kind>()).collect(),
+            list => list
+                .split(',')
+                .map(|name| name.trim().parse::<DistortionKind>())
+                .collect(),
         }
         .map_err(|e| match e {
             Error::UnknownKind { name, known } => Error::UnknownKind {
@@ -115,18 +118,21 @@ mod tests {
     #[test]
     fn lists_are_sorted_and_without_duplicates() {
         let some = parse("noise, jpeg,crop,jpeg ");
-        assert_eq!(Vec::from(some), [Kind::Crop, Kind::Jpeg, Kind::Noise]);
+        assert_eq!(
+            Vec::from(some),
+            [DistortionKind::Crop, DistortionKind::Jpeg, DistortionKind::Noise]
+        );
         assert_eq!(some.to_string(), "crop,jpeg,noise");
         assert_eq!(parse(&some.to_string()), some);
-        assert!(some.contains(Kind::Jpeg) && !some.contains(Kind::Blur));
+        assert!(some.contains(DistortionKind::Jpeg) && !some.contains(DistortionKind::Blur));
         assert_eq!(parse("none"), RobustTo::default());
         assert_eq!(parse("none").to_string(), "none");
-        assert_eq!(Vec::from(parse("all")), Kind::ALL);
+        assert_eq!(Vec::from(parse("all")), DistortionKind::ALL);
         assert_eq!(parse(&parse("all").to_string()), parse("all"));
         assert_eq!(format!("{:>6}|", parse("none")), "  none|");
         let mixed = parse("spz,8bit");
-        assert_eq!(mixed.of_pictures().collect::<Vec<_>>(), [Kind::EightBit]);
-        assert_eq!(mixed.of_scenes().collect::<Vec<_>>(), [Kind::Spz]);
+        assert_eq!(mixed.of_pictures().collect::<Vec<_>>(), [DistortionKind::EightBit]);
+        assert_eq!(mixed.of_scenes().collect::<Vec<_>>(), [DistortionKind::Spz]);
     }
 
     #[test]

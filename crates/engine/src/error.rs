@@ -114,6 +114,18 @@ impl From<guardsplat_scene::Error> for Error {
     }
 }
 
+impl From<guardsplat_codeword::Error> for Error {
+    fn from(error: guardsplat_codeword::Error) -> Self {
+        use guardsplat_codeword::{Error as Codeword, MAX_BITS};
+        let (field, reason) = match error {
+            Codeword::Length { bits } => ("bits", format!("{bits} is outside 1 to {MAX_BITS}")),
+            Codeword::Digits { reason } => ("message", reason),
+            other => ("message", other.to_string()),
+        };
+        Self::BadOption { field, reason }
+    }
+}
+
 impl From<guardsplat_hidden::Error> for Error {
     fn from(error: guardsplat_hidden::Error) -> Self {
         use guardsplat_hidden::Error as Hidden;

@@ -192,7 +192,10 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     let scene = Scene::read(&at("a.ply")).unwrap().gaussians;
     let reading = read_scene(&engine, &scene, 4, 32, [1.0; 3], 3, |_, _| Ok(())).unwrap();
     let found = &outcome.verification;
-    assert_eq!(reading.compare(&message()).unwrap(), found.comparison);
+    assert_eq!(
+        reading.compare(&message(), &engine.acceptance_rule(1)).unwrap(),
+        found.comparison
+    );
     let sampler = ViewSampler::new(&scene, 3).unwrap();
     let camera = sampler.camera(Split::HeldOut, 0, 32);
     let first = engine.picture(&scene, &camera, [1.0; 3]).unwrap();

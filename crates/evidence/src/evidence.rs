@@ -22,7 +22,7 @@ pub struct Evidence {
     /// Who may read it.
     pub audience: Audience,
     /// What was done.
-    pub kind: Kind,
+    pub kind: EvidenceKind,
     /// The job, as the service names it.
     pub job: String,
     /// When the work began, in UTC.
@@ -60,7 +60,7 @@ pub enum Audience {
 /// What was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum EvidenceKind {
     /// A scene was marked.
     Embed,
     /// A suspect was read.

@@ -1,24 +1,24 @@
 //! What was tried before something was found, since every attempt is paid for.
 use serde::{Deserialize, Serialize};
 
-/// What a suspect was compared with, and in which framings.
+/// What a suspect was compared with, and under which hypotheses about what was done to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tried {
-    /// How the suspect's pictures were looked at.
-    pub framings: Vec<Framing>,
+    /// What was undone before the suspect's pictures were read.
+    pub framings: Vec<HypothesisGroup>,
     /// Owners whose messages were compared.
     pub owners: u64,
     /// Assets whose messages were compared, of all these owners together; each is one claim.
     pub assets: u64,
 }
 
-/// One way to look at a picture.
+/// Hypotheses of one kind about what was done to a picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Framing {
+pub struct HypothesisGroup {
     /// What was done to the picture.
-    pub kind: FramingKind,
+    pub kind: HypothesisKind,
     /// In how many variants, at least one.
     pub variants: u32,
     /// Whether these were pooled with the others into one reading, which is then decided once. Otherwise each is an
@@ -29,7 +29,7 @@ pub struct Framing {
 /// What was done to a picture before it was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum FramingKind {
+pub enum HypothesisKind {
     /// Nothing.
     AsGiven,
     /// A part of it.
@@ -48,8 +48,8 @@ impl Tried {
     /// One picture as it was given, against one claim.
     pub fn once() -> Self {
         Self {
-            framings: vec![Framing {
-                kind: FramingKind::AsGiven,
+            framings: vec![HypothesisGroup {
+                kind: HypothesisKind::AsGiven,
                 variants: 1,
                 pooled: false,
             }],
@@ -77,12 +77,12 @@ mod tests {
     #[test]
     fn every_attempt_counts_and_pooled_ones_do_not() {
         assert_eq!(Tried::once().hypotheses(), 1);
-        let framing = |kind, variants, pooled| Framing { kind, variants, pooled };
+        let framing = |kind, variants, pooled| HypothesisGroup { kind, variants, pooled };
         let tried = Tried {
             framings: vec![
-                framing(FramingKind::AsGiven, 1, false),
-                framing(FramingKind::QuarterTurn, 3, false),
-                framing(FramingKind::Crop, 5, true),
+                framing(HypothesisKind::AsGiven, 1, false),
+                framing(HypothesisKind::QuarterTurn, 3, false),
+                framing(HypothesisKind::Crop, 5, true),
             ],
             owners: 2,
             assets: 10,

@@ -3,9 +3,10 @@
 //! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
 use crate::embedding::Embedding;
 use crate::error::{Error, Result};
-use crate::evidence::{Evidence, Kind, SCHEMA, VERSION};
+use crate::evidence::{Evidence, EvidenceKind, SCHEMA, VERSION};
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
-use crate::verification::{Decision, Verdict, Verification};
+use crate::verification::{Decision, Verification};
+use guardsplat_codeword::Verdict;
 
 impl Evidence {
     /// Whether everything is in range; see [`Evidence::to_json`].
@@ -34,9 +35,9 @@ impl Evidence {
             input.name.iter().try_for_each(|text| name(&field, text))?;
         }
         match (self.kind, &self.verification, &self.embedding) {
-            (Kind::Verify, None, _) => return Err(Error::field("verification", "a verify job has one")),
-            (Kind::Verify, _, Some(_)) => return Err(Error::field("embedding", "a verify job has none")),
-            (Kind::Embed, _, None) => return Err(Error::field("embedding", "an embed job has one")),
+            (EvidenceKind::Verify, None, _) => return Err(Error::field("verification", "a verify job has one")),
+            (EvidenceKind::Verify, _, Some(_)) => return Err(Error::field("embedding", "a verify job has none")),
+            (EvidenceKind::Embed, _, None) => return Err(Error::field("embedding", "an embed job has one")),
             _ => {}
         }
         self.verification.iter().try_for_each(Verification::validate)?;

@@ -1,6 +1,6 @@
 //! What a reading found: the verdict, the numbers behind it, and whose message it is.
 use crate::tried::Tried;
-use guardsplat_codeword::chance;
+use guardsplat_codeword::{AcceptanceRule, Verdict, chance};
 use serde::{Deserialize, Serialize};
 
 /// The outcome of reading a suspect, or of reading back what was just marked.
@@ -23,20 +23,6 @@ pub struct Verification {
     pub found: Option<Found>,
     /// The reading bit by bit, most significant first; empty, or one for each bit. For owners only.
     pub strip: Vec<Bit>,
-}
-
-/// Whether the message is there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The corrected p-value is at or below the threshold.
-    Match,
-    /// It is above.
-    NoMatch,
-    /// Nothing could be decided.
-    Inconclusive,
-    /// Nothing was read, since there is no such key.
-    UnknownKey,
 }
 
 /// Why nothing could be decided.
@@ -83,15 +69,19 @@ impl Decision {
     /// shown.
     pub fn new(bits: u32, matched: u32, corrected: Option<u32>, hypotheses: u64, threshold: f64) -> Self {
         let p_single = chance::tail(bits, matched).unwrap_or(1.0);
+        let rule = AcceptanceRule {
+            false_positive_rate: threshold,
+            hypotheses,
+        };
         Self {
             bits,
             matched,
             corrected,
             hypotheses,
             p_single,
-            p_value: chance::any_of(p_single, hypotheses),
+            p_value: rule.p_value(bits, matched).unwrap_or(1.0),
             threshold,
-            needed: chance::least_matches(bits, threshold, hypotheses).unwrap_or(None),
+            needed: rule.least_matches(bits).unwrap_or(None),
         }
     }
 

@@ -45,7 +45,7 @@ pub fn file_name(text: &str) -> Result<()> {
     text::file_name("file_name", text)
 }
 
-/// Checks a message against the bits of its key, 1 to [`message::MAX_BITS`].
+/// Checks a message against the bits of its key, 1 to [`MAX_BITS`](guardsplat_codeword::MAX_BITS).
 pub fn message(text: &str, bits: u32) -> Result<()> {
     message::check("message", text, bits)
 }

@@ -57,6 +57,7 @@ impl Service {
                     trace_parent: lease.job.trace_parent.unwrap_or_default(),
                     lease_token: lease.token,
                     lease_duration: Some(clock::proto_duration(self.limits().lease)),
+                    false_positive_rate: self.limits().false_positive_rate,
                 });
             }
             let left = end.saturating_duration_since(Instant::now());

@@ -1,37 +1,16 @@
 //! Messages in hexadecimal, checked against the bits of their key before anything is queued.
-use crate::error::{Error, Result};
+use guardsplat_codeword::{Error as Codeword, Message};
 
-/// Most bits of a key.
-pub const MAX_BITS: u32 = 150;
+use crate::error::{Error, Result};
 
 /// Checks that `text` is a message of exactly `bits` bits: ceil(`bits` / 4) hexadecimal digits, with or without `0x`,
 /// and zeros in the bits of the first digit that are too many.
 pub fn check(field: &str, text: &str, bits: u32) -> Result<()> {
-    let bad = |reason: String| Err(Error::invalid(field, reason));
-    let digits = text
-        .strip_prefix("0x")
-        .or_else(|| text.strip_prefix("0X"))
-        .unwrap_or(text);
-    let wrong = digits.chars().enumerate().find(|(_, c)| !c.is_ascii_hexdigit());
-    if let Some((position, digit)) = wrong {
-        return bad(format!(
-            "character {} is {digit:?}, not a hexadecimal digit",
-            position + 1
-        ));
+    match Message::parse(text, bits as usize) {
+        Ok(_) => Ok(()),
+        Err(Codeword::Digits { reason }) => Err(Error::invalid(field, reason)),
+        Err(error) => Err(Error::invalid(field, error.to_string())),
     }
-    let (count, wanted) = (digits.len(), bits.div_ceil(4) as usize);
-    if count != wanted {
-        let how = if count > wanted { "longer" } else { "shorter" };
-        return bad(format!(
-            "{count} hexadecimal digits are {how} than the key's {bits} bits, which take {wanted}"
-        ));
-    }
-    let spare = wanted as u32 * 4 - bits;
-    let first = digits.chars().next().and_then(|c| c.to_digit(16)).unwrap_or(0);
-    if first >> (4 - spare) != 0 {
-        return bad(format!("the value needs more than the key's {bits} bits"));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -96,7 +96,7 @@ impl Default for Limits {
             upload_idle: Duration::from_secs(60),
             watch_stall: Duration::from_secs(60),
             max_watches: 1_000,
-            false_positive_rate: 1e-6,
+            false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
             max_queued_of_project: None,
             max_bytes_of_project: None,
             rates: rate_limit::Rates::default(),

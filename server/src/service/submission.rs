@@ -1,6 +1,7 @@
 //! Checks a `CreateJob` request, all of it, before anything is queued.
 use std::collections::HashSet;
 
+use guardsplat_codeword::MessageLength;
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
@@ -12,7 +13,6 @@ use crate::ledger::queue::PRIORITIES;
 use crate::ledger::{ArtifactId, JobKind, KeyId};
 use crate::service::claims::{self, Claim};
 use crate::service::fingerprint;
-use crate::service::message::MAX_BITS;
 use crate::service::names::Kind;
 use crate::service::text;
 use crate::service::violations::Violations;
@@ -195,7 +195,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
 
 fn create_key(spec: &KeySpec, problems: &mut Violations) {
     problems.check(
-        (1..=MAX_BITS).contains(&spec.bits),
+        MessageLength::try_from(spec.bits).is_ok(),
         "job.create_key.bits",
         "must be 1 to 150",
     );

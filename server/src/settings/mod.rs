@@ -192,7 +192,7 @@ impl Default for Settings {
             worker_binary: None,
             worker_device: WorkerDevice::Auto,
             master_key_file: None,
-            false_positive_rate: 1e-6,
+            false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
             stop_seconds: 20,
             log_format: LogFormat::Text,
             log_filter: "info".into(),

@@ -1,7 +1,7 @@
 //! Texts of users of the engine: cameras, settings, messages.
 use crate::memory::bounded;
+use guardsplat_codeword::{MAX_BITS, Message};
 use guardsplat_engine::embed::Preset;
-use guardsplat_engine::message::{MAX_BITS, Message};
 use guardsplat_engine::view::parse_cameras;
 
 /// `cameras.json` and `transforms.json`.
@@ -35,7 +35,7 @@ pub fn embed_settings(data: &[u8]) {
 /// Messages in hexadecimal, of which the server and the worker must think alike.
 pub fn message(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    for bits in [1, 3, 4, 32, 33, MAX_BITS] {
+    for bits in [1, 3, 4, 32, 33, MAX_BITS as usize] {
         let parsed = bounded(data.len(), || Message::parse(text, bits));
         let checked = guardsplat_server::grpc::fuzz_api::message(text, bits as u32);
         assert_eq!(parsed.is_ok(), checked.is_ok(), "{bits} bits");

@@ -11,7 +11,7 @@ use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::key::{HIDDEN, HiddenKeyOptions, create_hidden_key};
 use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_engine::stop::Stop;
-use guardsplat_evaluation::report::named::{Kind, Options as ReportOptions, report};
+use guardsplat_evaluation::report::named::{Experiment, Options as ReportOptions, report};
 use guardsplat_evaluation::report::names::VAE;
 use guardsplat_evaluation::report::output;
 use guardsplat_evaluation::report::selection::Selection;
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Which experiments: capacity, robustness, trained, losses, pruning, longer, perturbations, sensitivity, elevation,
     /// formats, security, claims, trade
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "capacity")]
-    experiments: Vec<Kind>,
+    experiments: Vec<Experiment>,
     /// Only messages of these lengths
     #[arg(long, value_name = "N", value_delimiter = ',')]
     bits: Vec<usize>,
@@ -114,8 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// The experiment whose plots a file of their own gets: the one of two that has any.
-fn plotted(arguments: &Arguments) -> Option<Kind> {
-    let asked = [Kind::Trade, Kind::Claims].map(|kind| arguments.experiments.contains(&kind).then_some(kind));
+fn plotted(arguments: &Arguments) -> Option<Experiment> {
+    let asked =
+        [Experiment::Trade, Experiment::Claims].map(|kind| arguments.experiments.contains(&kind).then_some(kind));
     match asked {
         [Some(kind), None] | [None, Some(kind)] => Some(kind),
         _ => None,
@@ -147,7 +148,7 @@ fn check(arguments: &Arguments) -> Result<()> {
 /// The learned codec, if its weights were given.
 fn vae(arguments: &Arguments, compute: &Compute) -> Result<Option<Vae>> {
     let Some(path) = &arguments.vae else {
-        if arguments.experiments.contains(&Kind::Robustness) {
+        if arguments.experiments.contains(&Experiment::Robustness) {
             eprintln!("note: {VAE} is not measured: no weights (--vae FILE)");
         }
         return Ok(None);
@@ -166,7 +167,7 @@ fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Opti
         variants: timed(arguments)?,
     };
     let mut plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits, &trade)?;
-    if !arguments.experiments.contains(&Kind::Trade) {
+    if !arguments.experiments.contains(&Experiment::Trade) {
         plan.keep_only(&arguments.only)?;
     }
     let options = Options {
@@ -208,7 +209,7 @@ fn timed(arguments: &Arguments) -> Result<Vec<Variant>> {
         None => None,
         Some(path) => Some(std::fs::read_to_string(path).map_err(Error::io(path))?),
     };
-    let only = match arguments.experiments.contains(&Kind::Trade) {
+    let only = match arguments.experiments.contains(&Experiment::Trade) {
         true => arguments.only.as_slice(),
         false => &[],
     };
@@ -297,7 +298,7 @@ fn write_reports(arguments: &Arguments, store: &Store) -> Result<()> {
         output::write_csv(&selection, &folder.join("readings.csv"))?;
         output::write_html(&reports, folder, &folder.join("report.html"))?;
         if let Some(path) = &arguments.plot {
-            let of = plotted(arguments).map(Kind::name);
+            let of = plotted(arguments).map(Experiment::name);
             let report = reports.iter().find(|report| Some(report.name.as_str()) == of);
             output::write_svg(report.map_or(&[], |report| &report.plots), path)?;
         }

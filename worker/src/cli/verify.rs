@@ -3,10 +3,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use guardsplat_codeword::Verdict;
 use guardsplat_engine::Result;
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::extract::{Comparison, DEFAULT_VIEWS, find_source};
-use guardsplat_engine::message::{Key, Verdict};
+use guardsplat_engine::message::Key;
 use guardsplat_engine::scene::{BadRows, Ignored};
 use serde::Serialize;
 
@@ -109,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     Ok(match report.findings.verdict {
         Verdict::Match => Exit::Done,
         Verdict::NoMatch => Exit::NoMatch,
-        Verdict::Inconclusive => Exit::Inconclusive,
+        Verdict::Inconclusive | Verdict::UnknownKey => Exit::Inconclusive,
     })
 }
 
@@ -118,6 +119,7 @@ fn tell(report: &VerificationReport, comparison: Option<&Comparison>, ignored: &
         Verdict::Match => "match",
         Verdict::NoMatch => "no match",
         Verdict::Inconclusive => "inconclusive",
+        Verdict::UnknownKey => "unknown key",
     };
     let read = format!(
         "read {} from {} views; views agree on {:.1} % of bits, mean logit {:.2}",
@@ -138,8 +140,8 @@ fn tell(report: &VerificationReport, comparison: Option<&Comparison>, ignored: &
         ),
         None => format!("{verdict}: {read}"),
     });
-    if let Some(framing) = &report.framing {
-        print_line(&format!("read best of {} ways: {framing}", report.framings));
+    if let Some(hypothesis) = &report.hypothesis {
+        print_line(&format!("read best of {} ways: {hypothesis}", report.hypotheses));
     }
     if let Some(reason) = &report.reason {
         print_line(reason);

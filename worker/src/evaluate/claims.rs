@@ -1,9 +1,10 @@
 //! Claims about marks: right ones from few and many views, also after what is done to pictures, and wrong ones.
 //!
-//! Both are made as the service makes them: pictures are read in every framing, logits are summed over the views of a
+//! Both are made as the service makes them: pictures are read under every hypothesis, logits are summed over the views of a
 //! claim, and [`guardsplat_codeword::Claim`] decides once.
 use guardsplat_codeword::{
-    Claim, Code, Framing, NONCE_BYTES, Payload, ReadPayload, Scheme, Target, Whitening, Word, chance, mark,
+    Claim, Code, HypothesisReading, Message, NONCE_BYTES, Payload, ReadPayload, Reading, Scheme, Target, Whitening,
+    chance, mark,
 };
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::names::{NONE, SCENE, UNMARKED};
@@ -14,14 +15,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::read::Views;
 use crate::error::{Error, Result};
-use guardsplat_engine::extract::{Engine, Framed, framings};
-use guardsplat_engine::message::Message;
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, hypotheses};
 use guardsplat_engine::picture::Picture;
 
 /// Views of a claim about pictures.
 const POOLS: [usize; 3] = [1, 3, 10];
-/// The rate of false positives at which right claims are decided: the service's own, unless its operator changes it.
-const RATE: f64 = 1e-6;
 /// Wrong claims about each group of views.
 const WRONG: u64 = 250;
 /// What people do to a picture before they show it: screenshots at half the size, cropped, of a page that shows it, sent, and
@@ -107,7 +105,7 @@ impl ClaimTrials<'_> {
             views: suspects.len() as u32,
             pool: pool as u32,
             framings: 1,
-            rate: RATE,
+            rate: self.engine.false_positive_rate,
             p_values: Vec::new(),
             payloads: 0,
             wrong: 0,
@@ -117,16 +115,16 @@ impl ClaimTrials<'_> {
         // The same wrong claims whatever was read, and others for each group of views.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0x7772_6f6e_6700 ^ ((pool as u64) << 32));
         for views in suspects.chunks_exact(pool) {
-            let framings = Suspect::framings(self.engine, views)?;
-            claims.framings = claims.framings.max(framings.len() as u32);
+            let readings = Suspect::readings(self.engine, views)?;
+            claims.framings = claims.framings.max(readings.len() as u32);
             if case.suspect != UNMARKED {
-                let (p, payload) = decide(&framings, &target)?;
+                let (p, payload) = decide(&readings, &target, claims.rate)?;
                 claims.p_values.push(p);
                 claims.payloads += u32::from(payload);
             }
             for _ in 0..WRONG {
                 let wrong = wrong_target(&mut rng)?;
-                count(&mut claims.wrong_at_most, decide(&framings, &wrong)?.0);
+                count(&mut claims.wrong_at_most, decide(&readings, &wrong, claims.rate)?.0);
                 if let (Some(counts), [first, second, ..]) = (&mut claims.wrong_as_trials, views) {
                     count(counts, as_trials(&[first, second], &wrong.word)?);
                 }
@@ -138,7 +136,7 @@ impl ClaimTrials<'_> {
 
     /// The message as the word of an asset: its pad is what makes a codeword of it.
     fn target(&self) -> Result<Target> {
-        let word = Word::from_bits(self.message.bits()).map_err(refused)?;
+        let word = *self.message;
         let payload = Payload {
             key: 1,
             number: self.seed as u32 & 0xffff,
@@ -152,16 +150,16 @@ impl ClaimTrials<'_> {
     }
 }
 
-/// MarkRun view, read.
+/// One view, read.
 enum Suspect {
     AsGiven(Vec<f32>),
-    Searched(Framed),
+    Searched(PictureLogits),
 }
 
 impl Suspect {
     fn read(engine: &Engine, picture: &Picture, searched: bool) -> Result<Self> {
         if searched {
-            return Ok(Self::Searched(Framed::read(engine, picture)?));
+            return Ok(Self::Searched(PictureLogits::read(engine, picture)?));
         }
         let logits = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
         Ok(Self::AsGiven(logits))
@@ -170,41 +168,41 @@ impl Suspect {
     fn as_given(&self) -> &[f32] {
         match self {
             Self::AsGiven(logits) => logits,
-            Self::Searched(framed) => framed.as_given(),
+            Self::Searched(read) => read.as_given(),
         }
     }
 
-    /// Logits summed over views, in each framing.
-    fn framings(engine: &Engine, views: &[Self]) -> Result<Vec<Framing>> {
-        let framed: Vec<Framed> = (views.iter())
+    /// Logits summed over views, under each hypothesis.
+    fn readings(engine: &Engine, views: &[Self]) -> Result<Vec<HypothesisReading>> {
+        let searched: Vec<PictureLogits> = (views.iter())
             .filter_map(|view| match view {
-                Self::Searched(framed) => Some(framed.clone()),
+                Self::Searched(read) => Some(read.clone()),
                 Self::AsGiven(_) => None,
             })
             .collect();
-        let framing = |logits: Vec<f32>| Framing {
+        let reading = |logits: Vec<f32>| HypothesisReading {
             name: String::new(),
             views: views.len() as u32,
             logits,
         };
-        if framed.is_empty() {
+        if searched.is_empty() {
             let given = views.iter().map(|view| view.as_given().to_vec()).collect();
-            return Ok(vec![framing(guardsplat_engine::extract::Reading::new(given)?.summed)]);
+            return Ok(vec![reading(PooledLogits::new(given)?.summed)]);
         }
-        let read = framings(engine, &framed)?;
-        Ok(read.into_iter().map(|(_, reading)| framing(reading.summed)).collect())
+        let read = hypotheses(engine, &searched)?;
+        Ok(read.into_iter().map(|(_, logits)| reading(logits.summed)).collect())
     }
 }
 
 /// The p-value of a claim, and whether the payload was read as it is registered.
-fn decide(framings: &[Framing], target: &Target) -> Result<(f64, bool)> {
+fn decide(readings: &[HypothesisReading], target: &Target, rate: f64) -> Result<(f64, bool)> {
     let claim = Claim {
         scheme: Scheme::default(),
-        framings,
+        readings,
         targets: std::slice::from_ref(target),
         targets_tried: None,
         other_tries: 1,
-        rate: RATE,
+        rate,
     };
     let answer = claim.test().map_err(refused)?.answer;
     let payload = matches!(
@@ -218,14 +216,11 @@ fn decide(framings: &[Framing], target: &Target) -> Result<(f64, bool)> {
 }
 
 /// What the p-value would be if the bits of these views were trials of their own: wrong, and measured to show it.
-fn as_trials(views: &[&Suspect], word: &Word) -> Result<f64> {
-    let agreeing = |view: &&Suspect| {
-        let pairs = word.bits().zip(view.as_given());
-        pairs.filter(|(bit, logit)| *bit == (**logit > 0.0)).count()
-    };
-    let agreeing: usize = views.iter().map(agreeing).sum();
+fn as_trials(views: &[&Suspect], word: &Message) -> Result<f64> {
+    let agreeing = |view: &&Suspect| Reading::from_logits(view.as_given())?.matches(word);
+    let agreeing: guardsplat_codeword::Result<u32> = views.iter().map(agreeing).sum();
     let bits = word.length().bits() * views.len() as u32;
-    chance::tail(bits, agreeing as u32).map_err(refused)
+    chance::tail(bits, agreeing.map_err(refused)?).map_err(refused)
 }
 
 fn count(counts: &mut [u64; POWERS], p: f64) {
@@ -261,15 +256,17 @@ fn refused(error: guardsplat_codeword::Error) -> Error {
 
 #[cfg(test)]
 mod tests {
+    use guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE;
+
     use super::*;
 
-    /// A framing whose logits say `word`, but for the first `wrong` bits.
-    fn framing(word: &Word, wrong: usize) -> Framing {
+    /// A reading whose logits say `word`, but for the first `wrong` bits.
+    fn reading(word: &Message, wrong: usize) -> HypothesisReading {
         let logits = word
             .bits()
             .enumerate()
             .map(|(i, bit)| if bit == (i >= wrong) { 1.0 } else { -1.0 });
-        Framing {
+        HypothesisReading {
             name: String::new(),
             views: 1,
             logits: logits.collect(),
@@ -277,21 +274,25 @@ mod tests {
     }
 
     #[test]
-    fn right_claims_pay_for_their_framings_and_read_the_payload() {
+    fn right_claims_pay_for_their_hypotheses_and_read_the_payload() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let message = Message::random(64, &mut rng).unwrap();
-        let word = Word::from_bits(message.bits()).unwrap();
+        let word = Message::random(64, &mut rng).unwrap();
         let codeword = Code::default().codeword(Payload { key: 1, number: 5 }).unwrap();
         let target = Target {
             id: String::new(),
             word,
             pad: Some(word.xor(&codeword).unwrap()),
         };
-        let (one, read) = decide(&[framing(&word, 4)], &target).unwrap();
+        let (one, read) = decide(&[reading(&word, 4)], &target, DEFAULT_FALSE_POSITIVE_RATE).unwrap();
         assert!(read && one < 1e-9, "{one}");
-        let (two, _) = decide(&[framing(&word, 32), framing(&word, 4)], &target).unwrap();
+        let (two, _) = decide(
+            &[reading(&word, 32), reading(&word, 4)],
+            &target,
+            DEFAULT_FALSE_POSITIVE_RATE,
+        )
+        .unwrap();
         assert_eq!(two, 2.0 * one);
-        let (none, read) = decide(&[framing(&word, 32)], &target).unwrap();
+        let (none, read) = decide(&[reading(&word, 32)], &target, DEFAULT_FALSE_POSITIVE_RATE).unwrap();
         assert!(!read && none > 0.4);
     }
 
@@ -300,12 +301,17 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         // Two views that say the same, as views of one scene do.
         let word = wrong_target(&mut rng).unwrap().word;
-        let view = || Suspect::AsGiven(framing(&word, 0).logits);
+        let view = || Suspect::AsGiven(reading(&word, 0).logits);
         let (first, second) = (view(), view());
         let (mut right, mut wrong) = ([0; POWERS], [0; POWERS]);
         for _ in 0..20_000 {
             let target = wrong_target(&mut rng).unwrap();
-            count(&mut right, decide(&[framing(&word, 0)], &target).unwrap().0);
+            count(
+                &mut right,
+                decide(&[reading(&word, 0)], &target, DEFAULT_FALSE_POSITIVE_RATE)
+                    .unwrap()
+                    .0,
+            );
             count(&mut wrong, as_trials(&[&first, &second], &target.word).unwrap());
         }
         // Exactly 0.00843 at 10^-2 (42 of 64 bits), so 169 with a deviation of 13.

@@ -3,7 +3,7 @@
 //! A claim takes the guess at what was done under which most bits match, and counts every guess in its p-value. The share
 //! of right bits under that guess would be too good: it was searched for. So each bit is read under the guess that all
 //! *other* bits prefer; no bit has a say in how it is read.
-use guardsplat_engine::message::Message;
+use guardsplat_codeword::Message;
 
 /// How much better than the picture as it is a guess must match: 1 is all bits against half of them.
 const BETTER: f64 = 0.25;
@@ -12,11 +12,11 @@ const BETTER: f64 = 0.25;
 /// done first.
 pub(super) fn cross_chosen(guesses: &[Vec<f32>], message: &Message) -> Vec<f32> {
     let all: Vec<Agreement> = guesses.iter().map(|logits| Agreement::of(logits, message)).collect();
-    let read = message.bits().iter().enumerate().map(|(bit, right)| {
+    let read = message.bits().enumerate().map(|(bit, right)| {
         let scores = guesses
             .iter()
             .zip(&all)
-            .map(|(logits, all)| all.without(logits[bit], *right));
+            .map(|(logits, all)| all.without(logits[bit], right));
         guesses[best(scores)][bit]
     });
     read.collect()
@@ -45,7 +45,7 @@ impl Agreement {
     fn of(logits: &[f32], message: &Message) -> Self {
         let pairs = || logits.iter().zip(message.bits());
         Self {
-            signed: pairs().map(|(logit, right)| signed(*logit, *right)).sum(),
+            signed: pairs().map(|(logit, right)| signed(*logit, right)).sum(),
             all: logits.iter().map(|v| f64::from(v.abs())).sum(),
         }
     }
@@ -81,14 +81,15 @@ mod tests {
     }
 
     fn right(logits: &[f32]) -> usize {
-        Message::from_logits(logits).unwrap().matches(&message())
+        let read = guardsplat_codeword::Reading::from_logits(logits).unwrap();
+        read.matches(&message()).unwrap() as usize
     }
 
     #[test]
     fn the_right_guess_is_found_and_nothing_done_is_preferred() {
         let found = cross_chosen(&[logits(8), logits(7), logits(0), logits(9)], &message());
         assert_eq!(right(&found), 16);
-        // MarkRun bit better is no reason to believe that something was done.
+        // One bit better is no reason to believe that something was done.
         assert_eq!(cross_chosen(&[logits(1), logits(0)], &message()), logits(1));
     }
 

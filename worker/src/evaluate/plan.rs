@@ -1,7 +1,7 @@
 //! What the experiments of the paper, and ours, need: marks, and what is done to them.
-use guardsplat_distortion::{Kind as Distortion, RobustTo};
+use guardsplat_distortion::{DistortionKind as Distortion, RobustTo};
 use guardsplat_evaluation::attack::Attack;
-use guardsplat_evaluation::report::named::Kind;
+use guardsplat_evaluation::report::named::Experiment;
 use guardsplat_evaluation::report::names;
 
 use super::trial::Trial;
@@ -22,7 +22,7 @@ const LONGER_BITS: usize = 128;
 #[derive(Clone, Debug, PartialEq)]
 pub struct WantedMark {
     /// The experiment that asked first.
-    pub experiment: Kind,
+    pub experiment: Experiment,
     /// Bits of the message.
     pub bits: usize,
     /// What reports call the settings.
@@ -40,7 +40,7 @@ pub struct WantedMark {
 /// Everything that some experiments need.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// MarkRun of each length and variant.
+    /// One of each length and variant.
     pub wanted: Vec<WantedMark>,
     /// Lengths whose standard marks detectors are to judge.
     pub judged: Vec<usize>,
@@ -75,9 +75,9 @@ impl Plan {
         Ok(())
     }
 
-    fn add(&mut self, experiment: Kind, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
+    fn add(&mut self, experiment: Experiment, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
         let same = |w: &&mut WantedMark| w.bits == bits && w.variant == variant;
-        let claims = experiment == Kind::Claims;
+        let claims = experiment == Experiment::Claims;
         if let Some(known) = self.wanted.iter_mut().find(same) {
             known.claims |= claims;
             for trial in trials {
@@ -93,7 +93,7 @@ impl Plan {
             variant: variant.into(),
             settings,
             trials,
-            timed: experiment == Kind::Trade,
+            timed: experiment == Experiment::Trade,
             claims,
         });
     }
@@ -104,10 +104,10 @@ impl Plan {
 ///
 /// # Errors
 /// None but a suite of attacks that cannot be read, which the tests rule out.
-pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &Trade) -> Result<Plan> {
+pub fn plan(experiments: &[Experiment], standard: &Settings, bits: &[usize], trade: &Trade) -> Result<Plan> {
     let mut plan = Plan::default();
     let free: &[usize] = if bits.is_empty() { &[BITS] } else { bits };
-    if experiments.contains(&Kind::Security) {
+    if experiments.contains(&Experiment::Security) {
         plan.judged = free.to_vec();
     }
     for &kind in experiments {
@@ -119,13 +119,13 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
         };
         let none = [names::NONE];
         match kind {
-            Kind::Capacity => {
+            Experiment::Capacity => {
                 for bits in [16, 32, 48, 64, 72] {
                     add(bits, names::STANDARD, *standard, &none)?;
                 }
             }
-            Kind::Longer => add(LONGER_BITS, names::STANDARD, *standard, &none)?,
-            Kind::Robustness => {
+            Experiment::Longer => add(LONGER_BITS, names::STANDARD, *standard, &none)?,
+            Experiment::Robustness => {
                 let attacks: Vec<String> = Attack::suite("all")
                     .map_err(Error::Evaluation)?
                     .iter()
@@ -147,12 +147,12 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                 };
                 add(ROBUST_BITS, names::ROBUST_TO_ALL, all, &attacks)?;
             }
-            Kind::Trained => {
+            Experiment::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
                 add(BITS, names::DC, standard.learning(TrainableCoefficients::Dc), &none)?;
                 add(BITS, names::REST, standard.learning(TrainableCoefficients::Rest), &none)?;
             }
-            Kind::Losses => {
+            Experiment::Losses => {
                 add(BITS, names::STANDARD, *standard, &none)?;
                 let mut alone = *standard;
                 alone.lambda.reconstruction = 0.0;
@@ -161,12 +161,12 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                 add(BITS, names::MESSAGE_ONLY, alone, &none)?;
                 add(BITS, names::FIXED_WEIGHTS, fixed_weights(standard), &none)?;
             }
-            Kind::Pruning => {
+            Experiment::Pruning => {
                 let trials = [names::NONE, names::PRUNE_LOWEST, names::PRUNE_RANDOM];
                 add(BITS, names::STANDARD, *standard, &trials)?;
             }
-            Kind::Perturbations => add(BITS, names::STANDARD, *standard, &PERTURBATIONS)?,
-            Kind::Sensitivity => {
+            Experiment::Perturbations => add(BITS, names::STANDARD, *standard, &PERTURBATIONS)?,
+            Experiment::Sensitivity => {
                 // Where a PSNR is held, weights are changed all along, and what they were at first decides nothing.
                 let fixed = fixed_weights(standard);
                 add(BITS, names::FIXED_WEIGHTS, fixed, &none)?;
@@ -179,25 +179,25 @@ pub fn plan(experiments: &[Kind], standard: &Settings, bits: &[usize], trade: &T
                     add(BITS, &format!("{}{weight}", names::LAMBDA_MSG), message, &none)?;
                 }
             }
-            Kind::Elevation => {
+            Experiment::Elevation => {
                 add(BITS, names::STANDARD, *standard, &none)?;
                 let mut ring = *standard;
                 ring.ring = Some(RING);
                 add(BITS, names::RING, ring, &none)?;
             }
-            Kind::Formats => {
+            Experiment::Formats => {
                 let trials = names::formats();
                 let trials: Vec<&str> = trials.iter().map(String::as_str).collect();
                 add(BITS, names::STANDARD, *standard, &trials)?;
             }
-            Kind::Claims => add(CLAIM_BITS, names::STANDARD, *standard, &none)?,
+            Experiment::Claims => add(CLAIM_BITS, names::STANDARD, *standard, &none)?,
             // What detectors make of these marks comes after all of them; see `security`.
-            Kind::Security => {
+            Experiment::Security => {
                 for bits in free {
                     add(*bits, names::STANDARD, *standard, &none)?;
                 }
             }
-            Kind::Trade => {
+            Experiment::Trade => {
                 for bits in free {
                     for variant in &trade.variants {
                         let name = format!("{}{}:{}", names::TRADE, trade.device, variant.name);
@@ -249,7 +249,7 @@ mod tests {
             device: "cpu".into(),
             variants: variants(&standard, None, &[]).unwrap(),
         };
-        let plan = plan(&Kind::ALL, &standard, &[], &trade).unwrap();
+        let plan = plan(&Experiment::ALL, &standard, &[], &trade).unwrap();
         assert_eq!(plan.judged, [32]);
         let timed: Vec<&str> = plan
             .wanted
@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn variants_can_be_chosen() {
         let settings = Preset::Standard.settings();
-        let mut plan = plan(&[Kind::Robustness], &settings, &[], &Trade::default()).unwrap();
+        let mut plan = plan(&[Experiment::Robustness], &settings, &[], &Trade::default()).unwrap();
         assert_eq!(plan.wanted.len(), 3);
         let error = plan.keep_only(&["strong".into()]).unwrap_err().to_string();
         assert!(
@@ -301,7 +301,7 @@ mod tests {
     #[test]
     fn lengths_can_be_chosen() {
         let plan = plan(
-            &[Kind::Capacity],
+            &[Experiment::Capacity],
             &Preset::Standard.settings(),
             &[32, 64],
             &Trade::default(),
@@ -310,7 +310,7 @@ mod tests {
         let bits: Vec<usize> = plan.wanted.iter().map(|w| w.bits).collect();
         assert_eq!(bits, [32, 64]);
         let other = super::plan(
-            &[Kind::Security],
+            &[Experiment::Security],
             &Preset::Standard.settings(),
             &[16],
             &Trade::default(),

@@ -1,16 +1,16 @@
 //! Views of a scene as 8-bit pictures, and what is read of them after something was done to them.
 use std::collections::BTreeMap;
 
+use guardsplat_codeword::{Message, Reading};
 use guardsplat_distortion::Vae;
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::names;
-use guardsplat_evaluation::report::record::{Id, Reading as Record};
+use guardsplat_evaluation::report::record::{Id, ReadingRecord};
 use image::RgbImage;
 
 use super::guessed::cross_chosen;
 use crate::error::{Error, Result};
-use guardsplat_engine::extract::{Engine, Reading, read_guesses};
-use guardsplat_engine::message::Message;
+use guardsplat_engine::extract::{Engine, PooledLogits, read_corrections};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
 use guardsplat_engine::scene::Gaussians;
@@ -73,18 +73,18 @@ impl Views {
         Ok(self.images.iter().map(to_picture).collect())
     }
 
-    /// Logits of all views; of pictures that somebody else made, under what is guessed to have been done to them.
-    pub fn read(&self, engine: &Engine, message: &Message) -> Result<Reading> {
+    /// Logits of all views; of pictures that somebody else made, under what may have been done to them.
+    pub fn read(&self, engine: &Engine, message: &Message) -> Result<PooledLogits> {
         let mut logits = Vec::with_capacity(self.images.len());
-        // MarkRun at a time: large pictures of all views need not be there as floats.
+        // One at a time: large pictures of all views need not be there as floats.
         for image in &self.images {
             let picture = to_picture(image);
             match self.processed {
-                true => logits.push(cross_chosen(&read_guesses(engine, &picture)?, message)),
+                true => logits.push(cross_chosen(&read_corrections(engine, &picture)?, message)),
                 false => logits.extend(engine.read_logits(&[picture])?),
             }
         }
-        Ok(Reading::new(logits)?)
+        Ok(PooledLogits::new(logits)?)
     }
 
     /// The same views after an attack on each.
@@ -123,18 +123,21 @@ impl Views {
         mark: &Id,
         attack: &str,
         before: &Views,
-    ) -> Result<Record> {
+    ) -> Result<ReadingRecord> {
         let reading = self.read(engine, message)?;
         let right = reading
             .views
             .iter()
-            .map(|logits| Ok(Message::from_logits(logits)?.matches(message) as u16))
+            .map(|logits| Ok(Reading::from_logits(logits)?.matches(message)? as u16))
             .collect::<Result<Vec<u16>>>()?;
         let mut from = BTreeMap::new();
         for views in MESSAGE_VIEWS.into_iter().filter(|n| *n as usize <= right.len()) {
-            from.insert(views, reading.of_first(views as usize)?.message()? == *message);
+            from.insert(
+                views,
+                reading.of_first(views as usize)?.reading() == &Reading::of(*message),
+            );
         }
-        Ok(Record {
+        Ok(ReadingRecord {
             mark: mark.clone(),
             attack: attack.into(),
             size: self.cameras.first().map_or(0, |placed| placed.camera.width),

@@ -147,7 +147,7 @@ fn message(bits: usize, seed: u64) -> Result<Message> {
     Ok(Message::random(bits, &mut rng)?)
 }
 
-/// MarkRun mark and its readings.
+/// One mark and its readings.
 struct MarkRun<'a> {
     wanted: &'a WantedMark,
     options: &'a Options,

@@ -27,7 +27,7 @@ pub(super) struct Marked {
     pub id: Id,
 }
 
-/// MarkRun detector on marks, or on its positive control.
+/// One detector on marks, or on its positive control.
 struct WantedDetection {
     judge: Steganalyzer,
     control: bool,

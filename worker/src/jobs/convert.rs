@@ -1,13 +1,14 @@
 //! Between the API's messages and the engine's types.
 use std::time::Duration;
 
-use guardsplat_distortion::{Kind, RobustTo};
+use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
+use guardsplat_distortion::{DistortionKind, RobustTo};
 use guardsplat_engine::Error as EngineError;
 use guardsplat_engine::embed::{self, Outcome, Preset, Settings};
-use guardsplat_engine::extract::{DEFAULT_VIEWS, Framing, Guess, Reading, Tone};
+use guardsplat_engine::extract::{DEFAULT_VIEWS, PooledLogits};
+use guardsplat_engine::message::Key;
 use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
-use guardsplat_engine::message::{Key, Verdict};
 use guardsplat_engine::scene::{BadRows, Ignored};
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
@@ -43,22 +44,22 @@ pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
 fn robust_to(numbers: &[i32]) -> Result<RobustTo> {
     let kind = |number: &i32| {
         Ok(match Distortion::try_from(*number) {
-            Ok(Distortion::Crop) => Kind::Crop,
-            Ok(Distortion::Scaling) => Kind::Scaling,
-            Ok(Distortion::Rotation) => Kind::Rotation,
-            Ok(Distortion::Brightness) => Kind::Brightness,
-            Ok(Distortion::Contrast) => Kind::Contrast,
-            Ok(Distortion::Jpeg) => Kind::Jpeg,
-            Ok(Distortion::Noise) => Kind::Noise,
-            Ok(Distortion::Blur) => Kind::Blur,
-            Ok(Distortion::Mask) => Kind::Mask,
-            Ok(Distortion::EightBit) => Kind::EightBit,
-            Ok(Distortion::Combined) => Kind::Combined,
-            Ok(Distortion::ShNoise) => Kind::ShNoise,
-            Ok(Distortion::ShTruncation) => Kind::ShTruncation,
-            Ok(Distortion::Spz) => Kind::Spz,
-            Ok(Distortion::Sog) => Kind::Sog,
-            Ok(Distortion::Pruning) => Kind::Pruning,
+            Ok(Distortion::Crop) => DistortionKind::Crop,
+            Ok(Distortion::Scaling) => DistortionKind::Scaling,
+            Ok(Distortion::Rotation) => DistortionKind::Rotation,
+            Ok(Distortion::Brightness) => DistortionKind::Brightness,
+            Ok(Distortion::Contrast) => DistortionKind::Contrast,
+            Ok(Distortion::Jpeg) => DistortionKind::Jpeg,
+            Ok(Distortion::Noise) => DistortionKind::Noise,
+            Ok(Distortion::Blur) => DistortionKind::Blur,
+            Ok(Distortion::Mask) => DistortionKind::Mask,
+            Ok(Distortion::EightBit) => DistortionKind::EightBit,
+            Ok(Distortion::Combined) => DistortionKind::Combined,
+            Ok(Distortion::ShNoise) => DistortionKind::ShNoise,
+            Ok(Distortion::ShTruncation) => DistortionKind::ShTruncation,
+            Ok(Distortion::Spz) => DistortionKind::Spz,
+            Ok(Distortion::Sog) => DistortionKind::Sog,
+            Ok(Distortion::Pruning) => DistortionKind::Pruning,
             Ok(Distortion::Unspecified) | Err(_) => {
                 return Err(Error::BadJob(format!("robust_to: {number} is no distortion")));
             }
@@ -148,6 +149,7 @@ pub fn verify_result(found: VerificationReport) -> api::VerifyResult {
         Verdict::Match => ApiVerdict::Match,
         Verdict::NoMatch => ApiVerdict::NoMatch,
         Verdict::Inconclusive => ApiVerdict::Inconclusive,
+        Verdict::UnknownKey => ApiVerdict::UnknownKey,
     };
     api::VerifyResult {
         verdict: verdict.into(),
@@ -164,22 +166,22 @@ pub fn verify_result(found: VerificationReport) -> api::VerifyResult {
         view_agreement: found.view_agreement,
         reason: found.reason.unwrap_or_default(),
         ignored_rows: found.ignored_rows as u64,
-        framings: found.framings as u32,
-        framing: found.framing.unwrap_or_default(),
+        framings: found.hypotheses as u32,
+        framing: found.hypothesis.unwrap_or_default(),
         ..api::VerifyResult::default()
     }
 }
 
-/// What was read in one framing.
-pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
+/// What was read under one hypothesis.
+pub fn framed_reading(hypothesis: Hypothesis, logits: &PooledLogits) -> api::FramedReading {
     api::FramedReading {
-        quarter_turns: framing.quarter_turns.into(),
-        mirrored: framing.mirrored,
-        trimmed: framing.trimmed,
-        views: reading.views.len() as u32,
-        logits: reading.summed.clone(),
-        undone: undone(framing.undone),
-        part: framing.window.map(|window| api::PicturePart {
+        quarter_turns: hypothesis.quarter_turns.into(),
+        mirrored: hypothesis.mirrored,
+        trimmed: hypothesis.trimmed,
+        views: logits.views.len() as u32,
+        logits: logits.summed.clone(),
+        undone: undone(hypothesis.correction),
+        part: hypothesis.window.map(|window| api::PicturePart {
             left_twelfths: window.left,
             top_twelfths: window.top,
             side_twelfths: window.side,
@@ -187,15 +189,15 @@ pub fn framed(framing: Framing, reading: &Reading) -> api::FramedReading {
     }
 }
 
-fn undone(guess: Guess) -> Option<api::Undone> {
+fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
     use api::undone::Kind;
-    let (kind, factor) = match guess {
-        Guess::Nothing => return None,
-        Guess::Ground => (Kind::Ground, 1.0),
-        Guess::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
-        Guess::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
-        Guess::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
-        Guess::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
+    let (kind, factor) = match correction {
+        PhotometricCorrection::None => return None,
+        PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
+        PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
+        PhotometricCorrection::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
+        PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
+        PhotometricCorrection::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
     };
     Some(api::Undone {
         kind: kind.into(),

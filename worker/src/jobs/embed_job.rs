@@ -1,9 +1,9 @@
 //! `embed` jobs: the same bytes as the command's for the same seed.
 use std::time::{Duration, Instant};
 
+use guardsplat_codeword::Hypothesis;
 use guardsplat_engine::Error as EngineError;
 use guardsplat_engine::embed::{Job, Outcome, embed};
-use guardsplat_engine::extract::Framing;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{PictureFormat, encode_picture};
@@ -43,13 +43,14 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
     let (name, message, force) = (spec.key.clone(), spec.message.clone(), spec.force);
     let bad_rows = BadRows::ignored_if(spec.ignore_bad_rows);
     let marked_file = Content::File(output.clone());
+    let rate = attempt.lease.false_positive_rate;
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         let message = key.message(&message)?;
         let device = cache.device().to_owned();
-        let engine = cache.engine(&name, &key, stop)?;
+        let engine = cache.engine(&name, &key, rate, stop)?;
         let job = Job {
             input: &input,
             output: &output,
@@ -98,8 +99,8 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         .upload(comparison_sheet::NAME, Content::Bytes(marked.sheet), false)
         .await?;
     // What was read back of all views, for the evidence of an asset.
-    let readings = vec![convert::framed(
-        Framing::default(),
+    let readings = vec![convert::framed_reading(
+        Hypothesis::default(),
         &marked.outcome.verification.reading,
     )];
     let result = Done::EmbedResult(EmbedResult {

@@ -38,9 +38,9 @@ impl EngineCache {
         &self.compute
     }
 
-    /// The engine for `key`, the one from before if it is the same key's; it heeds `stop`. `name` is the key's, for
-    /// messages.
-    pub fn engine(&mut self, name: &str, key: &Key, stop: &Stop) -> Result<&Engine> {
+    /// The engine for `key`, the one from before if it is the same key's; it heeds `stop`, and judges at a rate of false
+    /// positives. `name` is the key's, for messages.
+    pub fn engine(&mut self, name: &str, key: &Key, false_positive_rate: f64, stop: &Stop) -> Result<&Engine> {
         stop.check()?;
         let id = key.id();
         let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
@@ -50,6 +50,7 @@ impl EngineCache {
         };
         let (_, engine) = self.loaded.insert((id, engine));
         engine.stop = stop.clone();
+        engine.false_positive_rate = false_positive_rate;
         Ok(engine)
     }
 }

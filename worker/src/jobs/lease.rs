@@ -2,6 +2,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE;
 use guardsplat_engine::{device, memory};
 use guardsplat_proto::v1::{
     CompleteJobRequest, FailJobRequest, Failure, Job, LeaseJobResponse, Progress, ReleaseJobRequest, ReportJobRequest,
@@ -33,10 +34,24 @@ pub struct Lease {
     pub duration: Duration,
     /// What the work is a part of, as `traceparent` has it; empty where nobody traces.
     pub trace_parent: String,
+    /// How often a match may be claimed wrongly.
+    pub false_positive_rate: f64,
     /// Whether the peak of memory is this attempt's, and not also of what was before.
     measured: bool,
     /// Bytes of the accelerator's memory that were held at most, of those times that it was looked at.
     device_peak: AtomicU64,
+}
+
+/// The rate that a server told; of one that told none, the one that such servers judge claims at.
+fn false_positive_rate(told: f64) -> Result<f64> {
+    match told {
+        0.0 => Ok(DEFAULT_FALSE_POSITIVE_RATE),
+        rate if rate > 0.0 && rate < 1.0 => Ok(rate),
+        rate => Err(Error::Damaged {
+            what: "a lease".into(),
+            reason: format!("its rate of false positives is {rate}"),
+        }),
+    }
 }
 
 /// Why an attempt ends that is not done.
@@ -88,6 +103,7 @@ impl Lease {
             token: answer.lease_token,
             duration,
             trace_parent: answer.trace_parent,
+            false_positive_rate: false_positive_rate(answer.false_positive_rate)?,
             measured: memory::forget_peak(),
             device_peak: AtomicU64::new(0),
         };
@@ -220,5 +236,19 @@ async fn in_time<T>(limit: Duration, work: impl Future<Output = Result<T>>) -> R
     match tokio::time::timeout(limit, work).await {
         Ok(done) => done.map(|_| ()),
         Err(_) => Err(Error::Unreachable(format!("not within {} s", limit.as_secs()))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn servers_that_tell_no_rate_mean_the_default() {
+        assert_eq!(false_positive_rate(0.0).unwrap(), DEFAULT_FALSE_POSITIVE_RATE);
+        assert_eq!(false_positive_rate(1e-9).unwrap(), 1e-9);
+        for rate in [-1.0, 1.0, f64::NAN, f64::INFINITY] {
+            assert!(false_positive_rate(rate).is_err());
+        }
     }
 }

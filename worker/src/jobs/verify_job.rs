@@ -11,7 +11,7 @@ use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
 use crate::operations::thumbnails::Thumbnails;
-use crate::operations::verification::{VerificationReport, read_and_compare, read_framed};
+use crate::operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
@@ -37,6 +37,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
     let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
+    let rate = attempt.lease.false_positive_rate;
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
         let source = find_source(&paths)?;
@@ -46,11 +47,11 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let message = Some(message).filter(|text| !text.is_empty());
         let message = message.map(|text| key.message(&text)).transpose()?;
         let device = cache.device().to_owned();
-        let engine = cache.engine(&name, &key, stop)?;
+        let engine = cache.engine(&name, &key, rate, stop)?;
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
         let mut shown = Thumbnails::default();
         let (findings, framed) = if claim {
-            let (framed, ignored) = read_framed(engine, &source, &views, &mut shown, progress)?;
+            let (framed, ignored) = read_hypotheses(engine, &source, &views, &mut shown, progress)?;
             // As given comes first.
             let reading = framed.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
@@ -64,7 +65,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
             // Of a raw message all is said in the findings.
             readings: framed
                 .iter()
-                .map(|(framing, reading)| convert::framed(*framing, reading))
+                .map(|(hypothesis, logits)| convert::framed_reading(*hypothesis, logits))
                 .collect(),
             shown,
             device,

@@ -1,10 +1,10 @@
 //! What a verification finds: reads scenes and pictures, and says whether the message is there.
+use guardsplat_codeword::{Hypothesis, Message, Verdict};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, Framed, Framing, Reading, Source, default_size, framings, read_scene,
+    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, hypotheses, read_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
-use guardsplat_engine::message::{Message, Verdict};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
@@ -40,7 +40,7 @@ pub fn read(
     views: &Views,
     shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
-) -> Result<(Reading, Vec<Ignored>)> {
+) -> Result<(PooledLogits, Vec<Ignored>)> {
     let (mut logits, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
     let (before, total) = (logits.len(), count(source, views));
     // One at a time: thousands of large pictures need not fit in memory.
@@ -50,7 +50,7 @@ pub fn read(
         logits.extend(engine.read_logits(&[picture])?);
         progress(before + index + 1, total);
     }
-    Ok((Reading::new(logits)?, ignored))
+    Ok((PooledLogits::new(logits)?, ignored))
 }
 
 /// Views and pictures that are read.
@@ -90,54 +90,54 @@ fn read_scenes(
     Ok((logits, ignored))
 }
 
-/// A reading in each framing, as given first, and rows of scenes that were ignored.
-pub type InFramings = (Vec<(Framing, Reading)>, Vec<Ignored>);
+/// A reading under each hypothesis, as given first, and rows of scenes that were ignored.
+pub type HypothesisReadings = (Vec<(Hypothesis, PooledLogits)>, Vec<Ignored>);
 
-/// As [`read`], in every framing that pictures may be in; views of scenes are as they are in all of them, and without
-/// pictures there is one framing only. Framings without borders are there only if some picture has any: others would be
+/// As [`read`], under every hypothesis about what was done to pictures; views of scenes are as they are under all of them,
+/// and without pictures there is one only. Those without borders are there only if some picture has any: others would be
 /// the same once more.
-pub fn read_framed(
+pub fn read_hypotheses(
     engine: &Engine,
     source: &Source,
     views: &Views,
     shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
-) -> Result<InFramings> {
+) -> Result<HypothesisReadings> {
     let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
     if source.pictures.is_empty() {
-        return Ok((vec![(Framing::default(), Reading::new(of_scenes)?)], ignored));
+        return Ok((vec![(Hypothesis::default(), PooledLogits::new(of_scenes)?)], ignored));
     }
     let mut pictures = Vec::with_capacity(source.pictures.len());
     for (index, path) in source.pictures.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
         shown.see("picture", index, &picture)?;
-        pictures.push(Framed::read(engine, &picture)?);
+        pictures.push(PictureLogits::read(engine, &picture)?);
         progress(of_scenes.len() + index + 1, count(source, views));
     }
-    let together = |(framing, reading): (Framing, Reading)| {
-        let all = of_scenes.iter().cloned().chain(reading.views).collect();
-        Ok((framing, Reading::new(all)?))
+    let together = |(hypothesis, logits): (Hypothesis, PooledLogits)| {
+        let all = of_scenes.iter().cloned().chain(logits.views).collect();
+        Ok((hypothesis, PooledLogits::new(all)?))
     };
-    let read = framings(engine, &pictures)?.into_iter().map(together);
+    let read = hypotheses(engine, &pictures)?.into_iter().map(together);
     Ok((read.collect::<Result<_>>()?, ignored))
 }
 
 /// What was read, and how it compares with a raw message.
 pub struct Compared {
-    /// The reading that agrees best.
-    pub reading: Reading,
+    /// What was read under the hypothesis that agrees best.
+    pub reading: PooledLogits,
     /// How it compares, if there is a message.
     pub comparison: Option<Comparison>,
-    /// How the pictures were looked at for it.
-    pub framing: Framing,
-    /// Ways in which they were looked at.
-    pub framings: usize,
+    /// What was undone for it.
+    pub hypothesis: Hypothesis,
+    /// Hypotheses under which the pictures were read.
+    pub hypotheses: usize,
     /// Rows of scenes that were ignored.
     pub ignored: Vec<Ignored>,
 }
 
-/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read in every framing
-/// besides. Half of the rate of false positives is for pictures as they are, the other half for all other framings
+/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read under every
+/// other hypothesis besides. Half of the rate of false positives is for pictures as they are, the other half for all others
 /// together, so that those who change nothing hardly pay for those who do.
 pub fn read_and_compare(
     engine: &Engine,
@@ -152,29 +152,29 @@ pub fn read_and_compare(
     let mut best = Compared {
         reading,
         comparison: None,
-        framing: Framing::default(),
-        framings: 1,
+        hypothesis: Hypothesis::default(),
+        hypotheses: 1,
         ignored,
     };
     let Some(message) = message else {
         return Ok(best);
     };
     let halves = if source.pictures.is_empty() { 1 } else { 2 };
-    let as_given = best.reading.compare_among(message, halves)?;
+    let as_given = best.reading.compare(message, &engine.acceptance_rule(halves))?;
     let decided = halves == 1 || as_given.decision.verdict != Verdict::NoMatch;
     let mut p_value = as_given.decision.p_value;
     best.comparison = Some(as_given);
     if decided {
         return Ok(best);
     }
-    let (framed, _) = read_framed(engine, source, views, &mut shown, progress)?;
-    best.framings = framed.len();
-    let others = halves * (framed.len() as u32 - 1).max(1);
-    for (framing, reading) in framed.into_iter().skip(1) {
-        let comparison = reading.compare_among(message, others)?;
+    let (read, _) = read_hypotheses(engine, source, views, &mut shown, progress)?;
+    best.hypotheses = read.len();
+    let rule = engine.acceptance_rule(halves * read.len().saturating_sub(1).max(1));
+    for (hypothesis, reading) in read.into_iter().skip(1) {
+        let comparison = reading.compare(message, &rule)?;
         if comparison.decision.p_value < p_value {
             p_value = comparison.decision.p_value;
-            (best.reading, best.framing, best.comparison) = (reading, framing, Some(comparison));
+            (best.reading, best.hypothesis, best.comparison) = (reading, hypothesis, Some(comparison));
         }
     }
     Ok(best)
@@ -208,9 +208,11 @@ pub struct VerificationReport {
     /// Mean share of views that agree with the decision on a bit.
     pub view_agreement: f64,
     /// Ways in which pictures were looked at, each of which the p-value pays for.
-    pub framings: usize,
+    #[serde(rename = "framings")]
+    pub hypotheses: usize,
     /// The way that agreed best, where it is not the first: what was undone, whether borders were cut off.
-    pub framing: Option<String>,
+    #[serde(rename = "framing")]
+    pub hypothesis: Option<String>,
     /// Rows of the scene that are no Gaussians of it and were ignored.
     pub ignored_rows: usize,
     /// Why nothing could be decided.
@@ -221,17 +223,17 @@ impl VerificationReport {
     /// What a comparison says.
     pub fn of(compared: &Compared) -> Result<Self> {
         let found = Self::new(&compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
-        let as_given = compared.framing == Framing::default();
+        let as_given = compared.hypothesis == Hypothesis::default();
         Ok(Self {
-            framings: compared.framings,
-            framing: (!as_given).then(|| compared.framing.to_string()),
+            hypotheses: compared.hypotheses,
+            hypothesis: (!as_given).then(|| compared.hypothesis.to_string()),
             ..found
         })
     }
 
     /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
     /// were ignored for it.
-    pub fn new(reading: &Reading, comparison: Option<&Comparison>, ignored: &[Ignored]) -> Result<Self> {
+    pub fn new(reading: &PooledLogits, comparison: Option<&Comparison>, ignored: &[Ignored]) -> Result<Self> {
         let decision = comparison.map(|c| &c.decision);
         Ok(Self {
             verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
@@ -241,13 +243,13 @@ impl VerificationReport {
             needed_bits: decision.and_then(|d| d.needed_bits),
             bits: reading.summed.len(),
             views: reading.views.len(),
-            message: reading.message()?.to_string(),
+            message: reading.message().to_string(),
             bit_accuracy: comparison.map(|c| c.bit_accuracy),
             bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
             mean_abs_logit: reading.mean_abs_logit(),
             view_agreement: reading.agreement(),
-            framings: 1,
-            framing: None,
+            hypotheses: 1,
+            hypothesis: None,
             ignored_rows: ignored.iter().map(Ignored::count).sum(),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),

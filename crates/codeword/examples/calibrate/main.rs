@@ -1,7 +1,7 @@
 //! Are p-values what they say? A million claims with wrong keys against a biased, correlated decoder.
 //!
 //! Prints the share of claims with p <= 10^-k beside what it may be at most. The first argument is another number of
-//! claims. Views counted as trials, and framings tried but not counted, are shown to fail.
+//! claims. Views counted as trials, and hypotheses tried but not counted, are shown to fail.
 mod simulation;
 
 use simulation::{Method, attainable, interval, run};
@@ -13,10 +13,10 @@ fn main() {
         .unwrap_or(1_000_000);
     for (method, title) in [
         (Method::OneTest, "one test: logits summed over views, decided once"),
-        (Method::SeveralFramings, "six framings tried, all counted"),
+        (Method::SeveralHypotheses, "six hypotheses tried, all counted"),
         (
-            Method::BestFramingOnly,
-            "WRONG: six framings tried, the best counted as the only one",
+            Method::BestHypothesisOnly,
+            "WRONG: six hypotheses tried, the best counted as the only one",
         ),
         (Method::ViewsAsTrials, "WRONG: each bit of each view counted as a trial"),
     ] {

@@ -1,5 +1,5 @@
 //! Claims with wrong keys, read by a decoder as bad as decoders are: biased, and correlated between bits and views.
-use guardsplat_codeword::{Claim, Code, Framing, Payload, Scheme, Target, Whitening, Word, chance, mark};
+use guardsplat_codeword::{Claim, Code, HypothesisReading, Message, Payload, Scheme, Target, Whitening, chance, mark};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,18 +8,18 @@ use rand_distr::{Distribution, StandardNormal};
 const BITS: usize = 64;
 /// Views of a suspect. Two, so that all their bits together are as many as the binomial tail takes.
 const VIEWS: usize = 2;
-/// Framings in which a suspect is read, where several are tried.
-const FRAMINGS: usize = 6;
+/// Hypotheses under which a suspect is read, where several are tried.
+const HYPOTHESES: usize = 6;
 
 /// How a p-value comes from what was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// As it should: logits summed over views, one test.
     OneTest,
-    /// The same, with several framings tried and counted.
-    SeveralFramings,
-    /// Wrongly: several framings tried, and only the best counted.
-    BestFramingOnly,
+    /// The same, with several hypotheses tried and counted.
+    SeveralHypotheses,
+    /// Wrongly: several hypotheses tried, and only the best counted.
+    BestHypothesisOnly,
     /// Wrongly: each bit of each view as a trial of its own.
     ViewsAsTrials,
 }
@@ -41,7 +41,7 @@ pub fn run(method: Method, claims: u64, seed: u64) -> Counts {
     counts
 }
 
-/// The share of claims with p <= 10^-k that one test with one framing has, exactly: the largest tail that is not above.
+/// The share of claims with p <= 10^-k that one test with one hypothesis has, exactly: the largest tail that is not above.
 pub fn attainable(k: i32) -> f64 {
     let rate = 10_f64.powi(-k);
     let least = chance::least_matches(BITS as u32, rate, 1).ok().flatten();
@@ -75,7 +75,7 @@ impl Decoder {
         }
     }
 
-    /// Logits of one framing, `[views][bits]`: bias, a factor of all bits, what is the scene's in each bit, and noise.
+    /// Logits under one hypothesis, `[views][bits]`: bias, a factor of all bits, what is the scene's in each bit, and noise.
     fn read(&self, scene: &[f32], factor: f32, rng: &mut ChaCha8Rng) -> Vec<Vec<f32>> {
         let mut view = || {
             let factor = factor + 0.3 * normal(rng);
@@ -92,14 +92,14 @@ fn p_value(method: Method, decoder: &Decoder, rng: &mut ChaCha8Rng) -> f64 {
     let scene: Vec<f32> = (0..BITS).map(|_| 0.7 * normal(rng)).collect();
     let factor = normal(rng);
     let target = wrong_target(rng);
-    let readings = match method {
+    let hypotheses = match method {
         Method::OneTest | Method::ViewsAsTrials => 1,
-        Method::SeveralFramings | Method::BestFramingOnly => FRAMINGS,
+        Method::SeveralHypotheses | Method::BestHypothesisOnly => HYPOTHESES,
     };
-    // Framings differ by more than views: in what all bits follow, too.
-    let mut framings = Vec::new();
+    // Hypotheses differ by more than views: in what all bits follow, too.
+    let mut readings = Vec::new();
     let mut agreeing = 0;
-    for _ in 0..readings {
+    for _ in 0..hypotheses {
         let views = decoder.read(&scene, factor + normal(rng), rng);
         let agrees = |view: &Vec<f32>| {
             target
@@ -111,7 +111,7 @@ fn p_value(method: Method, decoder: &Decoder, rng: &mut ChaCha8Rng) -> f64 {
         };
         agreeing += views.iter().map(agrees).sum::<usize>();
         let logits = (0..BITS).map(|bit| views.iter().map(|view| view[bit]).sum()).collect();
-        framings.push(Framing {
+        readings.push(HypothesisReading {
             name: String::new(),
             views: VIEWS as u32,
             logits,
@@ -122,14 +122,14 @@ fn p_value(method: Method, decoder: &Decoder, rng: &mut ChaCha8Rng) -> f64 {
     }
     let claim = Claim {
         scheme: Scheme::default(),
-        framings: &framings,
+        readings: &readings,
         targets: std::slice::from_ref(&target),
         targets_tried: None,
         other_tries: 1,
         rate: 1e-6,
     };
     let best = claim.test().unwrap().answer.best.unwrap();
-    if method == Method::BestFramingOnly {
+    if method == Method::BestHypothesisOnly {
         best.p_alone
     } else {
         best.p_value
@@ -150,7 +150,7 @@ fn wrong_target(rng: &mut ChaCha8Rng) -> Target {
         key: 1,
         number: rng.random_range(0..1000),
     };
-    let word: Word = mark(Code::default(), payload, &whitening).unwrap().word;
+    let word: Message = mark(Code::default(), payload, &whitening).unwrap().word;
     Target {
         id: String::new(),
         word,

@@ -1,23 +1,10 @@
 //! What a claim is answered with.
 use serde::{Deserialize, Serialize};
 
+use crate::acceptance::Verdict;
+use crate::message::Message;
 use crate::payload::Payload;
 use crate::reading::Reading;
-use crate::word::Word;
-
-/// The outcome of a claim.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The corrected p-value is at or below the rate.
-    Match,
-    /// It is above. This isn't "unmarked": marks can be too weak to be read, and other keys have other words.
-    NoMatch,
-    /// Whatever had been read, it could not have been a match; the reason says why.
-    Inconclusive,
-    /// There was nothing to compare with.
-    UnknownKey,
-}
 
 /// A verdict with what it rests on.
 ///
@@ -32,7 +19,7 @@ pub struct Answer {
     pub bits: u32,
     /// The threshold in bits: matches that the rate needs with so many hypotheses; `None` when no number would do.
     pub needed_bits: Option<u32>,
-    /// Hypotheses tried: framings times targets times other tries.
+    /// Hypotheses tried: readings times targets times other tries.
     pub hypotheses: u64,
     /// The best hypothesis; `None` when nothing was compared.
     pub best: Option<Comparison>,
@@ -42,11 +29,12 @@ pub struct Answer {
     pub reason: Option<String>,
 }
 
-/// The framing and the target that agree best; of equal ones the first framing, then the first target.
+/// The reading and the target that agree best; of equal ones the first reading, then the first target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
-    /// The framing's name.
-    pub framing: String,
+    /// The reading's name: what was undone before.
+    #[serde(rename = "framing")]
+    pub hypothesis: String,
     /// Views whose logits were summed.
     pub views: u32,
     /// The target's id.
@@ -83,12 +71,12 @@ pub enum ReadPayload {
     },
 }
 
-/// How sure the bits of the best framing are. For the mark's owner only: whoever can ask for it learns, bit by bit, which
+/// How sure the bits of the best reading are. For the mark's owner only: whoever can ask for it learns, bit by bit, which
 /// changes to a picture weaken the mark. That is why it is no part of [`Answer`] and is not serialised along with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confidences {
     /// The word read; undecided bits are 0.
-    pub word: Word,
+    pub word: Message,
     /// tanh(|logit| / 2) a bit, 0 to 1: how far sigmoid(logit) is from undecided. A probability (twice that of being
     /// right, less one) only if the decoder is calibrated, which summed views are not.
     pub bits: Vec<f32>,
@@ -113,7 +101,7 @@ impl Confidences {
             }
         };
         Self {
-            word: reading.word(),
+            word: reading.message(),
             bits: logits.iter().map(sure).collect(),
         }
     }

@@ -1,25 +1,27 @@
 //! One test per claim: are the words that were read one of these targets, at this false-positive rate?
 //!
-//! Every framing of the pictures (as given, cropped, turned, mirrored …) gives one word, decided once from logits that
-//! were summed over views before. The best pair of a framing and a target is judged by its exact binomial tail, times the
-//! number of all hypotheses: framings, targets, and whatever else the caller tried. Error correction reads the payload of
+//! Pictures are read under each [`Hypothesis`](crate::Hypothesis) about what was done to them (nothing, cropped, turned,
+//! mirrored …), and each gives one word, decided once from logits that were summed over views before. The best pair of a
+//! reading and a target is judged by the [`AcceptanceRule`], which counts all hypotheses: readings, targets, and whatever else the caller tried. Error correction reads the payload of
 //! a match afterwards, and never decides.
 mod answer;
 mod read;
 #[cfg(test)]
 mod tests;
 
+use crate::acceptance::{AcceptanceRule, Verdict};
 use crate::chance;
 use crate::code::Scheme;
+use crate::decision::too_few_decided;
 use crate::error::{Error, Result};
+use crate::message::Message;
 use crate::reading::Reading;
-use crate::word::Word;
-pub use answer::{Answer, Comparison, Confidences, ReadPayload, Tested, Verdict};
+pub use answer::{Answer, Comparison, Confidences, ReadPayload, Tested};
 
-/// Pictures of the suspect in one framing, read.
+/// Pictures of the suspect, read under one hypothesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Framing {
-    /// What was done to the pictures, for the report: "as given", "mirrored", ….
+pub struct HypothesisReading {
+    /// What was undone, for the report: "as given", "mirrored", ….
     pub name: String,
     /// Views that were summed.
     pub views: u32,
@@ -33,9 +35,9 @@ pub struct Target {
     /// What the registry calls it.
     pub id: String,
     /// The word that was embedded: under its pad, where the scheme is coded.
-    pub word: Word,
+    pub word: Message,
     /// The pad, to read the payload of a match with; not needed for the verdict.
-    pub pad: Option<Word>,
+    pub pad: Option<Message>,
 }
 
 /// A question to the statistics.
@@ -43,8 +45,8 @@ pub struct Target {
 pub struct Claim<'a> {
     /// What kind of words these are.
     pub scheme: Scheme,
-    /// All framings that were tried, also those that look bad.
-    pub framings: &'a [Framing],
+    /// All readings that were made, also those that look bad.
+    pub readings: &'a [HypothesisReading],
     /// What they are compared with. None means that the claim's key or owner is unknown.
     pub targets: &'a [Target],
     /// Targets that were searched, where `targets` are only the nearest of them; `None` when `targets` are all.
@@ -57,7 +59,7 @@ pub struct Claim<'a> {
 
 /// The pair with the most matches, the first of equal ones.
 struct Winner<'a> {
-    framing: &'a Framing,
+    read: &'a HypothesisReading,
     reading: Reading,
     target: &'a Target,
     matched: u32,
@@ -67,7 +69,7 @@ impl Claim<'_> {
     /// Decides.
     ///
     /// - No targets: [`Verdict::UnknownKey`], and nothing is compared.
-    /// - No framings, too few bits for the rate and the hypotheses, or too few bits decided: [`Verdict::Inconclusive`],
+    /// - No readings, too few bits for the rate and the hypotheses, or too few bits decided: [`Verdict::Inconclusive`],
     ///   with a reason.
     /// - Else [`Verdict::Match`] if the corrected p-value is at or below the rate, and [`Verdict::NoMatch`] if not.
     ///
@@ -77,10 +79,14 @@ impl Claim<'_> {
     pub fn test(&self) -> Result<Tested> {
         chance::check_rate(self.rate)?;
         let hypotheses = self.hypotheses()?;
-        let readings = self.readings()?;
+        let readings = self.decided()?;
         self.check_targets()?;
         let bits = self.scheme.length().bits();
-        let needed = chance::least_matches(bits, self.rate, hypotheses)?;
+        let rule = AcceptanceRule {
+            false_positive_rate: self.rate,
+            hypotheses,
+        };
+        let needed = rule.least_matches(bits)?;
         let mut answer = Answer {
             verdict: Verdict::Inconclusive,
             rate: self.rate,
@@ -106,35 +112,32 @@ impl Claim<'_> {
                 confidences: None,
             });
         };
-        let p_alone = chance::tail(bits, winner.matched)?;
         answer.best = Some(Comparison {
-            framing: winner.framing.name.clone(),
-            views: winner.framing.views,
+            hypothesis: winner.read.name.clone(),
+            views: winner.read.views,
             target: winner.target.id.clone(),
             matched_bits: winner.matched,
             undecided_bits: winner.reading.undecided_bits(),
-            p_alone,
-            p_value: chance::any_of(p_alone, hypotheses),
+            p_alone: chance::tail(bits, winner.matched)?,
+            p_value: rule.p_value(bits, winner.matched)?,
         });
         let decided = readings.iter().map(Reading::decided_bits).max().unwrap_or(0);
         match needed {
             None => answer.reason = Some(too_short(bits, hypotheses, self.rate)?),
             Some(needed) if decided < needed => {
-                answer.reason = Some(format!(
-                    "at most {decided} of {bits} bits could be decided, and a match needs {needed}"
-                ));
+                answer.reason = Some(too_few_decided(decided, bits, needed));
             }
             Some(needed) if winner.matched >= needed => {
                 answer.verdict = Verdict::Match;
-                answer.payload = read::payload(self.scheme, winner.target, &winner.framing.logits)?;
+                answer.payload = read::payload(self.scheme, winner.target, &winner.read.logits)?;
             }
             Some(_) => answer.verdict = Verdict::NoMatch,
         }
-        let confidences = Some(Confidences::of(&winner.reading, &winner.framing.logits));
+        let confidences = Some(Confidences::of(&winner.reading, &winner.read.logits));
         Ok(Tested { answer, confidences })
     }
 
-    /// Framings times targets times other tries. None of a kind counts as one, so that limits are told for nothing too.
+    /// Readings times targets times other tries. None of a kind counts as one, so that limits are told for nothing too.
     fn hypotheses(&self) -> Result<u64> {
         let bad = |field, reason: String| Error::Hypotheses { field, reason };
         let given = self.targets.len() as u64;
@@ -146,24 +149,24 @@ impl Claim<'_> {
         if self.other_tries == 0 {
             return Err(bad("other tries", "0 is below 1: this claim counts".into()));
         }
-        let framings = self.framings.len().max(1) as u64;
-        let product = framings
+        let readings = self.readings.len().max(1) as u64;
+        let product = readings
             .checked_mul(targets.max(1))
             .and_then(|n| n.checked_mul(self.other_tries));
         product.ok_or_else(|| bad("hypotheses", "more than 2^64 - 1 were tried".into()))
     }
 
-    fn readings(&self) -> Result<Vec<Reading>> {
-        let read = |framing: &Framing| {
-            let reading = Reading::from_logits(&framing.logits)?;
-            reading.require(&format!("framing {:?}", framing.name), self.scheme.length())?;
+    fn decided(&self) -> Result<Vec<Reading>> {
+        let read = |read: &HypothesisReading| {
+            let reading = Reading::from_logits(&read.logits)?;
+            reading.require(&format!("reading {:?}", read.name), self.scheme.length())?;
             Ok(reading)
         };
-        self.framings.iter().map(read).collect()
+        self.readings.iter().map(read).collect()
     }
 
     fn check_targets(&self) -> Result<()> {
-        let expected = Word::zeros(self.scheme.length());
+        let expected = Message::zeros(self.scheme.length());
         for target in self.targets {
             expected.require(&format!("target {:?}", target.id), &target.word)?;
             if let Some(pad) = &target.pad {
@@ -175,13 +178,13 @@ impl Claim<'_> {
 
     fn winner(&self, readings: &[Reading]) -> Result<Option<Winner<'_>>> {
         let mut best: Option<Winner<'_>> = None;
-        for (framing, reading) in self.framings.iter().zip(readings) {
+        for (read, reading) in self.readings.iter().zip(readings) {
             for target in self.targets {
                 let matched = reading.matches(&target.word)?;
                 if best.as_ref().is_none_or(|best| matched > best.matched) {
                     let reading = *reading;
                     best = Some(Winner {
-                        framing,
+                        read,
                         reading,
                         target,
                         matched,

@@ -3,8 +3,8 @@ use super::answer::ReadPayload;
 use super::{Scheme, Target};
 use crate::code::Code;
 use crate::error::Result;
+use crate::message::Message;
 use crate::payload::Payload;
-use crate::word::Word;
 
 /// What a match says: `None` for raw words, and for targets whose pad was not given.
 pub fn payload(scheme: Scheme, target: &Target, logits: &[f32]) -> Result<Option<ReadPayload>> {
@@ -36,7 +36,7 @@ pub fn payload(scheme: Scheme, target: &Target, logits: &[f32]) -> Result<Option
 }
 
 /// What the registered word says, if it is a codeword with a payload.
-fn registered(code: Code, word: &Word, pad: &Word) -> Result<Option<Payload>> {
+fn registered(code: Code, word: &Message, pad: &Message) -> Result<Option<Payload>> {
     let decoded = code
         .decode(&word.xor(pad)?)?
         .filter(|decoded| decoded.corrected_bits == 0);

@@ -1,19 +1,19 @@
 //! Verdicts at their limits, and p-values whose calibration can be enumerated.
 use super::*;
 use crate::code::Code;
+use crate::message::MessageLength;
 use crate::payload::Payload;
 use crate::whiten::{Whitening, mark};
-use crate::word::WordLength;
 use proptest::prelude::*;
 
 fn raw(bits: usize) -> Scheme {
     Scheme::Raw {
-        bits: WordLength::new(bits).unwrap(),
+        bits: MessageLength::new(bits).unwrap(),
     }
 }
 
-fn framing(name: &str, logits: Vec<f32>) -> Framing {
-    Framing {
+fn reading(name: &str, logits: Vec<f32>) -> HypothesisReading {
+    HypothesisReading {
         name: name.into(),
         views: 4,
         logits,
@@ -21,13 +21,13 @@ fn framing(name: &str, logits: Vec<f32>) -> Framing {
 }
 
 /// Logits of a word, the first `wrong` of them on the wrong side and unsure.
-fn logits(word: &Word, wrong: usize) -> Vec<f32> {
+fn logits(word: &Message, wrong: usize) -> Vec<f32> {
     let side =
         |(i, bit): (usize, bool)| if bit == (i < wrong) { -1.0 } else { 1.0 } * if i < wrong { 0.5 } else { 3.0 };
     word.bits().enumerate().map(side).collect()
 }
 
-fn target(id: &str, word: Word) -> Target {
+fn target(id: &str, word: Message) -> Target {
     Target {
         id: id.into(),
         word,
@@ -35,10 +35,10 @@ fn target(id: &str, word: Word) -> Target {
     }
 }
 
-fn claim<'a>(scheme: Scheme, framings: &'a [Framing], targets: &'a [Target]) -> Claim<'a> {
+fn claim<'a>(scheme: Scheme, readings: &'a [HypothesisReading], targets: &'a [Target]) -> Claim<'a> {
     Claim {
         scheme,
-        framings,
+        readings,
         targets,
         targets_tried: None,
         other_tries: 1,
@@ -49,11 +49,11 @@ fn claim<'a>(scheme: Scheme, framings: &'a [Framing], targets: &'a [Target]) -> 
 #[test]
 fn matches_decide_at_the_thresholds_of_the_table() {
     for (bits, needed) in [(32, 30), (48, 41), (64, 51), (72, 57)] {
-        let word = Word::zeros(WordLength::new(bits).unwrap());
+        let word = Message::zeros(MessageLength::new(bits).unwrap());
         let targets = [target("ours", word)];
         for (matched, verdict) in [(needed, Verdict::Match), (needed - 1, Verdict::NoMatch)] {
-            let framings = [framing("as given", logits(&word, bits - matched))];
-            let answer = claim(raw(bits), &framings, &targets).test().unwrap().answer;
+            let readings = [reading("as given", logits(&word, bits - matched))];
+            let answer = claim(raw(bits), &readings, &targets).test().unwrap().answer;
             let best = answer.best.unwrap();
             assert_eq!(
                 (answer.verdict, answer.needed_bits),
@@ -69,10 +69,10 @@ fn matches_decide_at_the_thresholds_of_the_table() {
 
 #[test]
 fn a_short_key_is_inconclusive_and_says_what_it_can_reach() {
-    let word = Word::zeros(WordLength::new(16).unwrap());
-    let framings = [framing("as given", logits(&word, 0))];
+    let word = Message::zeros(MessageLength::new(16).unwrap());
+    let readings = [reading("as given", logits(&word, 0))];
     let targets = [target("ours", word)];
-    let question = claim(raw(16), &framings, &targets);
+    let question = claim(raw(16), &readings, &targets);
     let answer = question.test().unwrap().answer;
     assert_eq!((answer.verdict, answer.needed_bits), (Verdict::Inconclusive, None));
     let expected = "16 bits with 1 hypotheses can never reach a rate of 1e-6: all of them match by chance at a rate of up \
@@ -87,25 +87,25 @@ fn a_short_key_is_inconclusive_and_says_what_it_can_reach() {
 
 #[test]
 fn all_hypotheses_count() {
-    let word = Word::from_u64(0x0123_4567_89ab_cdef);
-    let framings = [
-        framing("as given", vec![-1.0; 64]),
-        framing("mirrored", logits(&word, 13)),
+    let word = Message::from_u64(0x0123_4567_89ab_cdef);
+    let readings = [
+        reading("as given", vec![-1.0; 64]),
+        reading("mirrored", logits(&word, 13)),
     ];
     let targets = [
-        target("theirs", Word::from_u64(!0)),
+        target("theirs", Message::from_u64(!0)),
         target("ours", word),
         target("again", word),
     ];
     let question = Claim {
         other_tries: 5,
-        ..claim(raw(64), &framings, &targets)
+        ..claim(raw(64), &readings, &targets)
     };
     let answer = question.test().unwrap().answer;
     let best = answer.best.clone().unwrap();
     assert_eq!((answer.hypotheses, answer.verdict), (2 * 3 * 5, Verdict::NoMatch)); // alone, 51 would do
     assert_eq!(
-        (best.framing.as_str(), best.target.as_str(), best.matched_bits),
+        (best.hypothesis.as_str(), best.target.as_str(), best.matched_bits),
         ("mirrored", "ours", 51)
     );
     assert!(best.p_alone <= 1e-6 && best.p_value == 30.0 * best.p_alone);
@@ -127,12 +127,12 @@ fn all_hypotheses_count() {
 
 #[test]
 fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() {
-    let framings = [framing("as given", vec![1.0; 64])];
-    let tested = claim(raw(64), &framings, &[]).test().unwrap();
+    let readings = [reading("as given", vec![1.0; 64])];
+    let tested = claim(raw(64), &readings, &[]).test().unwrap();
     assert_eq!((tested.answer.verdict, tested.confidences), (Verdict::UnknownKey, None));
     assert!(tested.answer.best.is_none() && tested.answer.reason.is_some());
 
-    let targets = [target("ours", Word::from_u64(!0))];
+    let targets = [target("ours", Message::from_u64(!0))];
     let answer = claim(raw(64), &[], &targets).test().unwrap().answer;
     assert_eq!(
         (answer.verdict, answer.reason.as_deref()),
@@ -141,8 +141,8 @@ fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() 
 
     let mut unsure = vec![1.0; 64];
     unsure[..14].fill(f32::NAN);
-    let framings = [framing("as given", unsure.clone())];
-    let answer = claim(raw(64), &framings, &targets).test().unwrap().answer;
+    let readings = [reading("as given", unsure.clone())];
+    let answer = claim(raw(64), &readings, &targets).test().unwrap().answer;
     let reason = "at most 50 of 64 bits could be decided, and a match needs 51";
     assert_eq!(
         (answer.verdict, answer.reason.as_deref()),
@@ -150,8 +150,8 @@ fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() 
     );
     // One bit more decides, and undecided bits count as not matching.
     unsure[0] = 1.0;
-    let framings = [framing("as given", unsure)];
-    let tested = claim(raw(64), &framings, &targets).test().unwrap();
+    let readings = [reading("as given", unsure)];
+    let tested = claim(raw(64), &readings, &targets).test().unwrap();
     let best = tested.answer.best.unwrap();
     assert_eq!(
         (tested.answer.verdict, best.matched_bits, best.undecided_bits),
@@ -179,8 +179,8 @@ fn a_match_of_a_coded_scheme_says_what_was_embedded() {
             ..target("ours", mark.word)
         }];
         for wrong in [0, 1, code.corrects() as usize] {
-            let framings = [framing("as given", logits(&mark.word, wrong))];
-            let answer = claim(Scheme::Coded { code }, &framings, &targets)
+            let readings = [reading("as given", logits(&mark.word, wrong))];
+            let answer = claim(Scheme::Coded { code }, &readings, &targets)
                 .test()
                 .unwrap()
                 .answer;
@@ -194,10 +194,10 @@ fn a_match_of_a_coded_scheme_says_what_was_embedded() {
         }
         // Without the pad, and for another word, nothing is read.
         let bare = [target("ours", mark.word)];
-        let framings = [framing("as given", logits(&mark.word, 0))];
-        let answer = claim(Scheme::Coded { code }, &framings, &bare).test().unwrap().answer;
+        let readings = [reading("as given", logits(&mark.word, 0))];
+        let answer = claim(Scheme::Coded { code }, &readings, &bare).test().unwrap().answer;
         assert_eq!((answer.verdict, answer.payload), (Verdict::Match, None));
-        let other = [framing("as given", logits(&mark.pad, 0))];
+        let other = [reading("as given", logits(&mark.pad, 0))];
         let answer = claim(Scheme::Coded { code }, &other, &targets).test().unwrap().answer;
         assert_eq!((answer.verdict, answer.payload), (Verdict::NoMatch, None));
     }
@@ -217,19 +217,19 @@ fn error_correction_never_decides() {
         pad: Some(mark.pad),
         ..target("ours", mark.word)
     }];
-    let framings = [framing("as given", logits(&mark.word, 6))];
+    let readings = [reading("as given", logits(&mark.word, 6))];
     let strict = Claim {
         rate: 1e-18,
-        ..claim(Scheme::Coded { code: Code::Bch30 }, &framings, &targets)
+        ..claim(Scheme::Coded { code: Code::Bch30 }, &readings, &targets)
     };
     let answer = strict.test().unwrap().answer;
     assert_eq!((answer.verdict, answer.payload), (Verdict::NoMatch, None));
     // And a match whose payload is lost stays a match, whatever is made of the payload.
-    let framings = [framing(
+    let readings = [reading(
         "as given",
         logits(&mark.word, 13).iter().map(|l| l.signum()).collect(),
     )];
-    let answer = claim(Scheme::Coded { code: Code::Bch30 }, &framings, &targets)
+    let answer = claim(Scheme::Coded { code: Code::Bch30 }, &readings, &targets)
         .test()
         .unwrap()
         .answer;
@@ -250,11 +250,11 @@ fn p_values_are_calibrated_for_every_word_that_could_be_read() {
     let constant = vec![1.0; 10];
     let mixed: Vec<f32> = (0..10).map(|i| (i % 3) as f32 - 1.0).collect();
     for (logits, decided) in [(constant, true), (mixed, false)] {
-        let framings = [framing("as given", logits)];
+        let readings = [reading("as given", logits)];
         let p_value = |value: u32| {
             let bits: Vec<bool> = (0..10).map(|i| value >> i & 1 == 1).collect();
-            let targets = [target("wrong", Word::from_bits(&bits).unwrap())];
-            claim(raw(10), &framings, &targets)
+            let targets = [target("wrong", Message::from_bits(&bits).unwrap())];
+            claim(raw(10), &readings, &targets)
                 .test()
                 .unwrap()
                 .answer
@@ -272,18 +272,18 @@ fn p_values_are_calibrated_for_every_word_that_could_be_read() {
 
 #[test]
 fn what_does_not_fit_together_is_an_error() {
-    let framings = [framing("as given", vec![1.0; 64])];
-    let targets = [target("ours", Word::from_u64(0))];
-    let good = claim(raw(64), &framings, &targets);
+    let readings = [reading("as given", vec![1.0; 64])];
+    let targets = [target("ours", Message::from_u64(0))];
+    let good = claim(raw(64), &readings, &targets);
     let text = |claim: Claim<'_>| claim.test().unwrap_err().to_string();
     assert_eq!(
         text(Claim {
             scheme: raw(63),
             ..good
         }),
-        r#"framing "as given" has 64 bits, not 63"#
+        r#"reading "as given" has 64 bits, not 63"#
     );
-    let short = [target("ours", Word::from_bits(&[true]).unwrap())];
+    let short = [target("ours", Message::from_bits(&[true]).unwrap())];
     assert_eq!(
         text(Claim {
             targets: &short,
@@ -325,9 +325,9 @@ fn what_does_not_fit_together_is_an_error() {
 
 #[test]
 fn answers_come_back_from_json_without_confidences() {
-    let targets = [target("ours", Word::from_u64(0))];
-    let framings = [framing("as given", vec![-1.0; 64])];
-    let answer = claim(raw(64), &framings, &targets).test().unwrap().answer;
+    let targets = [target("ours", Message::from_u64(0))];
+    let readings = [reading("as given", vec![-1.0; 64])];
+    let answer = claim(raw(64), &readings, &targets).test().unwrap().answer;
     let json = serde_json::to_string(&answer).unwrap();
     assert_eq!(serde_json::from_str::<Answer>(&json).unwrap(), answer);
     assert!(
@@ -339,21 +339,21 @@ fn answers_come_back_from_json_without_confidences() {
 proptest! {
     #[test]
     fn no_input_panics_and_matches_are_at_or_below_the_rate(
-        framings in prop::collection::vec(prop::collection::vec(prop::num::f32::ANY, 0..70), 0..3),
+        readings in prop::collection::vec(prop::collection::vec(prop::num::f32::ANY, 0..70), 0..3),
         targets in prop::collection::vec((any::<u64>(), any::<Option<u64>>()), 0..4),
         tried: Option<u64>,
         other_tries: u64,
         rate in prop_oneof![prop::num::f64::ANY, 1e-3..0.9],
     ) {
         let full = |mut logits: Vec<f32>| { if logits.len() > 3 { logits.resize(64, 0.5) }; logits };
-        let framings: Vec<Framing> = framings.into_iter().map(|logits| framing("any", full(logits))).collect();
+        let readings: Vec<HypothesisReading> = readings.into_iter().map(|logits| reading("any", full(logits))).collect();
         let targets: Vec<Target> = targets
             .into_iter()
-            .map(|(word, pad)| Target { pad: pad.map(Word::from_u64), ..target("any", Word::from_u64(word)) })
+            .map(|(word, pad)| Target { pad: pad.map(Message::from_u64), ..target("any", Message::from_u64(word)) })
             .collect();
         let claim = Claim {
             scheme: Scheme::default(),
-            framings: &framings,
+            readings: &readings,
             targets: &targets,
             targets_tried: tried,
             other_tries: other_tries >> 40,

@@ -9,9 +9,9 @@ mod soft;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::message::{Message, MessageLength};
 use crate::payload::Payload;
 use crate::reading::Reading;
-use crate::word::{Word, WordLength};
 use bch::Bch;
 pub use scheme::{PAPER_LENGTHS, Scheme};
 
@@ -48,7 +48,7 @@ pub struct Decoded {
     /// Information bits, in the lowest [`Code::information_bits`].
     pub information: u64,
     /// The codeword.
-    pub codeword: Word,
+    pub codeword: Message,
     /// Decided bits that were read otherwise.
     pub corrected_bits: u32,
     /// Undecided bits that the code filled in.
@@ -73,7 +73,7 @@ impl Code {
     ///
     /// # Errors
     /// [`Error::TooLarge`] for more than [`Code::information_bits`].
-    pub fn encode(self, information: u64) -> Result<Word> {
+    pub fn encode(self, information: u64) -> Result<Message> {
         let limit = (1 << self.information_bits()) - 1;
         if information > limit {
             return Err(Error::TooLarge {
@@ -82,14 +82,14 @@ impl Code {
                 limit,
             });
         }
-        Ok(Word::from_u64(extend(self.bch().encode(information))))
+        Ok(Message::from_u64(extend(self.bch().encode(information))))
     }
 
     /// The codeword of a payload.
     ///
     /// # Errors
     /// Those of [`Payload::pack`].
-    pub fn codeword(self, payload: Payload) -> Result<Word> {
+    pub fn codeword(self, payload: Payload) -> Result<Message> {
         self.encode(payload.pack(self)?)
     }
 
@@ -97,7 +97,7 @@ impl Code {
     ///
     /// # Errors
     /// [`Error::OtherLength`] unless the word has 64 bits.
-    pub fn decode(self, word: &Word) -> Result<Option<Decoded>> {
+    pub fn decode(self, word: &Message) -> Result<Option<Decoded>> {
         let value = coded(word)?;
         let near = self
             .nearest(value)
@@ -118,7 +118,7 @@ impl Code {
     /// [`Error::OtherLength`] unless there are 64 logits.
     pub fn decode_logits(self, logits: &[f32]) -> Result<Option<Decoded>> {
         let reading = Reading::from_logits(logits)?;
-        let value = coded(&reading.word())?;
+        let value = coded(&reading.message())?;
         let decided = reading.limbs().1[0];
         Ok(soft::nearest(self, value, logits).map(|codeword| self.decoded(codeword, value, decided)))
     }
@@ -131,7 +131,7 @@ impl Code {
     fn decoded(self, codeword: u64, read: u64, decided: u64) -> Decoded {
         Decoded {
             information: self.bch().information(codeword >> 1),
-            codeword: Word::from_u64(codeword),
+            codeword: Message::from_u64(codeword),
             corrected_bits: ((codeword ^ read) & decided).count_ones(),
             filled_bits: (!decided).count_ones(),
         }
@@ -152,10 +152,10 @@ fn extend(codeword: u64) -> u64 {
 }
 
 /// The integer of a word of 64 bits.
-fn coded(word: &Word) -> Result<u64> {
+fn coded(word: &Message) -> Result<u64> {
     word.to_u64().ok_or_else(|| Error::OtherLength {
         what: "a coded word".into(),
         bits: word.length().bits(),
-        expected: WordLength::CODED.bits(),
+        expected: MessageLength::CODED.bits(),
     })
 }

@@ -2,7 +2,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Code;
-use crate::word::WordLength;
+use crate::message::MessageLength;
 
 /// The lengths that the paper reports, in bits.
 pub const PAPER_LENGTHS: [u32; 5] = [16, 32, 48, 64, 72];
@@ -15,7 +15,7 @@ pub enum Scheme {
     /// them at random and kept them secret.
     Raw {
         /// Bits of the word.
-        bits: WordLength,
+        bits: MessageLength,
     },
     /// 64 bits: a payload in a codeword, whitened by a secret pad.
     Coded {
@@ -32,10 +32,10 @@ impl Default for Scheme {
 
 impl Scheme {
     /// Bits of its words.
-    pub fn length(self) -> WordLength {
+    pub fn length(self) -> MessageLength {
         match self {
             Self::Raw { bits } => bits,
-            Self::Coded { .. } => WordLength::CODED,
+            Self::Coded { .. } => MessageLength::CODED,
         }
     }
 

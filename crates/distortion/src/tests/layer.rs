@@ -19,7 +19,7 @@ fn draws_are_uniform_seeded_and_independent_of_other_ranges() {
     assert_eq!(draws, draw(&layer, 1));
     assert_ne!(draws, draw(&layer, 2));
     // Clean and the eleven that act on pictures: 500 of each, with a deviation of 21.4.
-    let pictures = Kind::ALL.into_iter().filter(|k| !k.acts_on_scene());
+    let pictures = DistortionKind::ALL.into_iter().filter(|k| !k.acts_on_scene());
     for kind in pictures.map(Some).chain([None]) {
         let count = draws.iter().filter(|d| d.kind() == kind).count();
         assert!(count.abs_diff(500) < 100, "{kind:?} {count}");
@@ -36,7 +36,7 @@ fn draws_are_uniform_seeded_and_independent_of_other_ranges() {
     changed.ranges.mask = [0.0, 0.0];
     for (before, after) in draws.iter().zip(draw(&changed, 1)) {
         match before.kind() {
-            Some(Kind::Rotation | Kind::Mask) => assert_ne!(*before, after),
+            Some(DistortionKind::Rotation | DistortionKind::Mask) => assert_ne!(*before, after),
             _ => assert_eq!(*before, after),
         }
     }

@@ -1,7 +1,7 @@
 //! What CLIP sees of a training view: brighter or darker, zoomed and shifted, where that is asked for.
 //!
 //! Nothing unless it is. The shipped CLIP reads exact tones, and whoever reads a picture guesses them
-//! ([`crate::extract::guesses`]); half a percent of brightness alone, which moves the ground too, costs a scene of few
+//! ([`crate::extract::corrections`]); half a percent of brightness alone, which moves the ground too, costs a scene of few
 //! colours four points of accuracy (docs/evaluation.md).
 //! Only the message term sees augmented pictures; reconstruction compares the views themselves.
 use burn::tensor::{Tensor, TensorData};

@@ -3,7 +3,7 @@ use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
 use super::view_pool::PooledView;
 use crate::error::Result;
-use crate::extract::{Engine, Reading, default_size};
+use crate::extract::{Engine, PooledLogits, default_size};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
@@ -64,10 +64,10 @@ impl EarlyStopping {
             .zip(&pictures)
             .map(|(view, picture)| psnr(&view.reference, picture))
             .collect::<Result<Vec<Psnr>>>()?;
-        let reading = Reading::new(engine.read_logits(&pictures)?)?;
+        let reading = PooledLogits::new(engine.read_logits(&pictures)?)?;
         let check = Check {
             step,
-            bit_accuracy: reading.compare(message)?.bit_accuracy,
+            bit_accuracy: reading.compare(message, &engine.acceptance_rule(1))?.bit_accuracy,
             psnr_db: mean_psnr(&psnrs)?.psnr_db.unwrap_or(f64::INFINITY),
             margin: reading.margin(message),
         };

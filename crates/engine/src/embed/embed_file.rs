@@ -95,7 +95,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         verification = verify(engine, &scene.gaussians, &marked, job.message, settings, |done| {
             progress(Progress::Verifying { done, total })
         })?;
-        missed = settings.target.missed(&verification);
+        missed = settings.target.missed(&verification, &engine.claim_rule());
         match settings.target.weaken(&verification) {
             Some(factor) if weakened < WEAKENED => optimised.learned.scale(factor, &scene),
             _ => break,

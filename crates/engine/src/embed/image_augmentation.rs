@@ -26,7 +26,7 @@ pub(super) struct ImageAugmentation {
 }
 
 impl ImageAugmentation {
-    /// Tones that whoever reads a picture guesses and undoes ([`crate::extract::guesses`]) are left as they are.
+    /// Tones that whoever reads a picture corrections and undoes ([`crate::extract::corrections`]) are left as they are.
     pub fn new(settings: &Settings, engine: &Engine) -> Self {
         let mut layer = settings.layer();
         if engine.extractor.reads_exact_colours() {
@@ -80,7 +80,7 @@ impl ImageAugmentation {
 }
 
 /// Distorted pictures with the ground that they had, where it is black or white and has not moved: whoever reads a picture
-/// makes its ground white ([`crate::extract::Guess::Ground`]). Noise that is cut at white would shift all of it.
+/// makes its ground white ([`guardsplat_codeword::PhotometricCorrection::WhiteBackground`]). Noise that is cut at white would shift all of it.
 fn with_ground(before: &Tensor<4>, after: Tensor<4>, draws: &[Draw]) -> Tensor<4> {
     let [b, _, h, w] = before.dims();
     let stays = |draw: &Draw| f32::from(matches!(draw, Draw::Noise(_) | Draw::Jpeg(_) | Draw::EightBit));

@@ -1,5 +1,5 @@
 //! The presets: named choices of all settings of an embedding.
-use guardsplat_distortion::{JpegRange, Kind, Ranges, RobustTo};
+use guardsplat_distortion::{DistortionKind, JpegRange, Ranges, RobustTo};
 
 use super::adam::AdamOptions;
 use super::augment::Augmentation;
@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// What marks are trained to stand unless asked for something else: viewers and formats that keep fewer bands of
 /// spherical harmonics, or none, are what scenes meet first. Where nothing is dropped it costs up to 0.6
 /// points of accuracy and 0.5 dB (docs/evaluation.md).
-const EVERYDAY: [Kind; 1] = [Kind::ShTruncation];
+const EVERYDAY: [DistortionKind; 1] = [DistortionKind::ShTruncation];
 
 /// Qualities of JPEG that marks are trained against where that is asked for. At the paper's 10 the chroma of a picture of
 /// 800 pixels keeps steps of 0.04, four times what a mark at 40 dB changes: trained against that, marks stand nothing.
@@ -201,7 +201,10 @@ mod tests {
             let settings = preset.settings();
             settings.check().unwrap();
             assert_eq!(preset.name().parse::<Preset>().unwrap(), preset);
-            assert_eq!(settings.robust_to.contains(Kind::ShTruncation), preset != Preset::Paper);
+            assert_eq!(
+                settings.robust_to.contains(DistortionKind::ShTruncation),
+                preset != Preset::Paper
+            );
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The unmarked picture that the view is compared with shows the same: only the mark is to differ. What files of other
 //! formats round away is noise here, of the deviation that their steps have.
-use guardsplat_distortion::{Kind, RobustTo};
+use guardsplat_distortion::{DistortionKind, RobustTo};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -41,18 +41,18 @@ pub(super) enum SceneAugmentation {
 impl SceneAugmentation {
     /// One of nothing and what of `robust_to` happens to scenes, all equally likely; always the same for an index.
     pub fn draw(robust_to: RobustTo, degree: usize, seed: u64, index: u64) -> Self {
-        let kinds: Vec<Kind> = robust_to.of_scenes().collect();
+        let kinds: Vec<DistortionKind> = robust_to.of_scenes().collect();
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(2));
         rng.set_stream(index);
         let choice = rng.random_range(0..=kinds.len());
         let seed = rng.random();
         let noise = |[dc, rest]: [f32; 2]| Self::Noise { dc, rest, seed };
         match choice.checked_sub(1).and_then(|i| kinds.get(i)) {
-            Some(Kind::ShTruncation) => Self::TruncateSh(rng.random_range(0..=degree)),
-            Some(Kind::ShNoise) => noise([NOISE * rng.random::<f32>(); 2]),
-            Some(Kind::Spz) => noise(SPZ),
-            Some(Kind::Sog) => noise(SOG),
-            Some(Kind::Pruning) => Self::Prune { share: PRUNED, seed },
+            Some(DistortionKind::ShTruncation) => Self::TruncateSh(rng.random_range(0..=degree)),
+            Some(DistortionKind::ShNoise) => noise([NOISE * rng.random::<f32>(); 2]),
+            Some(DistortionKind::Spz) => noise(SPZ),
+            Some(DistortionKind::Sog) => noise(SOG),
+            Some(DistortionKind::Pruning) => Self::Prune { share: PRUNED, seed },
             _ => Self::None,
         }
     }

@@ -2,18 +2,15 @@
 //!
 //! A message of up to 32 bits is compared bit by bit by whoever gave it, so all of it must be read. Longer ones are the
 //! words of assets, or compared with a claim, and a claim wants many bits and not all of them: so many must match in the
-//! mean picture, and in the scene as a claim renders it, that no chance explains them in whatever framing they are read.
+//! mean picture, and in the scene as a claim renders it, that no chance explains them under whatever hypothesis they are read: the rule is that of claims.
 //! Whether the code of words reads its payload as well (up to 5 bits of 64 wrong) decides nothing: no claim rests on it.
-use guardsplat_codeword::chance;
+use guardsplat_codeword::AcceptanceRule;
 use serde::{Deserialize, Serialize};
 
 use super::verify::Verification;
 
 /// Messages up to here must be right to the last bit.
 const SHORT: usize = 32;
-/// What a claim is decided at, and the framings of a picture that it pays for ([`crate::extract::framings`]).
-const RATE: f64 = 1e-6;
-const FRAMINGS: u64 = 178;
 
 /// A mark that is this much too strong at most is made weaker, dB.
 const WEAKENED_DB: f64 = 1.0;
@@ -35,8 +32,8 @@ pub struct Target {
 
 impl Target {
     /// What is wanted of a message of so many bits.
-    fn accuracy(&self, bits: usize) -> f64 {
-        let enough = needed(bits) as f64 / bits.max(1) as f64;
+    fn accuracy(&self, bits: usize, rule: &AcceptanceRule) -> f64 {
+        let enough = needed(bits, rule) as f64 / bits.max(1) as f64;
         match bits {
             ..=SHORT => self.bit_accuracy,
             _ => self.bit_accuracy.min(enough),
@@ -52,11 +49,12 @@ impl Target {
         (short > 0.0 && short <= WEAKENED_DB).then(|| 10_f64.powf(-(short + SPARE_DB) / 20.0) as f32)
     }
 
-    /// What a verification misses, in words; nothing when all is reached.
-    pub fn missed(&self, found: &Verification) -> Vec<String> {
+    /// What a verification misses, in words; nothing when all is reached. A message of more than 32 bits must be read well
+    /// enough for a claim that is judged by `rule`.
+    pub fn missed(&self, found: &Verification, rule: &AcceptanceRule) -> Vec<String> {
         let mut missed = Vec::new();
         let bits = found.message.len();
-        let (accuracy, wanted) = (found.comparison.bit_accuracy, self.accuracy(bits));
+        let (accuracy, wanted) = (found.comparison.bit_accuracy, self.accuracy(bits, rule));
         if accuracy < wanted {
             missed.push(format!("bit accuracy {accuracy:.4} is below {wanted:.3}"));
         }
@@ -65,7 +63,7 @@ impl Target {
         {
             missed.push(format!("PSNR {psnr:.2} dB is below {} dB", self.psnr_db));
         }
-        let allowed = bits - needed(bits);
+        let allowed = bits - needed(bits, rule);
         let wrong = if bits <= SHORT {
             found.wrong_bits
         } else {
@@ -82,8 +80,8 @@ impl Target {
 }
 
 /// Bits of so many that must match: all of a short message, and of others what a claim needs.
-fn needed(bits: usize) -> usize {
-    let claimed = |bits: usize| chance::least_matches(bits as u32, RATE, FRAMINGS).ok().flatten();
+fn needed(bits: usize, rule: &AcceptanceRule) -> usize {
+    let claimed = |bits: usize| rule.least_matches(bits as u32).ok().flatten();
     match bits {
         ..=SHORT => bits,
         _ => claimed(bits).map_or(bits, |needed| needed as usize),
@@ -92,7 +90,17 @@ fn needed(bits: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use guardsplat_codeword::{
+        Claim, DEFAULT_FALSE_POSITIVE_RATE, HypothesisReading, Message, Scheme, Target as Claimed, Verdict,
+    };
+
     use super::*;
+
+    /// As many hypotheses as the shipped CLIP searches in a picture; `searched_hypotheses` is tested to be so many.
+    const RULE: AcceptanceRule = AcceptanceRule {
+        false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
+        hypotheses: 178,
+    };
 
     #[test]
     fn short_messages_must_be_right_and_long_ones_claimable() {
@@ -101,16 +109,61 @@ mod tests {
             psnr_db: 37.5,
             message: true,
         };
-        assert_eq!((target.accuracy(32), needed(32)), (0.95, 32));
-        assert_eq!((target.accuracy(8), needed(8)), (0.95, 8));
+        let wanted = |bits| (target.accuracy(bits, &RULE), needed(bits, &RULE));
+        assert_eq!(wanted(32), (0.95, 32));
+        assert_eq!(wanted(8), (0.95, 8));
         // 55 of 64 is what a claim about a picture needs (docs/verify.md).
-        assert_eq!((target.accuracy(64), needed(64)), (55.0 / 64.0, 55));
-        assert!(target.accuracy(128) < target.accuracy(64) && target.accuracy(128) > 0.7);
+        assert_eq!(wanted(64), (55.0 / 64.0, 55));
+        assert!(wanted(128).0 < wanted(64).0 && wanted(128).0 > 0.7);
         // A target that asks for less is not raised.
         let low = Target {
             bit_accuracy: 0.6,
             ..target
         };
-        assert_eq!(low.accuracy(64), 0.6);
+        assert_eq!(low.accuracy(64, &RULE), 0.6);
+        // A stricter rate asks for more.
+        let strict = AcceptanceRule {
+            false_positive_rate: 1e-12,
+            ..RULE
+        };
+        assert!(needed(64, &strict) > 55);
+    }
+
+    #[test]
+    fn a_mark_that_just_meets_its_target_is_a_match_as_a_claim_and_one_bit_fewer_is_not() {
+        for rule in [1e-6, 1e-9, 1e-3].map(|false_positive_rate| AcceptanceRule {
+            false_positive_rate,
+            ..RULE
+        }) {
+            let least = needed(64, &rule);
+            for (right, verdict) in [(least, Verdict::Match), (least - 1, Verdict::NoMatch)] {
+                let logits = (0..64).map(|bit| if bit < right { 1.0 } else { -1.0 }).collect();
+                let best = HypothesisReading {
+                    name: "as given".into(),
+                    views: 1,
+                    logits,
+                };
+                // Other hypotheses read nothing, and are paid for.
+                let none = HypothesisReading {
+                    logits: vec![0.0; 64],
+                    ..best.clone()
+                };
+                let mut readings = vec![none; rule.hypotheses as usize];
+                readings[0] = best;
+                let claim = Claim {
+                    scheme: Scheme::default(),
+                    readings: &readings,
+                    targets: &[Claimed {
+                        id: "asset".into(),
+                        word: Message::from_u64(u64::MAX),
+                        pad: None,
+                    }],
+                    targets_tried: None,
+                    other_tries: 1,
+                    rate: rule.false_positive_rate,
+                };
+                assert_eq!(claim.test().unwrap().answer.verdict, verdict);
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views over the sphere.
 use super::settings::Settings;
-use crate::error::Result;
-use crate::extract::{Comparison, Engine, Reading, default_size};
+use crate::error::{Error, Result};
+use crate::extract::{Comparison, Engine, PooledLogits, default_size};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Quality, measure};
@@ -17,7 +17,7 @@ pub struct Verification {
     /// How the views compare with the message.
     pub comparison: Comparison,
     /// What was read of all views.
-    pub reading: Reading,
+    pub reading: PooledLogits,
     /// What was read from the first few views.
     pub message: Message,
     /// Whether that is the whole message.
@@ -63,16 +63,19 @@ pub fn verify(
     }
     let quality = measure(&pairs, engine.lpips()?, &engine.compute.device, &engine.stop)?;
     pairs.truncate(KEPT_PAIRS);
-    let reading = Reading::new(logits)?;
-    let read = reading.of_first(settings.verify.message_views)?.message()?;
-    let wrong_bits_of_all = message.len() - reading.message()?.matches(message);
+    let reading = PooledLogits::new(logits)?;
+    // Rendered as it is, a scene is one hypothesis.
+    let comparison = reading.compare(message, &engine.acceptance_rule(1))?;
+    let wrong = |read: &PooledLogits| Ok::<_, Error>(message.len() - read.reading().matches(message)? as usize);
+    let read = reading.of_first(settings.verify.message_views)?;
+    let (wrong_bits, wrong_bits_of_all) = (wrong(&read)?, wrong(&reading)?);
     Ok(Verification {
-        comparison: reading.compare(message)?,
+        comparison,
         reading,
-        message_recovered: read == *message,
-        wrong_bits: message.len() - read.matches(message),
+        message_recovered: wrong_bits == 0,
+        wrong_bits,
         wrong_bits_of_all,
-        message: read,
+        message: read.message(),
         quality,
         views: settings.verify.views,
         size,

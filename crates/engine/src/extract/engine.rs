@@ -3,9 +3,11 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use burn::tensor::Tensor;
+use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE};
 use rayon::prelude::*;
 
 use super::extractor::{ClipExtractor, Extractor};
+use super::hypothesis::searched_hypotheses;
 use crate::clip::{Clip, resize};
 use crate::device::Compute;
 use crate::error::{Error, Result};
@@ -62,6 +64,8 @@ pub struct Engine {
     lpips_weights: Option<PathBuf>,
     /// The perceptual distance, from its first use on.
     lpips: OnceLock<Lpips>,
+    /// How often a match may be claimed wrongly: of what is read, and by the claims that a mark is to bear.
+    pub false_positive_rate: f64,
     /// What a job may take of the machine's memory.
     pub limits: Limits,
     /// Ends whatever is being computed, with [`Error::Stopped`](crate::Error::Stopped).
@@ -85,6 +89,7 @@ impl Engine {
             rasterizer: OnceLock::new(),
             bits: extractor.bits(),
             extractor,
+            false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
             limits: Limits {
                 buffer: compute.max_buffer,
                 ..Limits::of_machine(None)
@@ -94,6 +99,20 @@ impl Engine {
             lpips: OnceLock::new(),
             stop: Stop::default(),
         }
+    }
+
+    /// The rule by which a reading is judged that is the best of so many.
+    pub fn acceptance_rule(&self, hypotheses: usize) -> AcceptanceRule {
+        AcceptanceRule {
+            false_positive_rate: self.false_positive_rate,
+            hypotheses: hypotheses as u64,
+        }
+    }
+
+    /// The rule by which a claim is judged that names one asset and shows one picture: it pays for every hypothesis that
+    /// this engine searches.
+    pub fn claim_rule(&self) -> AcceptanceRule {
+        self.acceptance_rule(searched_hypotheses(self.extractor.as_ref()).len())
     }
 
     /// The renderer.

@@ -1,24 +1,23 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
 mod engine;
 mod extractor;
-mod framed;
-mod framing;
-mod kind;
+mod hypothesis;
+mod photometric;
+mod picture_logits;
 mod pictures;
-mod reading;
-mod restore;
+mod pooled;
+mod suspect_kind;
 mod window;
 
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
-pub use framed::{Framed, framings};
-pub use framing::{Framing, without_borders};
-pub use kind::Kind;
+pub use hypothesis::{searched_hypotheses, without_borders};
+pub use photometric::{corrections, read_corrections};
+pub use picture_logits::{PictureLogits, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
-pub use reading::{Comparison, Reading};
-pub use restore::{Guess, Tone, guesses, read_guesses};
-pub use window::Window;
+pub use pooled::{Comparison, PooledLogits};
+pub use suspect_kind::SuspectKind;
 
 use crate::error::Result;
 use crate::picture::Picture;
@@ -38,8 +37,8 @@ pub fn default_size(engine: &Engine) -> u32 {
 ///
 /// # Errors
 /// No pictures, or a failing device.
-pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<Reading> {
-    Reading::new(engine.read_logits(pictures)?)
+pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<PooledLogits> {
+    PooledLogits::new(engine.read_logits(pictures)?)
 }
 
 /// Renders `views` held-out 8-bit views of a scene, `size` by `size` pixels, and reads them. `done` hears of every
@@ -55,7 +54,7 @@ pub fn read_scene(
     background: [f32; 3],
     seed: u64,
     mut done: impl FnMut(usize, &Picture) -> Result<()>,
-) -> Result<Reading> {
+) -> Result<PooledLogits> {
     let sampler = ViewSampler::new(gaussians, seed)?;
     let mut logits = Vec::with_capacity(views);
     for index in 0..views {
@@ -64,5 +63,5 @@ pub fn read_scene(
         logits.extend(engine.read_logits(std::slice::from_ref(&picture))?);
         done(index + 1, &picture)?;
     }
-    Reading::new(logits)
+    PooledLogits::new(logits)
 }

@@ -1,7 +1,7 @@
 //! What there is to read on disk: scenes, picture files and folders of them.
 use std::path::{Path, PathBuf};
 
-use super::kind::Kind;
+use super::suspect_kind::SuspectKind;
 use crate::error::{Error, Result};
 use crate::quality::PictureFormat;
 use crate::scene::is_loose_sog;
@@ -30,9 +30,9 @@ pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
             add_folder(path, &mut source.pictures)?;
             continue;
         }
-        match Kind::of(path)? {
-            Kind::Scene => source.scenes.push(path.clone()),
-            Kind::Picture => source.pictures.push(path.clone()),
+        match SuspectKind::of(path)? {
+            SuspectKind::Scene => source.scenes.push(path.clone()),
+            SuspectKind::Picture => source.pictures.push(path.clone()),
         }
         check_count(source.scenes.len() + source.pictures.len())?;
     }

@@ -2,14 +2,12 @@
 //!
 //! A CLIP that averages over a picture reads a mark from any part of the scene, and whatever else the picture shows only
 //! adds to it. So the part need not fit the scene: it is to lie inside of it.
-use std::fmt;
+use guardsplat_codeword::{WINDOW_STEPS as STEPS, Window};
 
 use super::Engine;
 use crate::error::Result;
 use crate::picture::Picture;
 
-/// Steps in which places are told.
-const STEPS: u32 = 12;
 /// Sides of windows, and what lies from one to the next: halves by quarters, thirds by sixths.
 const TRIED: [(u32, u32); 2] = [(6, 3), (4, 2)];
 /// Pixels of a window's shorter side, at least; less is nothing to read.
@@ -17,64 +15,43 @@ const LEAST_SIDE: u32 = 16;
 /// Windows that are read together.
 const BATCH: usize = 8;
 
-/// A part of a picture, of the same aspect; in twelfths of its sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// From the left edge.
-    pub left: u32,
-    /// From the top edge.
-    pub top: u32,
-    /// Of both sides.
-    pub side: u32,
+/// All windows that are read: 9 halves and 25 thirds.
+pub(super) fn windows() -> impl Iterator<Item = Window> {
+    TRIED.into_iter().flat_map(|(side, step)| {
+        let places = move || (0..=STEPS - side).step_by(step as usize);
+        places().flat_map(move |top| places().map(move |left| Window { left, top, side }))
+    })
 }
 
-impl fmt::Display for Window {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |twelfths: u32| (100 * twelfths + STEPS / 2) / STEPS;
-        let [left, top, side] = [self.left, self.top, self.side].map(percent);
-        write!(f, "{side} % of its sides from {left} % right and {top} % down")
+/// Logits of a picture in each of these windows, in their order; `None` where the picture is too small for them.
+///
+/// # Errors
+/// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
+pub(super) fn read_windows(engine: &Engine, picture: &Picture) -> Result<Option<Vec<Vec<f32>>>> {
+    let least = TRIED.iter().map(|(side, _)| *side).min().unwrap_or(STEPS);
+    if picture.width.min(picture.height) * least / STEPS < LEAST_SIDE {
+        return Ok(None);
     }
+    let windows: Vec<Window> = windows().collect();
+    let mut logits = Vec::with_capacity(windows.len());
+    for chunk in windows.chunks(BATCH) {
+        // Made small one by one: a large picture need not fit in memory eight times.
+        let parts = chunk.iter().map(|window| engine.resized(&crop(*window, picture)));
+        logits.extend(engine.read_logits(&parts.collect::<Result<Vec<_>>>()?)?);
+    }
+    Ok(Some(logits))
 }
 
-impl Window {
-    /// All that are tried: 9 halves and 25 thirds.
-    pub fn tried() -> impl Iterator<Item = Self> {
-        TRIED.into_iter().flat_map(|(side, step)| {
-            let places = move || (0..=STEPS - side).step_by(step as usize);
-            places().flat_map(move |top| places().map(move |left| Self { left, top, side }))
-        })
-    }
-
-    /// Logits of a picture in each of these windows, in their order; `None` where the picture is too small for them.
-    ///
-    /// # Errors
-    /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
-    pub fn read(engine: &Engine, picture: &Picture) -> Result<Option<Vec<Vec<f32>>>> {
-        let least = TRIED.iter().map(|(side, _)| *side).min().unwrap_or(STEPS);
-        if picture.width.min(picture.height) * least / STEPS < LEAST_SIDE {
-            return Ok(None);
-        }
-        let windows: Vec<Self> = Self::tried().collect();
-        let mut logits = Vec::with_capacity(windows.len());
-        for chunk in windows.chunks(BATCH) {
-            // Made small one by one: a large picture need not fit in memory eight times.
-            let parts = chunk.iter().map(|window| engine.resized(&window.of(picture)));
-            logits.extend(engine.read_logits(&parts.collect::<Result<Vec<_>>>()?)?);
-        }
-        Ok(Some(logits))
-    }
-
-    /// This part of a picture.
-    fn of(self, picture: &Picture) -> Picture {
-        let place = |side: u32, twelfths: u32| (u64::from(side) * u64::from(twelfths) / u64::from(STEPS)) as usize;
-        let [left, right] = [self.left, self.left + self.side].map(|at| place(picture.width, at));
-        let [top, bottom] = [self.top, self.top + self.side].map(|at| place(picture.height, at));
-        let row = |y: usize| &picture.pixels[3 * (y * picture.width as usize + left)..][..3 * (right - left)];
-        Picture {
-            width: (right - left) as u32,
-            height: (bottom - top) as u32,
-            pixels: (top..bottom).flat_map(row).copied().collect(),
-        }
+/// A part of a picture.
+fn crop(window: Window, picture: &Picture) -> Picture {
+    let place = |side: u32, twelfths: u32| (u64::from(side) * u64::from(twelfths) / u64::from(STEPS)) as usize;
+    let [left, right] = [window.left, window.left + window.side].map(|at| place(picture.width, at));
+    let [top, bottom] = [window.top, window.top + window.side].map(|at| place(picture.height, at));
+    let row = |y: usize| &picture.pixels[3 * (y * picture.width as usize + left)..][..3 * (right - left)];
+    Picture {
+        width: (right - left) as u32,
+        height: (bottom - top) as u32,
+        pixels: (top..bottom).flat_map(row).copied().collect(),
     }
 }
 
@@ -84,7 +61,7 @@ mod tests {
 
     #[test]
     fn windows_lie_inside_and_every_scene_of_half_a_page_holds_one() {
-        let all: Vec<Window> = Window::tried().collect();
+        let all: Vec<Window> = windows().collect();
         assert_eq!(all.len(), 34);
         assert!(all.iter().all(|w| w.left + w.side <= STEPS && w.top + w.side <= STEPS));
         // Along one side, in hundredths: wherever half of it is the scene, a window lies within.
@@ -108,7 +85,7 @@ mod tests {
             top: 6,
             side: 6,
         };
-        let part = window.of(&picture);
+        let part = crop(window, &picture);
         // From a quarter to three quarters of 25, and the lower half of 14.
         assert_eq!((part.width, part.height), (12, 7));
         assert_eq!(part.pixels[..3], [6.0, 7.0, 0.0]);

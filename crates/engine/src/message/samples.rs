@@ -5,10 +5,10 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 use rand_chacha::ChaCha20Rng;
 
-use super::bits::Message;
 use super::decoder::{Decoder, unit};
 use super::projection::Projection;
 use crate::error::{Error, Result};
+use guardsplat_codeword::Message;
 
 /// Noise vectors drawn once; each sample of each step takes one of them at random.
 const NOISE_POOL: usize = 4096;
@@ -41,9 +41,8 @@ pub(super) fn distinct_messages(
     if wanted.saturating_mul(2) >= all {
         // Drawing until every message came up would take long: shuffle them all instead. Here `all` is small.
         for value in 0..all {
-            messages.push(Message::from_bits(
-                (0..bits).rev().map(|b| value >> b & 1 == 1).collect(),
-            )?);
+            let value_bits: Vec<bool> = (0..bits).rev().map(|b| value >> b & 1 == 1).collect();
+            messages.push(Message::from_bits(&value_bits)?);
         }
         shuffle(&mut messages, rng);
         messages.truncate(wanted);
@@ -51,7 +50,7 @@ pub(super) fn distinct_messages(
         let mut known = HashSet::new();
         while messages.len() < wanted {
             let message = Message::random(bits, rng)?;
-            if known.insert(message.clone()) {
+            if known.insert(message) {
                 messages.push(message);
             }
         }

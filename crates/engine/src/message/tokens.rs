@@ -4,8 +4,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha20Rng;
 use sha2::Sha256;
 
-use super::bits::{Message, check_bits};
 use crate::error::{Error, Result};
+use guardsplat_codeword::{Message, MessageLength};
 
 /// Length of a CLIP token sequence.
 pub const CONTEXT: usize = 77;
@@ -50,9 +50,9 @@ impl TokenTable {
     /// table of the same secret and bits a token begins with the shorter one.
     ///
     /// # Errors
-    /// `bits` outside 1 to [`MAX_BITS`](super::bits::MAX_BITS), or more than [`POSITIONS`] tokens hold.
+    /// `bits` outside 1 to [`MAX_BITS`](guardsplat_codeword::MAX_BITS), or more than [`POSITIONS`] tokens hold.
     pub fn new(secret: &[u8; 32], bits: usize, bits_per_token: usize) -> Result<Self> {
-        check_bits(bits)?;
+        MessageLength::new(bits)?;
         check_bits_per_token(bits, bits_per_token)?;
         let count = bits.div_ceil(bits_per_token) << bits_per_token;
         let mut rng = ChaCha20Rng::from_seed(hmac_sha256(secret, &[b"guardsplat token table v1"]));
@@ -90,7 +90,8 @@ impl TokenTable {
         let mut sequence = [0; CONTEXT];
         sequence[0] = START;
         let values = self.tokens.chunks_exact(1 << self.bits_per_token);
-        let positions = values.zip(message.bits().chunks(self.bits_per_token));
+        let bits: Vec<bool> = message.bits().collect();
+        let positions = values.zip(bits.chunks(self.bits_per_token));
         for (slot, (values, bits)) in sequence[1..].iter_mut().zip(positions) {
             // Most significant first.
             let value = bits.iter().fold(0, |value, bit| 2 * value + usize::from(*bit));
@@ -166,7 +167,7 @@ mod tests {
         assert!(sequence[6..].iter().all(|&t| t == 0));
         assert!(table.sequence(&Message::parse("05", 8).unwrap()).is_err());
         let full = TokenTable::new(&[3; 32], 75, 1).unwrap();
-        let message = Message::from_bits(vec![true; 75]).unwrap();
+        let message = Message::from_bits(&[true; 75]).unwrap();
         assert_eq!(full.sequence(&message).unwrap()[76], END);
     }
 

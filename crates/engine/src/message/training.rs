@@ -5,7 +5,6 @@ use burn::tensor::Device;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha20Rng;
 
-use super::bits::Message;
 use super::decoder::{Decoder, DecoderWeights, bce_from_logits};
 use super::linear;
 use super::projection::Projection;
@@ -13,6 +12,7 @@ use super::samples::{Samples, distinct_messages, noise_pool, shuffle};
 use super::tokens::{CONTEXT, TokenTable};
 use crate::error::{Error, Result};
 use crate::stop::Stop;
+use guardsplat_codeword::Message;
 
 /// Sequences given to the text tower at once.
 const ENCODE_BATCH: usize = 64;

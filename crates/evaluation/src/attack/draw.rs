@@ -2,7 +2,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::kind::Kind;
+use super::kind::AttackKind;
 
 /// What random numbers are for. Each use has a stream, so that a range and the number drawn from it place alike.
 #[derive(Clone, Copy)]
@@ -21,7 +21,7 @@ pub(super) enum RandomStream {
 pub(super) struct RandomSource {
     pub seed: u64,
     pub index: u64,
-    pub kind: Kind,
+    pub kind: AttackKind,
     pub occurrence: u16,
 }
 

@@ -1,8 +1,8 @@
 //! Every attack with its name, unit and limits.
 
-/// What an attack does. The docs give the meaning of its strength; [`Kind::limits`] what it may be.
+/// What an attack does. The docs give the meaning of its strength; [`AttackKind::limits`] what it may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum AttackKind {
     /// Written as baseline JPEG of this quality (of libjpeg's scale and tables) and read again. Chroma has half the
     /// resolution (4:2:0) at every quality, as libjpeg and OpenCV write it.
     Jpeg,
@@ -90,7 +90,7 @@ const fn limits(least: f64, most: f64, grid: Grid, identity: Option<f64>) -> Opt
     })
 }
 
-impl Kind {
+impl AttackKind {
     /// Every kind, in the order of the docs.
     pub const ALL: [Self; 26] = [
         Self::Jpeg,

@@ -1,7 +1,7 @@
 //! Real attacks on 8-bit pictures: codecs, resampling, noise; never the stand-ins that training uses.
 //!
 //! An attack is written as text, `jpeg:10`, and may draw its strength anew for every picture, `rotate:-30..30`. Several
-//! in a row are joined by `+`: `crop:0.6+brightness:1.3+jpeg:50`. [`Kind`] lists them with units and limits.
+//! in a row are joined by `+`: `crop:0.6+brightness:1.3+jpeg:50`. [`AttackKind`] lists them with units and limits.
 //!
 //! Whatever is random follows from a seed and the index of the picture, so that every picture gets its own and gets it
 //! again. Pictures are taken as they are stored, without linearising their colours, as nearly all software does. AVIF and
@@ -38,7 +38,7 @@ pub mod testing;
 mod tests;
 
 pub use chain::{Attack, MAX_STEPS};
-pub use kind::Kind;
+pub use kind::AttackKind;
 pub use size::{MAX_PIXELS, MAX_SIDE};
 pub use step::Step;
 pub use strength::Strength;

@@ -6,7 +6,7 @@ use image::{Rgb, RgbImage};
 use rand::RngExt;
 
 use super::draw::{RandomSource, RandomStream};
-use super::kind::{Grid, Kind, Limits};
+use super::kind::{AttackKind, Grid, Limits};
 use super::strength::{Strength, start_of};
 use super::{codec, colour, cover, filter, frame, noise, resample, rotate};
 use crate::{Error, Result};
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// One step of an attack: what is done, and how strongly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    kind: Kind,
+    kind: AttackKind,
     strength: Option<Strength>,
 }
 
@@ -23,7 +23,7 @@ impl Step {
     ///
     /// # Errors
     /// [`Error::BadOption`] with the limits.
-    pub fn new(kind: Kind, strength: Option<Strength>) -> Result<Self> {
+    pub fn new(kind: AttackKind, strength: Option<Strength>) -> Result<Self> {
         let bad = |reason| Error::BadOption {
             field: kind.name(),
             reason,
@@ -42,7 +42,7 @@ impl Step {
     }
 
     /// What is done.
-    pub fn kind(self) -> Kind {
+    pub fn kind(self) -> AttackKind {
         self.kind
     }
 
@@ -70,33 +70,33 @@ impl Step {
         }
         let random = &mut source.random(RandomStream::Pixels);
         Ok(match self.kind {
-            Kind::Jpeg => codec::jpeg(&picture, value as u8)?,
-            Kind::Webp => codec::webp(&picture, value as f32)?,
-            Kind::Noise => noise::add(picture, value as f32, random),
-            Kind::Blur => filter::blur(&picture, value as u32),
-            Kind::Median => filter::median(&picture, value as u32),
-            Kind::Sharpen => filter::sharpen(&picture, value as f32),
-            Kind::Scale => resample::scale(&picture, value)?,
-            Kind::Rescale => resample::rescale(&picture, value)?,
-            Kind::Fit => resample::fit(picture, value as u32)?,
-            Kind::Rotate => rotate::rotate(&picture, value),
-            Kind::QuarterTurns => rotate::quarter_turns(picture, value as u8),
-            Kind::Flip => image::imageops::flip_horizontal(&picture),
-            Kind::Crop => frame::crop(&picture, value),
-            Kind::CropRandom => frame::crop_random(&picture, value, random),
-            Kind::Window => frame::window(&picture, value as u32),
-            Kind::Border => frame::border(&picture, value)?,
-            Kind::Page => frame::page(&picture, value, random)?,
-            Kind::Brightness => colour::brightness(picture, value),
-            Kind::Contrast => colour::contrast(picture, value),
-            Kind::Gamma => colour::gamma(picture, value),
-            Kind::Hue => colour::hue(picture, value),
-            Kind::Saturation => colour::saturation(picture, value),
-            Kind::Grey => colour::saturation(picture, 0.0),
-            Kind::Bits => colour::bits(picture, value as u32),
-            Kind::Mask => cover::cover(picture, value, 4, 2.0, Rgb([128; 3]), random),
+            AttackKind::Jpeg => codec::jpeg(&picture, value as u8)?,
+            AttackKind::Webp => codec::webp(&picture, value as f32)?,
+            AttackKind::Noise => noise::add(picture, value as f32, random),
+            AttackKind::Blur => filter::blur(&picture, value as u32),
+            AttackKind::Median => filter::median(&picture, value as u32),
+            AttackKind::Sharpen => filter::sharpen(&picture, value as f32),
+            AttackKind::Scale => resample::scale(&picture, value)?,
+            AttackKind::Rescale => resample::rescale(&picture, value)?,
+            AttackKind::Fit => resample::fit(picture, value as u32)?,
+            AttackKind::Rotate => rotate::rotate(&picture, value),
+            AttackKind::QuarterTurns => rotate::quarter_turns(picture, value as u8),
+            AttackKind::Flip => image::imageops::flip_horizontal(&picture),
+            AttackKind::Crop => frame::crop(&picture, value),
+            AttackKind::CropRandom => frame::crop_random(&picture, value, random),
+            AttackKind::Window => frame::window(&picture, value as u32),
+            AttackKind::Border => frame::border(&picture, value)?,
+            AttackKind::Page => frame::page(&picture, value, random)?,
+            AttackKind::Brightness => colour::brightness(picture, value),
+            AttackKind::Contrast => colour::contrast(picture, value),
+            AttackKind::Gamma => colour::gamma(picture, value),
+            AttackKind::Hue => colour::hue(picture, value),
+            AttackKind::Saturation => colour::saturation(picture, value),
+            AttackKind::Grey => colour::saturation(picture, 0.0),
+            AttackKind::Bits => colour::bits(picture, value as u32),
+            AttackKind::Mask => cover::cover(picture, value, 4, 2.0, Rgb([128; 3]), random),
             // Ratio of sides as torchvision's RandomErasing.
-            Kind::Erase => cover::cover(picture, value, 1, 3.3, Rgb([0; 3]), random),
+            AttackKind::Erase => cover::cover(picture, value, 1, 3.3, Rgb([0; 3]), random),
         })
     }
 }
@@ -156,13 +156,13 @@ impl FromStr for Step {
             Some((name, strength)) => (name, Some(strength)),
             None => (text, None),
         };
-        let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.name() == name) else {
+        let Some(kind) = AttackKind::ALL.into_iter().find(|kind| kind.name() == name) else {
             return Err(Error::BadOption {
                 field: "attack",
                 reason: format!(
                     "{:?} is none of none, {}",
                     start_of(name),
-                    Kind::ALL.map(Kind::name).join(", ")
+                    AttackKind::ALL.map(AttackKind::name).join(", ")
                 ),
             });
         };
@@ -172,7 +172,7 @@ impl FromStr for Step {
 }
 
 /// An error of a strength, told of the attack that it is for, with its limits.
-fn named(kind: Kind, error: Error) -> Error {
+fn named(kind: AttackKind, error: Error) -> Error {
     match error {
         Error::BadOption { reason, .. } => Error::BadOption {
             field: kind.name(),

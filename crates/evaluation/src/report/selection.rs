@@ -1,5 +1,5 @@
 //! What one table is made of: records of one engine version with one CLIP, and of each variant the newest settings.
-use super::record::{Claims, Detection, Id, Mark, Reading};
+use super::record::{Claims, Detection, Id, Mark, ReadingRecord};
 use super::store::Records;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,7 +45,7 @@ pub struct Run<'a> {
     /// The mark.
     pub mark: &'a Mark,
     /// What was read of it.
-    pub reading: &'a Reading,
+    pub reading: &'a ReadingRecord,
 }
 
 /// Records that may be told together, in an order that does not depend on when they were made.
@@ -54,7 +54,7 @@ pub struct Selection<'a> {
     records: &'a Records,
     pair: Pair,
     marks: Vec<(&'a Id, &'a Mark)>,
-    readings: BTreeMap<(&'a Id, &'a str), &'a Reading>,
+    readings: BTreeMap<(&'a Id, &'a str), &'a ReadingRecord>,
     notes: Vec<String>,
 }
 
@@ -94,13 +94,13 @@ impl<'a> Selection<'a> {
             notes.push(format!("seconds are of several devices: {devices}"));
         }
         let sizes: BTreeMap<&Id, u32> = marks.iter().map(|(id, mark)| (*id, mark.embedding.size)).collect();
-        let mut readings: BTreeMap<(&Id, &str), &Reading> = BTreeMap::new();
+        let mut readings: BTreeMap<(&Id, &str), &ReadingRecord> = BTreeMap::new();
         let mut repeated = 0;
         for reading in records.readings() {
             let Some(size) = sizes.get(&reading.mark) else {
                 continue;
             };
-            let worth = |reading: &Reading| (reading.views, reading.size == *size);
+            let worth = |reading: &ReadingRecord| (reading.views, reading.size == *size);
             let place = (&reading.mark, reading.attack.as_str());
             let known = readings.get(&place).copied();
             repeated += usize::from(known.is_some());

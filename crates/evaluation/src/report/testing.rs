@@ -1,5 +1,5 @@
 //! Records for the tests of reports.
-use super::record::{Claims, Detection, Embedding, Mark, Reading, Record, Timing};
+use super::record::{Claims, Detection, Embedding, Mark, ReadingRecord, Record, Timing};
 use super::store::Records;
 
 /// A change of a record, and the field that it is of.
@@ -41,9 +41,9 @@ pub fn mark(scene: &str, bits: u32, variant: &str, seed: u64) -> Mark {
 }
 
 /// What was read of a mark, bits right by view; the whole message is right from 1 view if it is in the first.
-pub fn reading(mark: &Mark, attack: &str, bits_right: &[u16]) -> Reading {
+pub fn reading(mark: &Mark, attack: &str, bits_right: &[u16]) -> ReadingRecord {
     let bits = mark.embedding.bits;
-    Reading {
+    ReadingRecord {
         mark: mark.id(),
         attack: attack.into(),
         size: mark.embedding.size,

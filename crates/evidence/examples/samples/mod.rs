@@ -1,7 +1,7 @@
 //! Made-up reports, plausible and always the same, for examples and tests.
 use guardsplat_evidence::{
-    Audience, Bit, Decision, Embedding, Evidence, Found, Framing, FramingKind, Input, Key, Kind, Model, Picture,
-    Reason, Role, SCHEMA, Sha256, SigningKey, Target, Tried, VERSION, Verdict, Verification, View,
+    Audience, Bit, Decision, Embedding, Evidence, EvidenceKind, Found, HypothesisGroup, HypothesisKind, Input, Key,
+    Model, Picture, Reason, Role, SCHEMA, Sha256, SigningKey, Target, Tried, VERSION, Verdict, Verification, View,
 };
 
 /// The service's key; of examples, so everybody's.
@@ -29,14 +29,14 @@ pub fn all() -> Vec<(&'static str, Evidence)> {
 
 /// A match found by a search over ten assets in several framings.
 pub fn matching() -> Evidence {
-    let framing = |kind, variants, pooled| Framing { kind, variants, pooled };
+    let framing = |kind, variants, pooled| HypothesisGroup { kind, variants, pooled };
     let tried = Tried {
         framings: vec![
-            framing(FramingKind::AsGiven, 1, false),
-            framing(FramingKind::Crop, 5, true),
-            framing(FramingKind::QuarterTurn, 3, false),
-            framing(FramingKind::Mirrored, 1, false),
-            framing(FramingKind::Scaling, 2, true),
+            framing(HypothesisKind::AsGiven, 1, false),
+            framing(HypothesisKind::Crop, 5, true),
+            framing(HypothesisKind::QuarterTurn, 3, false),
+            framing(HypothesisKind::Mirrored, 1, false),
+            framing(HypothesisKind::Scaling, 2, true),
         ],
         owners: 2,
         assets: 10,
@@ -86,7 +86,7 @@ pub fn embed(reached: bool) -> Evidence {
     let mut verification = decided(64, Tried::once());
     verification.found = None;
     Evidence {
-        kind: Kind::Embed,
+        kind: EvidenceKind::Embed,
         inputs: vec![
             input(Role::Original, "garden statue.ply"),
             input(Role::Marked, "marked.ply"),
@@ -114,7 +114,7 @@ pub fn verify(verification: Verification) -> Evidence {
         schema: SCHEMA.into(),
         version: VERSION,
         audience: Audience::Owner,
-        kind: Kind::Verify,
+        kind: EvidenceKind::Verify,
         job: "jobs/0192f3c4-7a51-7d3e-9b1f-5a4c2e8d6f10".into(),
         started: "2026-03-14T09:26:53Z".parse().expect("a time"),
         finished: "2026-03-14T09:27:31.5Z".parse().expect("a time"),

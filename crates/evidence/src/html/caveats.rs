@@ -1,6 +1,6 @@
 //! What a report does not prove, said before somebody else says it.
-use crate::evidence::{Evidence, Kind};
-use crate::verification::Verdict;
+use crate::evidence::{Evidence, EvidenceKind};
+use guardsplat_codeword::Verdict;
 use maud::{Markup, html};
 
 /// What does not follow from this report.
@@ -25,7 +25,7 @@ pub(super) fn section(evidence: &Evidence) -> Markup {
                     li { "This does not say that the suspect is unmarked. A mark may be too weak or too much changed to be read, or be
                         of another key or message." }
                 }
-                @if evidence.kind == Kind::Embed {
+                @if evidence.kind == EvidenceKind::Embed {
                     li { "The figures are those of this file, seen from these views. What somebody does to the scene later is not in
                         them." }
                 }

@@ -1,7 +1,8 @@
 //! How sure the verdict is: the p-value for a lawyer, for a statistician, and its numbers.
 use super::text::number;
-use crate::verification::{Decision, Verdict, Verification};
+use crate::verification::{Decision, Verification};
 use crate::words::{chance, counted, grouped};
+use guardsplat_codeword::Verdict;
 use maud::{Markup, html};
 
 /// What the number means and where it comes from.

@@ -1,5 +1,5 @@
 //! What was tried, and how it is paid for.
-use crate::tried::{Framing, FramingKind};
+use crate::tried::{HypothesisGroup, HypothesisKind};
 use crate::verification::{Decision, Verification};
 use crate::words::{counted, grouped};
 use maud::{Markup, html};
@@ -26,14 +26,14 @@ pub(super) fn section(decision: &Decision, verification: &Verification) -> Marku
     }
 }
 
-fn row(framing: &Framing) -> Markup {
+fn row(framing: &HypothesisGroup) -> Markup {
     let name = match framing.kind {
-        FramingKind::AsGiven => "As given",
-        FramingKind::Crop => "Parts, or without borders",
-        FramingKind::QuarterTurn => "Quarter turns",
-        FramingKind::Mirrored => "Mirrored",
-        FramingKind::Scaling => "Other scales",
-        FramingKind::Tone => "Changed tones undone",
+        HypothesisKind::AsGiven => "As given",
+        HypothesisKind::Crop => "Parts, or without borders",
+        HypothesisKind::QuarterTurn => "Quarter turns",
+        HypothesisKind::Mirrored => "Mirrored",
+        HypothesisKind::Scaling => "Other scales",
+        HypothesisKind::Tone => "Changed tones undone",
     };
     html! {
         tr {

@@ -1,8 +1,9 @@
 //! The verdict: what everybody reads, and some read only.
 use super::text::{sent, visible};
-use crate::evidence::{Audience, Evidence, Kind};
-use crate::verification::{Reason, Verdict, Verification};
+use crate::evidence::{Audience, Evidence, EvidenceKind};
+use crate::verification::{Reason, Verification};
 use crate::words::{chance, counted};
+use guardsplat_codeword::Verdict;
 use maud::{Markup, html};
 
 /// The verdict in a few words, for the title of the window.
@@ -13,7 +14,7 @@ pub(super) fn title(evidence: &Evidence) -> String {
 /// The verdict in a word, what that means, and the class of its colours and sign.
 fn headline(evidence: &Evidence) -> (&'static str, &'static str, &'static str) {
     let verdict = evidence.verification.as_ref().map(|v| v.verdict);
-    if evidence.kind == Kind::Embed {
+    if evidence.kind == EvidenceKind::Embed {
         let missed = evidence.embedding.as_ref().is_some_and(|e| !e.missed.is_empty());
         return match verdict {
             _ if missed => (
@@ -41,8 +42,8 @@ fn headline(evidence: &Evidence) -> (&'static str, &'static str, &'static str) {
 pub(super) fn section(evidence: &Evidence) -> Markup {
     let (word, meaning, class) = headline(evidence);
     let kind = match evidence.kind {
-        Kind::Embed => "Evidence of a marking",
-        Kind::Verify => "Evidence of a verification",
+        EvidenceKind::Embed => "Evidence of a marking",
+        EvidenceKind::Verify => "Evidence of a verification",
     };
     let audience = match evidence.audience {
         Audience::Owner => "the owner\u{2019}s report, not for others",

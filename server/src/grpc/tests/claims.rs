@@ -1,8 +1,8 @@
 //! Marking assets and claims about them, from submission to evidence; workers are played by the tests.
 use std::time::Duration;
 
-use guardsplat_codeword::Word;
-use guardsplat_evidence::{Checked, Picture, Verdict as WorkerReadings, VerifyingKey, check};
+use guardsplat_codeword::Message;
+use guardsplat_evidence::{Checked, Picture, Verdict as Told, VerifyingKey, check};
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::complete_job_request::Result as Output;
 use guardsplat_proto::v1::job::{Result as JobResult, Spec, State};
@@ -74,7 +74,7 @@ fn embed(key: &str, scene: &str, asset: &str) -> EmbedSpec {
 }
 
 fn logits(word: &str, wrong: usize) -> Vec<f32> {
-    let word = Word::from_u64(u64::from_str_radix(word, 16).unwrap());
+    let word = Message::from_u64(u64::from_str_radix(word, 16).unwrap());
     let sign = |(i, bit): (usize, bool)| {
         if bit != (i % 10 == 3 && i / 10 < wrong) {
             4.0
@@ -258,7 +258,7 @@ async fn an_asset_is_marked_with_a_word_that_only_its_worker_is_told() {
     let decision = read.decision.unwrap();
     assert_eq!(
         (read.verdict, decision.matched, decision.hypotheses),
-        (WorkerReadings::Match, 64, 1)
+        (Told::Match, 64, 1)
     );
     let hashes: Vec<_> = evidence.inputs.iter().map(|input| input.sha256.to_string()).collect();
     assert_eq!(hashes, [sha256(b"other"), sha256(b"marked")]);
@@ -379,7 +379,7 @@ async fn claims_that_nothing_can_decide_say_why() {
     assert!(result.reason.contains("no asset is registered"), "{}", result.reason);
     assert_eq!(
         checked.evidence.unwrap().verification.unwrap().verdict,
-        WorkerReadings::UnknownKey
+        Told::UnknownKey
     );
     // A key whose assets can't be marked.
     bench.key = bench.server.key(32, b"short key").await;

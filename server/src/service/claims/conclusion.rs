@@ -1,5 +1,5 @@
 //! The end of a job with a claim: what a worker read becomes a verdict, and evidence of it.
-use guardsplat_codeword::{Answer, Framing, ReadPayload, Verdict};
+use guardsplat_codeword::{Answer, HypothesisReading, ReadPayload, Verdict};
 use guardsplat_evidence::{Evidence, View};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
@@ -29,7 +29,7 @@ pub(crate) struct WorkerReadings {
 /// What of that was checked.
 struct Checked<'a> {
     told: &'a WorkerReadings,
-    framings: Vec<Framing>,
+    readings: Vec<HypothesisReading>,
     views: Vec<View>,
 }
 
@@ -46,7 +46,7 @@ impl Service {
         let key = self.key_of(job).await?;
         let told = Checked {
             told,
-            framings: framing::checked(&told.readings, key.bits)?,
+            readings: framing::checked(&told.readings, key.bits)?,
             views: evidence::checked_views(&told.views)?,
         };
         let report = match job.kind {
@@ -92,13 +92,13 @@ impl Service {
         told: Checked<'_>,
         completion: &mut Completion,
     ) -> Result<Evidence> {
-        let Checked { told, framings, views } = told;
-        if framings.is_empty() {
+        let Checked { told, readings, views } = told;
+        if readings.is_empty() {
             let reason = "is missing: the server decides a claim on what was read";
             return Err(Error::invalid("readings", reason));
         }
-        let decided = self.decide(claim, key, &framings).await?;
-        let result = answered(decode(&completion.result)?, &decided, framings.len());
+        let decided = self.decide(claim, key, &readings).await?;
+        let result = answered(decode(&completion.result)?, &decided, readings.len());
         let facts = Facts {
             job,
             key,
@@ -124,13 +124,13 @@ impl Service {
         told: Checked<'_>,
         completion: &mut Completion,
     ) -> Result<Evidence> {
-        let Checked { told, framings, views } = told;
+        let Checked { told, readings, views } = told;
         let mut result: EmbedResult = decode(&completion.result)?;
         // The word that was embedded is as secret as its pad.
         result.message.clear();
-        let decided = match framings.is_empty() {
+        let decided = match readings.is_empty() {
             true => None,
-            false => Some(self.decide(claim, key, &framings).await?),
+            false => Some(self.decide(claim, key, &readings).await?),
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,
@@ -189,7 +189,7 @@ fn answered(read: VerifyResult, decided: &Decided, framings: usize) -> VerifyRes
         hypotheses: Some(*hypotheses),
         framings: framings as u32,
         assets: decided.tried.assets,
-        framing: best.as_ref().map(|best| best.framing.clone()).unwrap_or_default(),
+        framing: best.as_ref().map(|best| best.hypothesis.clone()).unwrap_or_default(),
         asset: matched.map(|best| Kind::Asset.name(best.asset.id)).unwrap_or_default(),
         owner: matched.map(|best| Kind::Owner.name(best.owner.id)).unwrap_or_default(),
         payload_number: payload.map(|(payload, _)| payload.number.into()),

@@ -1,9 +1,11 @@
-//! Decides a claim on what was read: the words of all assets that it could be about against all framings, with every pair
+//! Decides a claim on what was read: the words of all assets that it could be about against all readings, with every pair
 //! counted as a hypothesis.
 use std::collections::HashSet;
 
 use futures::TryStreamExt;
-use guardsplat_codeword::{Answer, Framing, Index, Reading, Scheme, Target, Tested, Verdict, WordLength, chance};
+use guardsplat_codeword::{
+    Answer, HypothesisReading, Index, MessageLength, Reading, Scheme, Target, Tested, Verdict, chance,
+};
 
 use super::Claim;
 use crate::error::{Error, Result};
@@ -18,7 +20,7 @@ pub struct Decided {
     pub tested: Tested,
     /// What was compared.
     pub tried: Tried,
-    /// The logits of the best framing; empty where nothing was compared.
+    /// The logits of the best reading; empty where nothing was compared.
     pub logits: Vec<f32>,
     /// The asset that agreed best, with its owner.
     pub best: Option<Best>,
@@ -52,14 +54,14 @@ struct Words {
 }
 
 impl Service {
-    /// Decides a claim on `framings`, which are of the key's length.
-    pub(crate) async fn decide(&self, claim: &Claim, key: &KeyRow, framings: &[Framing]) -> Result<Decided> {
+    /// Decides a claim on `read`, whose logits are of the key's length.
+    pub(crate) async fn decide(&self, claim: &Claim, key: &KeyRow, read: &[HypothesisReading]) -> Result<Decided> {
         let words = match key.bits == marks::bits() {
             true => self.words(claim, key).await?,
             false => return Ok(unmarkable(key, self.limits().false_positive_rate)),
         };
         let failed = |error| Error::internal("deciding a claim", error);
-        let readings = framings.iter().map(|framing| Reading::from_logits(&framing.logits));
+        let readings = read.iter().map(|read| Reading::from_logits(&read.logits));
         let readings = readings.collect::<Result<Vec<_>, _>>().map_err(failed)?;
         // Whatever else agrees as well would be judged alike.
         let nearest = words.index.nearest(&readings, 1).map_err(failed)?;
@@ -71,7 +73,7 @@ impl Service {
         let targets: Vec<_> = best.iter().map(|best| best.target.clone()).collect();
         let claim = guardsplat_codeword::Claim {
             scheme: Scheme::Coded { code: CODE },
-            framings,
+            readings: read,
             targets: &targets,
             targets_tried: Some(words.tried.assets),
             other_tries: 1,
@@ -82,10 +84,10 @@ impl Service {
             let reason = "no asset is registered that the claim could be about, for this key".to_owned();
             tested.answer.reason = Some(reason);
         }
-        let name = tested.answer.best.as_ref().map(|best| best.framing.as_str());
-        let read = framings.iter().find(|framing| Some(framing.name.as_str()) == name);
+        let name = tested.answer.best.as_ref().map(|best| best.hypothesis.as_str());
+        let read = read.iter().find(|read| Some(read.name.as_str()) == name);
         Ok(Decided {
-            logits: read.map(|framing| framing.logits.clone()).unwrap_or_default(),
+            logits: read.map(|read| read.logits.clone()).unwrap_or_default(),
             tested,
             tried: words.tried,
             best,
@@ -94,7 +96,7 @@ impl Service {
 
     async fn words(&self, claim: &Claim, key: &KeyRow) -> Result<Words> {
         let mut words = Words {
-            index: Index::new(WordLength::CODED),
+            index: Index::new(MessageLength::CODED),
             assets: Vec::new(),
             tried: Tried::default(),
         };

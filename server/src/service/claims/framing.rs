@@ -1,7 +1,9 @@
-//! Framings as workers tell of them: checked, and named for people.
+//! What workers read under each hypothesis: checked, and named for people.
 use std::collections::HashSet;
 
-use guardsplat_codeword::Framing;
+use guardsplat_codeword::{
+    Hypothesis, HypothesisReading, PhotometricCorrection, Tone, WINDOW_STEPS as TWELFTHS, Window,
+};
 use guardsplat_evidence as evidence;
 use guardsplat_proto::v1::FramedReading;
 use guardsplat_proto::v1::undone::Kind;
@@ -9,13 +11,11 @@ use guardsplat_proto::v1::undone::Kind;
 use crate::error::Result;
 use crate::service::violations::Violations;
 
-/// Most framings. Workers try some seventy tones, with borders and without, and some thirty parts.
+/// Most readings. Workers try some seventy tones, with borders and without, and some thirty parts.
 const MOST: usize = 1024;
-/// What parts of pictures are told in.
-const TWELFTHS: u32 = 12;
 
-/// What was read in each framing, checked against the bits of the key.
-pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
+/// What was read under each hypothesis, checked against the bits of the key.
+pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisReading>> {
     let mut problems = Violations::default();
     if readings.len() > MOST {
         let reason = format!("has {} entries, at most {MOST} are taken", readings.len());
@@ -51,51 +51,40 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
         }
     }
     problems.finish()?;
-    let framing = |reading: &FramedReading| Framing {
-        name: name(reading),
+    let read = |reading: &FramedReading| HypothesisReading {
+        name: hypothesis(reading).to_string(),
         views: reading.views,
         logits: reading.logits.clone(),
     };
-    Ok(readings.iter().map(framing).collect())
+    Ok(readings.iter().map(read).collect())
 }
 
-/// What was done to the pictures, in words.
-fn name(reading: &FramedReading) -> String {
-    let mut done = Vec::new();
-    if let Some(undone) = &reading.undone {
-        let factor = undone.factor;
-        done.push(match undone.kind() {
-            Kind::Unspecified => "undone".to_owned(),
-            Kind::Ground => "ground made white".to_owned(),
-            Kind::Brightness => format!("brightness x {factor:.2} undone"),
-            Kind::Gamma => format!("gamma {factor:.2} undone"),
-            Kind::Contrast => format!("contrast x {factor:.2} undone"),
-            Kind::Saturation => format!("saturation x {factor:.2} undone"),
-        });
-    }
-    if reading.quarter_turns > 0 {
-        done.push(format!("turned by {} degrees", 90 * reading.quarter_turns));
-    }
-    if reading.mirrored {
-        done.push("mirrored".to_owned());
-    }
-    if reading.trimmed {
-        done.push("without borders".to_owned());
-    }
-    if let Some(part) = &reading.part {
-        let percent = |twelfths: u32| (100 * twelfths + TWELFTHS / 2) / TWELFTHS;
-        let [side, left, top] = [part.side_twelfths, part.left_twelfths, part.top_twelfths].map(percent);
-        done.push(format!("{side} % of its sides from {left} % right and {top} % down"));
-    }
-    match done.is_empty() {
-        true => "as given".into(),
-        false => done.join(", "),
+/// What is undone, as a worker tells it.
+fn hypothesis(reading: &FramedReading) -> Hypothesis {
+    let correction = reading.undone.map(|undone| (undone.kind(), undone.factor));
+    Hypothesis {
+        quarter_turns: reading.quarter_turns as u8, // below 4, or refused
+        mirrored: reading.mirrored,
+        trimmed: reading.trimmed,
+        correction: match correction {
+            None | Some((Kind::Unspecified, _)) => PhotometricCorrection::None, // refused
+            Some((Kind::Ground, _)) => PhotometricCorrection::WhiteBackground,
+            Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),
+            Some((Kind::Gamma, exponent)) => PhotometricCorrection::Tone(Tone::Gamma(exponent)),
+            Some((Kind::Contrast, factor)) => PhotometricCorrection::Tone(Tone::Contrast(factor)),
+            Some((Kind::Saturation, factor)) => PhotometricCorrection::Tone(Tone::Saturation(factor)),
+        },
+        window: reading.part.map(|part| Window {
+            left: part.left_twelfths,
+            top: part.top_twelfths,
+            side: part.side_twelfths,
+        }),
     }
 }
 
-/// The same by kinds, for the report: as much as was done counts under what changes most.
-pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
-    use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
+/// Hypotheses by kinds, for the report: as much as was done counts under what changes most.
+pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::HypothesisGroup> {
+    use evidence::HypothesisKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
         _ if reading.undone.is_some() => Tone,
         _ if reading.part.is_some() => Crop,
@@ -105,12 +94,12 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
         _ => QuarterTurn,
     };
     let count = |wanted| readings.iter().filter(|reading| kind(reading) == wanted).count() as u32;
-    let each = [AsGiven, Tone, QuarterTurn, Mirrored, Crop].map(|kind| evidence::Framing {
+    let each = [AsGiven, Tone, QuarterTurn, Mirrored, Crop].map(|kind| evidence::HypothesisGroup {
         kind,
         variants: count(kind),
         pooled: false,
     });
-    each.into_iter().filter(|framing| framing.variants > 0).collect()
+    each.into_iter().filter(|group| group.variants > 0).collect()
 }
 
 #[cfg(test)]

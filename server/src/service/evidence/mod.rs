@@ -4,7 +4,7 @@ mod reading;
 mod views;
 
 use guardsplat_evidence::{
-    Audience, Embedding, Evidence, Key, Kind as Of, Model, SCHEMA, Sha256, Target, Timestamp, VERSION, View,
+    Audience, Embedding, Evidence, EvidenceKind as Of, Key, Model, SCHEMA, Sha256, Target, Timestamp, VERSION, View,
 };
 use guardsplat_proto::v1::EmbedResult;
 

@@ -1,7 +1,7 @@
 //! A decided claim as the report tells it.
-use guardsplat_codeword::{Answer, ReadPayload, Verdict as Decision};
+use guardsplat_codeword::{Answer, ReadPayload, Verdict};
 use guardsplat_evidence as evidence;
-use guardsplat_evidence::{Bit, Found, Framing, Reason, Tried, Verdict, Verification};
+use guardsplat_evidence::{Bit, Found, HypothesisGroup, Reason, Tried, Verification};
 
 use super::{Decided, payload};
 use crate::error::Result;
@@ -12,8 +12,8 @@ use crate::service::names::Kind;
 pub struct Read<'a> {
     /// The outcome.
     pub decided: &'a Decided,
-    /// The framings that were tried.
-    pub framings: Vec<Framing>,
+    /// The hypotheses that were tried, by kinds.
+    pub framings: Vec<HypothesisGroup>,
     /// Whether the claim named the asset, whose owner may see its word even where it does not match.
     pub named: bool,
 }
@@ -22,14 +22,8 @@ impl Read<'_> {
     /// What the report says of it.
     pub fn verification(&self, key: &KeyRow) -> Result<Verification> {
         let answer = &self.decided.tested.answer;
-        let verdict = match answer.verdict {
-            Decision::Match => Verdict::Match,
-            Decision::NoMatch => Verdict::NoMatch,
-            Decision::Inconclusive => Verdict::Inconclusive,
-            Decision::UnknownKey => Verdict::UnknownKey,
-        };
         Ok(Verification {
-            verdict,
+            verdict: answer.verdict,
             reason: self.reason(),
             note: self.note(),
             tried: Tried {
@@ -49,7 +43,7 @@ impl Read<'_> {
 
     fn reason(&self) -> Option<Reason> {
         let answer = &self.decided.tested.answer;
-        let inconclusive = answer.verdict == Decision::Inconclusive;
+        let inconclusive = answer.verdict == Verdict::Inconclusive;
         inconclusive.then(|| match answer.needed_bits {
             Some(_) => Reason::WeakReading,
             None if self.decided.too_few_bits() => Reason::TooFewBits,
@@ -60,14 +54,14 @@ impl Read<'_> {
     fn note(&self) -> Option<String> {
         let answer = &self.decided.tested.answer;
         let framing = answer.best.as_ref().map(|best| match best.undecided_bits {
-            0 => format!("best in this framing: {}", best.framing),
-            bits => format!("best in this framing: {}; {bits} bits were undecided", best.framing),
+            0 => format!("best in this framing: {}", best.hypothesis),
+            bits => format!("best in this framing: {}; {bits} bits were undecided", best.hypothesis),
         });
         answer.reason.clone().or(framing)
     }
 
     fn found(&self, key: &KeyRow) -> Result<Option<Found>> {
-        let matches = self.decided.tested.answer.verdict == Decision::Match;
+        let matches = self.decided.tested.answer.verdict == Verdict::Match;
         let Some(best) = self.decided.best.as_ref().filter(|_| matches) else {
             return Ok(None);
         };
@@ -88,7 +82,7 @@ impl Read<'_> {
             return Vec::new();
         };
         // A search that found nothing is nobody's business but the searcher's, who owns none of these assets.
-        let known = self.named || tested.answer.verdict == Decision::Match;
+        let known = self.named || tested.answer.verdict == Verdict::Match;
         let target = self.decided.best.as_ref().filter(|_| known);
         let mut wanted = target.into_iter().flat_map(|best| best.target.word.bits());
         let read = confidences.word.bits();

@@ -1,7 +1,7 @@
 //! What the API says is what the engine does.
+use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE, Message};
 use guardsplat_engine::embed::{LossTerms, Progress, Step};
-use guardsplat_engine::extract::Reading;
-use guardsplat_engine::message::Message;
+use guardsplat_engine::extract::PooledLogits;
 
 use super::*;
 
@@ -114,9 +114,13 @@ fn progress_leaves_out_what_is_no_number() {
 
 #[test]
 fn findings_keep_their_figures() {
-    let reading = Reading::new(vec![vec![2.0; 32], vec![-1.0; 32]]).unwrap();
+    let reading = PooledLogits::new(vec![vec![2.0; 32], vec![-1.0; 32]]).unwrap();
     let message = Message::parse("ffffffff", 32).unwrap();
-    let comparison = reading.compare(&message).unwrap();
+    let rule = AcceptanceRule {
+        false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
+        hypotheses: 1,
+    };
+    let comparison = reading.compare(&message, &rule).unwrap();
     let found = verify_result(VerificationReport::new(&reading, Some(&comparison), &[]).unwrap());
     assert_eq!(found.verdict(), ApiVerdict::Match);
     assert_eq!((found.matched_bits, found.bits, found.views), (Some(32), 32, 2));

@@ -7,11 +7,11 @@ use super::{ClipIdentity, Decoding, Key, KeyOptions, Secret, natural_images};
 use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
-use crate::message::bits::check_bits;
 use crate::message::tokens::hmac_sha256;
 use crate::message::{CONTEXT, FitOptions, Message, Projection, TokenTable, fit, train, training};
 use crate::picture::Picture;
 use crate::stop::Stop;
+use guardsplat_codeword::MessageLength;
 
 /// Random messages whose text features the projection is fitted to.
 const FITTED_MESSAGES: usize = 512;
@@ -45,7 +45,7 @@ pub fn create_key(
     stop: &Stop,
     mut progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
-    check_bits(options.bits)?;
+    MessageLength::new(options.bits)?;
     let bits_per_token = options.bits_per_token();
     let secret = Secret::draw(options.seed)?;
     let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;

@@ -6,9 +6,9 @@ use sha2::{Digest, Sha256};
 use super::{ClipIdentity, Decoding, Key, Secret};
 use crate::device::Compute;
 use crate::error::Result;
-use crate::message::bits::check_bits;
 use crate::message::tokens::fewest_bits_per_token;
 use crate::stop::Stop;
+use guardsplat_codeword::MessageLength;
 
 /// What keys name in place of a CLIP.
 pub const HIDDEN: &str = "hidden";
@@ -69,7 +69,7 @@ pub fn create_hidden_key(
     stop: &Stop,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Key> {
-    check_bits(options.bits)?;
+    MessageLength::new(options.bits)?;
     let secret = Secret::draw(options.seed)?;
     // Weights and pictures follow from the secret: who has not the key has not the decoder.
     let seed = secret.derived_seed(b"guardsplat hidden decoder seed v1");

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use super::{ClipIdentity, Decoding, Key, Secret};
 use crate::clip::check_header;
 use crate::error::{Error, Result};
-use crate::message::bits::MAX_BITS;
 use crate::message::decoder::{DecoderWeights, HIDDEN, LayerWeights};
 use crate::message::projection::Projection;
 use crate::message::tokens::check_bits_per_token;
+use guardsplat_codeword::{MAX_BITS, MessageLength};
 
 /// The format's version; another one is refused.
 const VERSION: u32 = 1;
@@ -198,7 +198,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
         ));
     }
     let header: Header = serde_json::from_str(json).map_err(bad_header)?;
-    if !(1..=MAX_BITS).contains(&header.bits) {
+    if MessageLength::new(header.bits).is_err() {
         return Err(format!("{} bits are outside 1 to {MAX_BITS}", header.bits));
     }
     check_bits_per_token(header.bits, header.bits_per_token).map_err(|e| e.to_string())?;

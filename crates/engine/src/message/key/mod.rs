@@ -17,11 +17,11 @@ pub use create_hidden::{HIDDEN, HiddenKeyOptions, create_hidden_key};
 pub use file::MAX_BYTES as MAX_KEY_BYTES;
 
 use crate::error::{Error, Result};
-use crate::message::bits::Message;
 use crate::message::decoder::DecoderWeights;
 use crate::message::projection::Projection;
 use crate::message::tokens::{TokenTable, fewest_bits_per_token, hmac_sha256};
 use crate::message::training::TrainingOptions;
+use guardsplat_codeword::Message;
 
 /// Which CLIP a key belongs to; for keys that read pictures without one, how their decoder is made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,7 +35,7 @@ pub struct ClipIdentity {
 /// What a key is made from, besides a CLIP.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyOptions {
-    /// Bits of its messages, 1 to [`MAX_BITS`](crate::message::MAX_BITS).
+    /// Bits of its messages, 1 to [`MAX_BITS`](guardsplat_codeword::MAX_BITS).
     pub bits: usize,
     /// Bits that one CLIP token stands for; `None` takes the fewest that make room.
     pub bits_per_token: Option<usize>,
@@ -171,7 +171,7 @@ impl Key {
 
     /// Parses a message of the key's length from hexadecimal.
     pub fn message(&self, text: &str) -> Result<Message> {
-        Message::parse(text, self.bits())
+        Ok(Message::parse(text, self.bits())?)
     }
 
     /// Fails unless the key belongs to the CLIP with these weights; `path` is the key's file, for the message.

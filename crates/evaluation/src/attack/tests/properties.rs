@@ -5,16 +5,16 @@ use proptest::prelude::*;
 use super::text::step;
 use super::{attack, done, varied};
 use crate::attack::kind::Grid;
-use crate::attack::{Attack, Kind, Step, Strength};
+use crate::attack::{Attack, AttackKind, Step, Strength};
 
-fn with(kind: Kind, value: Option<f64>) -> Attack {
+fn with(kind: AttackKind, value: Option<f64>) -> Attack {
     let strength = value.map(|value| Strength::new(value, value).unwrap());
     Attack::new(vec![Step::new(kind, strength).unwrap()]).unwrap()
 }
 
 /// Each kind with its least and greatest strength and some between.
 fn all() -> impl Iterator<Item = Attack> {
-    Kind::ALL.into_iter().flat_map(|kind| {
+    AttackKind::ALL.into_iter().flat_map(|kind| {
         let values = match kind.spec() {
             None => vec![None],
             Some(limits) => {
@@ -52,7 +52,7 @@ fn identity_strengths_change_nothing() {
     let picture = varied(30, 20);
     assert_eq!(done("none", &picture), picture);
     let mut known = 0;
-    for kind in Kind::ALL {
+    for kind in AttackKind::ALL {
         if let Some(identity) = kind.spec().and_then(|limits| limits.identity) {
             assert_eq!(
                 with(kind, Some(identity)).apply(&picture, 1, 2).unwrap(),
@@ -62,7 +62,7 @@ fn identity_strengths_change_nothing() {
             known += 1;
         }
     }
-    assert_eq!(known, Kind::ALL.len() - 4);
+    assert_eq!(known, AttackKind::ALL.len() - 4);
 }
 
 #[test]

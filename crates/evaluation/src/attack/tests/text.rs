@@ -2,7 +2,7 @@
 use proptest::prelude::*;
 
 use super::attack;
-use crate::attack::{Attack, Kind, MAX_STEPS, Step, Strength};
+use crate::attack::{Attack, AttackKind, MAX_STEPS, Step, Strength};
 
 fn refused(text: &str) -> String {
     text.parse::<Attack>().unwrap_err().to_string()
@@ -89,7 +89,7 @@ fn json_holds_the_text() {
 
 #[test]
 fn names_are_distinct_and_short_enough_for_keys() {
-    let mut names = Kind::ALL.map(Kind::name);
+    let mut names = AttackKind::ALL.map(AttackKind::name);
     assert!(
         names
             .iter()
@@ -101,8 +101,8 @@ fn names_are_distinct_and_short_enough_for_keys() {
 
 /// Any step, its strength a number or a range within the limits.
 pub(super) fn step() -> impl Strategy<Value = Step> {
-    (0..Kind::ALL.len(), 0.0..=1.0f64, 0.0..=1.0f64, any::<bool>()).prop_map(|(kind, one, other, range)| {
-        let kind = Kind::ALL[kind];
+    (0..AttackKind::ALL.len(), 0.0..=1.0f64, 0.0..=1.0f64, any::<bool>()).prop_map(|(kind, one, other, range)| {
+        let kind = AttackKind::ALL[kind];
         let strength = kind.limits().map(|(least, most)| {
             let at = |share: f64| {
                 let value = least + share * (most - least);

@@ -1,5 +1,5 @@
 //! Which cases each report asks for, whether they were measured or not.
-use super::{Kind, Options};
+use super::{Experiment, Options};
 use crate::report::names::{
     ALL_ATTRIBUTES, DC, FIXED_WEIGHTS, FORMAT, LAMBDA_MSG, LAMBDA_RECON, MESSAGE_ONLY, NONE, OCCLUSION, PAPER_ATTACKS,
     PRUNE_LOWEST, PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, ROBUST, ROBUST_TO_ALL, SH_DEGREE,
@@ -29,7 +29,7 @@ const HELD: &str = "The paper's third row has a loss of the offsets' size beside
 const PRUNED: &str = "The paper's PSNR is that of pruned marked views against unmarked ones; the column here compares \
     attacked with unattacked marked views.";
 
-pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options) -> Vec<Section> {
+pub(super) fn sections(kind: Experiment, selection: &Selection<'_>, options: &Options) -> Vec<Section> {
     let section = |label, quality, cases| Section {
         title: kind.title().into(),
         label,
@@ -43,19 +43,19 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
         bits.filter(|bits| wanted(*bits)).collect()
     };
     match kind {
-        Kind::Capacity => {
+        Experiment::Capacity => {
             let longest = paper::BITS.into_iter().max().unwrap_or(0);
             let mut bits = measured(&|bits| bits <= longest);
             bits.extend(paper::BITS);
             vec![section("bits", true, by_bits(bits, Some(Source::Capacity)))]
         }
-        Kind::Longer => {
+        Experiment::Longer => {
             let longest = paper::BITS.into_iter().max().unwrap_or(0);
             let mut bits = measured(&|bits| bits > longest);
             bits.insert(LONGER_BITS);
             vec![section("bits", true, by_bits(bits, None))]
         }
-        Kind::Robustness => {
+        Experiment::Robustness => {
             let mut attacks: Vec<&str> = PAPER_ATTACKS.to_vec();
             attacks.extend(others(selection, ROBUSTNESS_BITS, &attacks));
             let cases = by_attack(ROBUSTNESS_BITS, attacks, Some(Source::Robustness));
@@ -96,7 +96,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             }
             sections
         }
-        Kind::Trained => {
+        Experiment::Trained => {
             let variants = [
                 ("all attributes", ALL_ATTRIBUTES),
                 ("DC only", DC),
@@ -106,7 +106,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             let cases = by_variant(ABLATION_BITS, variants, Some(Source::Trained));
             vec![section("learned", true, cases)]
         }
-        Kind::Losses => {
+        Experiment::Losses => {
             let variants = [
                 ("message", MESSAGE_ONLY),
                 ("message and likeness, weights fixed", FIXED_WEIGHTS),
@@ -120,7 +120,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             losses.notes.push(HELD);
             vec![losses]
         }
-        Kind::Pruning => {
+        Experiment::Pruning => {
             let mut attacks = vec![NONE, PRUNE_LOWEST, PRUNE_RANDOM];
             for prefix in [PRUNE_LOWEST_PREFIX, PRUNE_RANDOM_PREFIX] {
                 attacks.extend(family(selection, ABLATION_BITS, prefix, &attacks));
@@ -133,7 +133,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             pruning.notes.push(PRUNED);
             vec![pruning]
         }
-        Kind::Perturbations => {
+        Experiment::Perturbations => {
             let mut attacks = vec![NONE];
             for prefix in [SH_NOISE, OCCLUSION] {
                 let known = family(selection, options.bits, prefix, &[]);
@@ -143,14 +143,14 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             }
             vec![section("perturbed", false, by_attack(options.bits, attacks, None))]
         }
-        Kind::Formats => {
+        Experiment::Formats => {
             let names = formats();
             let expected: Vec<&str> = names.iter().map(String::as_str).collect();
             let more = [FORMAT, SH_DEGREE].map(|prefix| family(selection, options.bits, prefix, &expected));
             let attacks = expected.iter().copied().chain(more.into_iter().flatten()).collect();
             vec![section("format", false, by_attack(options.bits, attacks, None))]
         }
-        Kind::Sensitivity => {
+        Experiment::Sensitivity => {
             let weights = [(LAMBDA_RECON, "likeness"), (LAMBDA_MSG, "message")];
             let of_weight = |(prefix, name): (&str, &str)| {
                 let mut section = section("weight", true, by_weight(selection, options.bits, prefix));
@@ -159,7 +159,7 @@ pub(super) fn sections(kind: Kind, selection: &Selection<'_>, options: &Options)
             };
             weights.into_iter().map(of_weight).collect()
         }
-        Kind::Elevation | Kind::Security | Kind::Claims | Kind::Trade => Vec::new(),
+        Experiment::Elevation | Experiment::Security | Experiment::Claims | Experiment::Trade => Vec::new(),
     }
 }
 

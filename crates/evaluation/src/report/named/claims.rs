@@ -220,7 +220,7 @@ fn attainable(bits: u32, rate: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::named::{Kind, Options, report};
+    use crate::report::named::{Experiment, Options, report};
     use crate::report::record::Record;
     use crate::report::testing::{claims, mark, records};
 
@@ -247,7 +247,7 @@ mod tests {
             Record::Claims(clean),
         ]);
         let selection = Selection::newest(&all).unwrap();
-        let told = report(Kind::Claims, &selection, &Options::default()).unwrap();
+        let told = report(Experiment::Claims, &selection, &Options::default()).unwrap();
         let text = |table: usize, row: usize, cell: usize| told.tables[table].rows[row].cells[cell].to_string();
         assert_eq!(told.tables[0].rows.len(), 1);
         // Half of one mark's claims and all of the other's.
@@ -260,7 +260,12 @@ mod tests {
         assert!(text(1, 1, 4).starts_with("6.00e-2 "), "{}", text(1, 1, 4));
         assert!(told.plots[0].svg.contains("WRONG"));
         let none = records([Record::Mark(marks[0].clone())]);
-        let empty = report(Kind::Claims, &Selection::newest(&none).unwrap(), &Options::default()).unwrap();
+        let empty = report(
+            Experiment::Claims,
+            &Selection::newest(&none).unwrap(),
+            &Options::default(),
+        )
+        .unwrap();
         assert_eq!(empty.missing, ["claims: not measured"]);
     }
 }

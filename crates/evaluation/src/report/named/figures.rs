@@ -1,6 +1,6 @@
 //! Plots and pictures of sections.
 use super::cases::Section;
-use super::{Kind, Picture, Plot, Report};
+use super::{Experiment, Picture, Plot, Report};
 use crate::error::Result;
 use crate::report::plot::{Axes, Bar, Dot, Line, Point, bars, lines, scatter};
 use crate::report::selection::Selection;
@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 const SUCCESS_VIEWS: u32 = 1;
 
 /// Plots of a section.
-pub(super) fn of_section(kind: Kind, section: &Section, selection: &Selection<'_>) -> Result<Vec<Plot>> {
+pub(super) fn of_section(kind: Experiment, section: &Section, selection: &Selection<'_>) -> Result<Vec<Plot>> {
     let summaries: Vec<(&Case, Summary)> = section
         .cases
         .iter()
@@ -24,7 +24,7 @@ pub(super) fn of_section(kind: Kind, section: &Section, selection: &Selection<'_
         })
         .collect();
     let mut plots = Vec::new();
-    if matches!(kind, Kind::Capacity | Kind::Longer) {
+    if matches!(kind, Experiment::Capacity | Experiment::Longer) {
         plots.push(by_bits(
             "accuracy (%)",
             &summaries,

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 /// A report that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum Experiment {
     /// Accuracy and quality by bits (the paper's Table 1).
     Capacity,
     /// Accuracy under attacks on pictures (Table 2).
@@ -44,64 +44,64 @@ pub enum Kind {
     Trade,
 }
 
-impl Kind {
+impl Experiment {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Kind; 13] = [
-        Kind::Capacity,
-        Kind::Robustness,
-        Kind::Trained,
-        Kind::Losses,
-        Kind::Pruning,
-        Kind::Longer,
-        Kind::Perturbations,
-        Kind::Sensitivity,
-        Kind::Elevation,
-        Kind::Formats,
-        Kind::Security,
-        Kind::Claims,
-        Kind::Trade,
+    pub const ALL: [Experiment; 13] = [
+        Experiment::Capacity,
+        Experiment::Robustness,
+        Experiment::Trained,
+        Experiment::Losses,
+        Experiment::Pruning,
+        Experiment::Longer,
+        Experiment::Perturbations,
+        Experiment::Sensitivity,
+        Experiment::Elevation,
+        Experiment::Formats,
+        Experiment::Security,
+        Experiment::Claims,
+        Experiment::Trade,
     ];
 
     /// What it is called on a command line and between markers, such as "capacity".
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Capacity => "capacity",
-            Kind::Robustness => "robustness",
-            Kind::Trained => "trained",
-            Kind::Losses => "losses",
-            Kind::Pruning => "pruning",
-            Kind::Longer => "longer",
-            Kind::Perturbations => "perturbations",
-            Kind::Sensitivity => "sensitivity",
-            Kind::Elevation => "elevation",
-            Kind::Formats => "formats",
-            Kind::Security => "security",
-            Kind::Claims => "claims",
-            Kind::Trade => "trade",
+            Experiment::Capacity => "capacity",
+            Experiment::Robustness => "robustness",
+            Experiment::Trained => "trained",
+            Experiment::Losses => "losses",
+            Experiment::Pruning => "pruning",
+            Experiment::Longer => "longer",
+            Experiment::Perturbations => "perturbations",
+            Experiment::Sensitivity => "sensitivity",
+            Experiment::Elevation => "elevation",
+            Experiment::Formats => "formats",
+            Experiment::Security => "security",
+            Experiment::Claims => "claims",
+            Experiment::Trade => "trade",
         }
     }
 
     /// The report of this name.
-    pub fn of_name(name: &str) -> Option<Kind> {
-        Kind::ALL.into_iter().find(|kind| kind.name() == name)
+    pub fn of_name(name: &str) -> Option<Experiment> {
+        Experiment::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
     /// What it shows.
     pub fn title(self) -> &'static str {
         match self {
-            Kind::Capacity => "Capacity: accuracy and quality by length of the message",
-            Kind::Robustness => "Robustness: accuracy under attacks on pictures",
-            Kind::Trained => "What is learned of the Gaussians",
-            Kind::Losses => "Which losses count",
-            Kind::Pruning => "Gaussians removed",
-            Kind::Longer => "Longer messages",
-            Kind::Perturbations => "Noise on the colours, and views covered in part",
-            Kind::Sensitivity => "Other weights of the losses",
-            Kind::Elevation => "Accuracy by elevation of the view",
-            Kind::Formats => "Other formats, and back",
-            Kind::Security => "What detectors without a key see",
-            Kind::Claims => "Claims: right ones found, wrong ones refused",
-            Kind::Trade => "Time against success against likeness",
+            Experiment::Capacity => "Capacity: accuracy and quality by length of the message",
+            Experiment::Robustness => "Robustness: accuracy under attacks on pictures",
+            Experiment::Trained => "What is learned of the Gaussians",
+            Experiment::Losses => "Which losses count",
+            Experiment::Pruning => "Gaussians removed",
+            Experiment::Longer => "Longer messages",
+            Experiment::Perturbations => "Noise on the colours, and views covered in part",
+            Experiment::Sensitivity => "Other weights of the losses",
+            Experiment::Elevation => "Accuracy by elevation of the view",
+            Experiment::Formats => "Other formats, and back",
+            Experiment::Security => "What detectors without a key see",
+            Experiment::Claims => "Claims: right ones found, wrong ones refused",
+            Experiment::Trade => "Time against success against likeness",
         }
     }
 }
@@ -155,7 +155,7 @@ pub struct Picture {
 /// A report: tables, plots, and what is missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Its name, see [`Kind::name`].
+    /// Its name, see [`Experiment::name`].
     pub name: String,
     /// What it shows.
     pub title: String,
@@ -178,7 +178,7 @@ pub struct Report {
 ///
 /// # Errors
 /// [`Error::Codec`] if a plot cannot be drawn.
-pub fn report(kind: Kind, selection: &Selection<'_>, options: &Options) -> Result<Report> {
+pub fn report(kind: Experiment, selection: &Selection<'_>, options: &Options) -> Result<Report> {
     let mut report = Report {
         name: kind.name().into(),
         title: kind.title().into(),
@@ -190,10 +190,10 @@ pub fn report(kind: Kind, selection: &Selection<'_>, options: &Options) -> Resul
         notes: selection.notes().to_vec(),
     };
     match kind {
-        Kind::Elevation => elevation::fill(&mut report, selection, options)?,
-        Kind::Security => security::fill(&mut report, selection)?,
-        Kind::Claims => claims::fill(&mut report, selection)?,
-        Kind::Trade => trade::fill(&mut report, selection)?,
+        Experiment::Elevation => elevation::fill(&mut report, selection, options)?,
+        Experiment::Security => security::fill(&mut report, selection)?,
+        Experiment::Claims => claims::fill(&mut report, selection)?,
+        Experiment::Trade => trade::fill(&mut report, selection)?,
         _ => {}
     }
     for section in cases::sections(kind, selection, options) {
@@ -221,19 +221,19 @@ pub fn report(kind: Kind, selection: &Selection<'_>, options: &Options) -> Resul
 /// # Errors
 /// [`Error::Codec`] if a plot cannot be drawn.
 pub fn all(selection: &Selection<'_>, options: &Options) -> Result<Vec<Report>> {
-    Kind::ALL
+    Experiment::ALL
         .into_iter()
         .map(|kind| report(kind, selection, options))
         .collect()
 }
 
-impl std::str::FromStr for Kind {
+impl std::str::FromStr for Experiment {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Kind::of_name(name).ok_or_else(|| Error::BadOption {
+        Experiment::of_name(name).ok_or_else(|| Error::BadOption {
             field: "report",
-            reason: format!("{name} is none of {}", Kind::ALL.map(Kind::name).join(", ")),
+            reason: format!("{name} is none of {}", Experiment::ALL.map(Experiment::name).join(", ")),
         })
     }
 }

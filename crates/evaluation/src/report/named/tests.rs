@@ -37,7 +37,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         .collect()
 }
 
-fn made(kind: Kind, records: &Records) -> Report {
+fn made(kind: Experiment, records: &Records) -> Report {
     report(kind, &Selection::newest(records).unwrap(), &Options::default()).unwrap()
 }
 
@@ -48,7 +48,7 @@ fn row(label: &str, accuracy: &str) -> (String, String) {
 #[test]
 fn capacity_has_all_lengths_of_the_paper() {
     let records = some();
-    let report = made(Kind::Capacity, &records);
+    let report = made(Experiment::Capacity, &records);
     let expected = [
         row("16", "87.50"),
         row("32", "43.75"),
@@ -68,7 +68,7 @@ fn capacity_has_all_lengths_of_the_paper() {
 #[test]
 fn robustness_has_the_papers_attacks_and_then_others() {
     let records = some();
-    let report = made(Kind::Robustness, &records);
+    let report = made(Experiment::Robustness, &records);
     let rows = rows(&report);
     assert_eq!(rows[0], row("none", "87.50"));
     assert_eq!(rows[1], row("noise:0.1", "not measured"));
@@ -82,29 +82,29 @@ fn robustness_has_the_papers_attacks_and_then_others() {
 #[test]
 fn ablations_and_families() {
     let records = some();
-    let trained = rows(&made(Kind::Trained, &records));
+    let trained = rows(&made(Experiment::Trained, &records));
     assert_eq!(trained[0], row("all attributes", "not measured"));
     assert_eq!(trained[1], row("DC only", "43.75"));
-    let pruning = rows(&made(Kind::Pruning, &records));
+    let pruning = rows(&made(Experiment::Pruning, &records));
     assert_eq!(pruning.len(), 4);
     assert_eq!(pruning[3], row("prune-random:0.1", "96.88"));
-    let perturbed = rows(&made(Kind::Perturbations, &records));
+    let perturbed = rows(&made(Experiment::Perturbations, &records));
     assert_eq!(
         perturbed[1..],
         [row("sh-noise:0.01", "96.88"), row("occlusion:", "not measured")]
     );
-    let formats = rows(&made(Kind::Formats, &records));
+    let formats = rows(&made(Experiment::Formats, &records));
     assert_eq!(formats[1], row("format:ply", "not measured"));
     assert_eq!(formats[3], row("format:spz", "96.88"));
     assert_eq!(formats[6..], [row("sh-degree:0", "96.88")]);
-    let longer = rows(&made(Kind::Longer, &records));
+    let longer = rows(&made(Experiment::Longer, &records));
     assert_eq!(longer, [row("128", "not measured")]);
 }
 
 #[test]
 fn weights_are_in_the_order_of_numbers() {
     let records = some();
-    let sensitivity = made(Kind::Sensitivity, &records);
+    let sensitivity = made(Experiment::Sensitivity, &records);
     assert_eq!(sensitivity.tables.len(), 2);
     let labels: Vec<String> = sensitivity.tables[1]
         .rows
@@ -122,7 +122,7 @@ fn weights_are_in_the_order_of_numbers() {
 #[test]
 fn security_and_elevation() {
     let records = some();
-    let security = made(Kind::Security, &records);
+    let security = made(Experiment::Security, &records);
     let cells: Vec<String> = security.tables[0].rows[0]
         .cells
         .iter()
@@ -148,7 +148,7 @@ fn security_and_elevation() {
             .iter()
             .any(|m| m.starts_with("learned: not measured; it judges"))
     );
-    let elevation = made(Kind::Elevation, &records);
+    let elevation = made(Experiment::Elevation, &records);
     // Bins, and the marks of a ring.
     assert_eq!(elevation.missing.len(), 13);
     assert_eq!(elevation.tables[0].rows[0].cells[0].to_string(), "-90° to -75°");
@@ -164,7 +164,7 @@ fn security_tells_the_largest_detection_and_controls_that_do_not_fire() {
     control.detector = "control:chi-square".into();
     all.extend([detection(&marks[..1]), both, control].map(Record::Detection));
     let records = records(all);
-    let report = made(Kind::Security, &records);
+    let report = made(Experiment::Security, &records);
     let firsts: Vec<[String; 2]> = report
         .tables
         .iter()
@@ -185,7 +185,7 @@ fn every_report_can_be_made_of_one_mark() {
     let records = records([Record::Mark(mark("lego", 8, "unknown", 1))]);
     let selection = Selection::newest(&records).unwrap();
     let reports = all(&selection, &Options::default()).unwrap();
-    assert_eq!(reports.len(), Kind::ALL.len());
+    assert_eq!(reports.len(), Experiment::ALL.len());
     for report in &reports {
         assert!(!report.missing.is_empty(), "{}", report.name);
         assert!(
@@ -193,7 +193,7 @@ fn every_report_can_be_made_of_one_mark() {
             "{}",
             report.name
         );
-        assert_eq!(report.name.parse::<Kind>().unwrap().title(), report.title);
+        assert_eq!(report.name.parse::<Experiment>().unwrap().title(), report.title);
     }
-    assert!("capacities".parse::<Kind>().is_err());
+    assert!("capacities".parse::<Experiment>().is_err());
 }

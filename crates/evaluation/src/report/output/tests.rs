@@ -1,6 +1,6 @@
 //! Every output holds every number, and nothing that a hostile name could do.
 use super::*;
-use crate::report::named::{Kind, Options, all, report};
+use crate::report::named::{Experiment, Options, all, report};
 use crate::report::names::{NONE, STANDARD};
 use crate::report::record::Record;
 use crate::report::selection::Selection;
@@ -86,7 +86,7 @@ fn pages_hold_every_cell_and_run_nothing() {
 fn a_lost_picture_is_told() {
     let records = hostile();
     let selection = Selection::newest(&records).unwrap();
-    let capacity = report(Kind::Capacity, &selection, &options()).unwrap();
+    let capacity = report(Experiment::Capacity, &selection, &options()).unwrap();
     assert_eq!(capacity.pictures.len(), 1);
     let page = to_html(&[capacity], tempfile::tempdir().unwrap().path());
     assert!(page.contains("<p>difference.png: ") && !page.contains("<img"));
@@ -145,7 +145,7 @@ fn json_parses_back() {
 fn markdown_goes_between_its_markers() {
     let records = hostile();
     let selection = Selection::newest(&records).unwrap();
-    let capacity = report(Kind::Capacity, &selection, &options()).unwrap();
+    let capacity = report(Experiment::Capacity, &selection, &options()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("evaluation.md");
     std::fs::write(
@@ -175,7 +175,7 @@ fn markdown_goes_between_its_markers() {
 fn files_are_what_the_texts_are() {
     let records = hostile();
     let selection = Selection::newest(&records).unwrap();
-    let reports = [report(Kind::Losses, &selection, &options()).unwrap()];
+    let reports = [report(Experiment::Losses, &selection, &options()).unwrap()];
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_json(&reports, &path("a.json")).unwrap();

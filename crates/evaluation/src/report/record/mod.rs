@@ -13,7 +13,7 @@ pub use claims::{Claims, POWERS, claims_id};
 pub use detection::{Detection, detection_id};
 pub use id::Id;
 pub use mark::{Embedding, Mark};
-pub use reading::{Reading, reading_id};
+pub use reading::{ReadingRecord, reading_id};
 pub use timing::Timing;
 
 use crate::error::Result;
@@ -27,7 +27,7 @@ pub enum Record {
     /// One embedding.
     Mark(Mark),
     /// One mark, read under one attack.
-    Reading(Reading),
+    Reading(ReadingRecord),
     /// One detector, judging clean and marked pictures.
     Detection(Detection),
     /// Claims about one suspect, right and wrong ones.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// What was read of a mark under an attack.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Reading {
+pub struct ReadingRecord {
     /// The mark.
     pub mark: Id,
     /// The attack, such as [`crate::report::names::NONE`] or "jpeg:10".
@@ -40,7 +40,7 @@ pub fn reading_id(mark: &Id, attack: &str, size: u32, views: u32) -> Id {
         .id()
 }
 
-impl Reading {
+impl ReadingRecord {
     /// Its identity.
     pub fn id(&self) -> Id {
         reading_id(&self.mark, &self.attack, self.size, self.views)
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn impossible_readings_are_refused() {
         let mark = mark("lego", 16, "standard", 1);
-        let changes: [Change<Reading>; 6] = [
+        let changes: [Change<ReadingRecord>; 6] = [
             ("bits_right", |r| r.views = 3),
             ("bits_right", |r| r.bits_right = vec![17, 0]),
             ("message_right_from", |r| {

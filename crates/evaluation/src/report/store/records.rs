@@ -1,7 +1,7 @@
 //! The records of a store, in the order they were written.
 use super::FILE;
 use crate::error::{Error, Result};
-use crate::report::record::{Claims, Detection, Id, Mark, Reading, Record};
+use crate::report::record::{Claims, Detection, Id, Mark, ReadingRecord, Record};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,7 +19,7 @@ pub type Note = String;
 pub struct Records {
     folder: PathBuf,
     marks: Vec<(Id, Mark)>,
-    readings: Vec<Reading>,
+    readings: Vec<ReadingRecord>,
     detections: Vec<Detection>,
     claims: Vec<Claims>,
     /// Every identity; those of marks with their place among them.
@@ -168,7 +168,7 @@ impl Records {
     }
 
     /// All readings, in the order they were written; each one's mark is among [`Records::marks`].
-    pub fn readings(&self) -> &[Reading] {
+    pub fn readings(&self) -> &[ReadingRecord] {
         &self.readings
     }
 

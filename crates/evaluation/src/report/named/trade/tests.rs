@@ -1,6 +1,6 @@
 //! The front is what the definition says, and notes tell when seconds cannot be compared.
 use super::*;
-use crate::report::named::{Kind, Options, report};
+use crate::report::named::{Experiment, Options, report};
 use crate::report::record::{Mark, Record};
 use crate::report::store::Records;
 use crate::report::testing::{mark, reading, records, timing};
@@ -23,7 +23,12 @@ fn timed(variant: &str, scene: &str, figures: [f64; 2], right: [bool; 3]) -> (Ma
 }
 
 fn made(records: &Records) -> Report {
-    report(Kind::Trade, &Selection::newest(records).unwrap(), &Options::default()).unwrap()
+    report(
+        Experiment::Trade,
+        &Selection::newest(records).unwrap(),
+        &Options::default(),
+    )
+    .unwrap()
 }
 
 /// First and last cells of rows.

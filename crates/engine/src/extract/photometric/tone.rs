@@ -1,24 +1,10 @@
 //! What is done to the tones of pictures, and how it is undone.
-use serde::Serialize;
+use guardsplat_codeword::Tone;
 
 use crate::picture::Picture;
 
 /// Weights of red, green and blue in a pixel's grey (ITU-R BT.601).
 const GREY: [f32; 3] = [0.299, 0.587, 0.114];
-
-/// Something that was done to all pixels of a picture alike.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Tone {
-    /// Values were multiplied by this.
-    Brightness(f32),
-    /// Values in [0, 1] were raised to this power.
-    Gamma(f32),
-    /// The distance of values from the picture's mean grey was multiplied by this.
-    Contrast(f32),
-    /// The distance of a pixel's values from its grey was multiplied by this.
-    Saturation(f32),
-}
 
 /// A kind of tone that is looked for.
 struct Sought {
@@ -41,42 +27,29 @@ const fn sought(tone: fn(f32) -> Tone, reach: f32, ratio: f32) -> Sought {
     Sought { tone, reach, ratio }
 }
 
-impl std::fmt::Display for Tone {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Brightness(factor) => write!(f, "brightness x {factor:.2}"),
-            Self::Gamma(exponent) => write!(f, "gamma {exponent:.2}"),
-            Self::Contrast(factor) => write!(f, "contrast x {factor:.2}"),
-            Self::Saturation(factor) => write!(f, "saturation x {factor:.2}"),
+/// The picture before this was done to it, values cut to [0, 1]; what was cut when it was done stays cut.
+pub(super) fn undone(tone: Tone, picture: &Picture) -> Picture {
+    let pixels = match tone {
+        Tone::Brightness(factor) => each(picture, |v| v / factor),
+        Tone::Gamma(exponent) => each(picture, |v| v.max(0.0).powf(1.0 / exponent)),
+        Tone::Contrast(factor) => {
+            let greys = picture.pixels.as_chunks::<3>().0.iter().map(|p| f64::from(grey(p)));
+            let count = (picture.pixels.len() / 3).max(1);
+            let mean = (greys.sum::<f64>() / count as f64) as f32;
+            each(picture, |v| mean + (v - mean) / factor)
         }
-    }
-}
-
-impl Tone {
-    /// The picture before this was done to it, values cut to [0, 1]; what was cut when it was done stays cut.
-    pub(super) fn undone(self, picture: &Picture) -> Picture {
-        let pixels = match self {
-            Self::Brightness(factor) => each(picture, |v| v / factor),
-            Self::Gamma(exponent) => each(picture, |v| v.max(0.0).powf(1.0 / exponent)),
-            Self::Contrast(factor) => {
-                let greys = picture.pixels.as_chunks::<3>().0.iter().map(|p| f64::from(grey(p)));
-                let count = (picture.pixels.len() / 3).max(1);
-                let mean = (greys.sum::<f64>() / count as f64) as f32;
-                each(picture, |v| mean + (v - mean) / factor)
-            }
-            Self::Saturation(factor) => picture
-                .pixels
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .flat_map(|pixel| {
-                    let grey = grey(pixel);
-                    pixel.map(|v| (grey + (v - grey) / factor).clamp(0.0, 1.0))
-                })
-                .collect(),
-        };
-        Picture { pixels, ..*picture }
-    }
+        Tone::Saturation(factor) => picture
+            .pixels
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .flat_map(|pixel| {
+                let grey = grey(pixel);
+                pixel.map(|v| (grey + (v - grey) / factor).clamp(0.0, 1.0))
+            })
+            .collect(),
+    };
+    Picture { pixels, ..*picture }
 }
 
 /// All factors of all kinds.
@@ -114,9 +87,9 @@ mod tests {
         let before = picture();
         for Sought { tone, .. } in SOUGHT {
             // Undoing the inverse is doing it.
-            let done = tone(1.4).undone(&before);
+            let done = undone(tone(1.4), &before);
             assert_ne!(done, before, "{:?}", tone(1.4));
-            let after = tone(1.0 / 1.4).undone(&done);
+            let after = undone(tone(1.0 / 1.4), &done);
             for (a, b) in after.pixels.iter().zip(&before.pixels) {
                 assert!((a - b).abs() < 1e-5, "{:?}: {a} {b}", tone(1.4));
             }

@@ -9,19 +9,19 @@ use crate::scene::{Format, HEAD, sniff};
 
 /// What can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum SuspectKind {
     /// A scene, be it a damaged one.
     Scene,
     /// A picture, be it a damaged one.
     Picture,
 }
 
-impl Kind {
+impl SuspectKind {
     /// What a file is.
     ///
     /// # Errors
     /// [`Error::Io`], and [`Error::BadPicture`] for what is neither, with the reasons.
-    pub fn of(path: &Path) -> Result<Kind> {
+    pub fn of(path: &Path) -> Result<SuspectKind> {
         // Before it is opened: a pipe would wait for its other end.
         let size = match std::fs::metadata(path).map_err(Error::io(path))? {
             metadata if metadata.is_file() => metadata.len(),
@@ -31,13 +31,13 @@ impl Kind {
         let file = File::open(path).map_err(Error::io(path))?;
         file.take(HEAD as u64).read_to_end(&mut head).map_err(Error::io(path))?;
         if is_picture(&head) {
-            return Ok(Kind::Picture);
+            return Ok(SuspectKind::Picture);
         }
         if sniff(&head, size).is_some() {
-            return Ok(Kind::Scene);
+            return Ok(SuspectKind::Scene);
         }
         match Format::of(path) {
-            Ok(_) => Ok(Kind::Scene),
+            Ok(_) => Ok(SuspectKind::Scene),
             Err(crate::scene::Error::BadScene { path, reason }) => Err(Error::BadPicture {
                 path,
                 reason: format!("not a PNG, JPEG, WebP or OpenEXR picture, and {reason}"),
@@ -57,7 +57,7 @@ mod tests {
         let kind = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            Kind::of(&path)
+            SuspectKind::of(&path)
         };
         for bytes in [
             &b"\x89PNG\r\n\x1a\n"[..],
@@ -69,13 +69,18 @@ mod tests {
             let bytes = [bytes, &[0; 64][bytes.len()..]].concat();
             assert_eq!(
                 kind("a.ply", &bytes).unwrap(),
-                Kind::Picture,
+                SuspectKind::Picture,
                 "{}",
                 bytes.escape_ascii()
             );
         }
         for bytes in [&b"ply\nformat"[..], b"\x1f\x8b\x08", b"NGSP"] {
-            assert_eq!(kind("a.png", bytes).unwrap(), Kind::Scene, "{}", bytes.escape_ascii());
+            assert_eq!(
+                kind("a.png", bytes).unwrap(),
+                SuspectKind::Scene,
+                "{}",
+                bytes.escape_ascii()
+            );
         }
         let reason = |name: &str, bytes: &[u8]| kind(name, bytes).unwrap_err().to_string();
         let told = reason("a.splat", b"Dear diary");
@@ -86,9 +91,12 @@ mod tests {
         assert!(reason("a.png", b"").contains("it is empty"));
         // A picture, and none that is read.
         assert!(reason("a.gif", b"GIF89a").contains("not a PNG"));
-        assert!(matches!(Kind::of(&folder.path().join("none")), Err(Error::Io { .. })));
+        assert!(matches!(
+            SuspectKind::of(&folder.path().join("none")),
+            Err(Error::Io { .. })
+        ));
         assert!(
-            Kind::of(folder.path())
+            SuspectKind::of(folder.path())
                 .unwrap_err()
                 .to_string()
                 .contains("not a regular file")

@@ -1,14 +1,17 @@
-//! What was read: logits summed per bit over views, one decision.
+//! Logits summed per bit over views, and the one reading that they decide for.
+use guardsplat_codeword::{AcceptanceRule, Decision, Message, Reading};
+
 use crate::error::{Error, Result};
-use crate::message::{Decision, Message, decide};
 
 /// Logits of some views of one scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct PooledLogits {
     /// Logits of each view, `bits` a view.
     pub views: Vec<Vec<f32>>,
     /// Their sum over the views, a bit.
     pub summed: Vec<f32>,
+    /// What the sums decide for.
+    reading: Reading,
 }
 
 /// How a reading compares with a message that was claimed.
@@ -22,11 +25,11 @@ pub struct Comparison {
     pub bit_accuracy_worst_view: f64,
 }
 
-impl Reading {
+impl PooledLogits {
     /// Sums the logits of views.
     ///
     /// # Errors
-    /// No views, views of different lengths, or logits that are not finite.
+    /// No views, views of different lengths, more bits than a message has, or logits that are not finite.
     pub fn new(views: Vec<Vec<f32>>) -> Result<Self> {
         let bad = |reason: String| Err(Error::BadOption { field: "views", reason });
         let Some(bits) = views.first().map(Vec::len).filter(|bits| *bits > 0) else {
@@ -42,7 +45,11 @@ impl Reading {
             }
             summed.iter_mut().zip(view).for_each(|(sum, v)| *sum += v);
         }
-        Ok(Self { views, summed })
+        Ok(Self {
+            reading: Reading::from_logits(&summed)?,
+            views,
+            summed,
+        })
     }
 
     /// The first `count` views only, all of them if there are fewer.
@@ -53,27 +60,21 @@ impl Reading {
         Self::new(self.views[..count.min(self.views.len())].to_vec())
     }
 
-    /// The message that the summed logits decide for.
-    ///
-    /// # Errors
-    /// When there are more bits than a message may have.
-    pub fn message(&self) -> Result<Message> {
-        Message::from_logits(&self.summed)
+    /// What the summed logits decide for, with bits that they leave undecided.
+    pub fn reading(&self) -> &Reading {
+        &self.reading
     }
 
-    /// Compares with a message.
+    /// The bits of that; undecided ones are 0.
+    pub fn message(&self) -> Message {
+        self.reading.message()
+    }
+
+    /// Compares with a message, by a rule that says how many hypotheses are tried.
     ///
     /// # Errors
     /// When lengths differ.
-    pub fn compare(&self, message: &Message) -> Result<Comparison> {
-        self.compare_among(message, 1)
-    }
-
-    /// As [`Reading::compare`], where this is one of so many hypotheses that are tried.
-    ///
-    /// # Errors
-    /// When lengths differ.
-    pub fn compare_among(&self, message: &Message, hypotheses: u32) -> Result<Comparison> {
+    pub fn compare(&self, message: &Message, rule: &AcceptanceRule) -> Result<Comparison> {
         if message.len() != self.summed.len() {
             return Err(Error::BadOption {
                 field: "message",
@@ -83,11 +84,10 @@ impl Reading {
         let accuracies = self
             .views
             .iter()
-            .map(|view| Ok(Message::from_logits(view)?.accuracy(message)))
+            .map(|view| Ok(Reading::from_logits(view)?.bit_accuracy(message)?))
             .collect::<Result<Vec<f64>>>()?;
-        let matched = self.message()?.matches(message);
         Ok(Comparison {
-            decision: decide(message.len() as u32, matched as u32, hypotheses),
+            decision: rule.decide(&self.reading, message)?,
             bit_accuracy: accuracies.iter().sum::<f64>() / accuracies.len() as f64,
             bit_accuracy_worst_view: accuracies.iter().copied().fold(1.0, f64::min),
         })
@@ -100,11 +100,14 @@ impl Reading {
         all.map(|v| f64::from(v.abs())).sum::<f64>() / count as f64
     }
 
-    /// Share of a view's bits that agree with the summed decision, mean over views; 0.5 is chance for many views.
+    /// Share of a view's bits that agree with the summed decision, mean over views; 0.5 is chance for many views. Undecided
+    /// bits agree with nothing.
     pub fn agreement(&self) -> f64 {
         let agreeing = |view: &Vec<f32>| {
             let pairs = view.iter().zip(&self.summed);
-            pairs.filter(|(v, sum)| (**v > 0.0) == (**sum > 0.0)).count()
+            pairs
+                .filter(|(v, sum)| (**v > 0.0 && **sum > 0.0) || (**v < 0.0 && **sum < 0.0))
+                .count()
         };
         let count = self.views.len() * self.summed.len();
         self.views.iter().map(agreeing).sum::<usize>() as f64 / count as f64
@@ -114,7 +117,7 @@ impl Reading {
     pub fn margin(&self, message: &Message) -> f64 {
         let signed = self.summed.iter().zip(message.bits());
         let weakest = signed
-            .map(|(&sum, &bit)| f64::from(if bit { sum } else { -sum }))
+            .map(|(&sum, bit)| f64::from(if bit { sum } else { -sum }))
             .fold(f64::INFINITY, f64::min);
         weakest / self.views.len() as f64
     }
@@ -123,10 +126,15 @@ impl Reading {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::Verdict;
+    use guardsplat_codeword::{Claim, DEFAULT_FALSE_POSITIVE_RATE, HypothesisReading, Scheme, Target, Verdict};
 
-    fn reading() -> Reading {
-        Reading::new(vec![
+    const RULE: AcceptanceRule = AcceptanceRule {
+        false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
+        hypotheses: 1,
+    };
+
+    fn reading() -> PooledLogits {
+        PooledLogits::new(vec![
             vec![3.0, -1.0, 0.5, -0.5],
             vec![-1.0, -1.0, 0.5, 0.25],
             vec![-1.0, -1.0, 0.5, 0.125],
@@ -139,7 +147,7 @@ mod tests {
         let reading = reading();
         assert_eq!(reading.summed, [1.0, -3.0, 1.5, -0.125]);
         // Two of three views vote against the first and the last bit; the sums decide otherwise.
-        assert_eq!(reading.message().unwrap().to_string(), "a");
+        assert_eq!(reading.message().to_string(), "a");
         assert_eq!(reading.of_first(1).unwrap().summed, [3.0, -1.0, 0.5, -0.5]);
         assert_eq!(reading.of_first(9).unwrap(), reading);
     }
@@ -147,13 +155,13 @@ mod tests {
     #[test]
     fn accuracy_is_per_view_and_the_decision_is_one() {
         let message = Message::parse("a", 4).unwrap();
-        let found = reading().compare(&message).unwrap();
+        let found = reading().compare(&message, &RULE).unwrap();
         assert_eq!(found.decision.matched_bits, 4);
         assert_eq!(found.decision.bits, 4);
         assert_eq!(found.decision.verdict, Verdict::Inconclusive);
         assert!((found.bit_accuracy - (1.0 + 0.5 + 0.5) / 3.0).abs() < 1e-12);
         assert_eq!(found.bit_accuracy_worst_view, 0.5);
-        assert!(reading().compare(&Message::parse("aa", 8).unwrap()).is_err());
+        assert!(reading().compare(&Message::parse("aa", 8).unwrap(), &RULE).is_err());
     }
 
     #[test]
@@ -168,10 +176,72 @@ mod tests {
 
     #[test]
     fn what_cannot_be_read_is_refused() {
-        assert!(Reading::new(vec![]).is_err());
-        assert!(Reading::new(vec![vec![]]).is_err());
-        assert!(Reading::new(vec![vec![1.0], vec![1.0, 2.0]]).is_err());
-        let error = Reading::new(vec![vec![1.0], vec![f32::NAN]]).unwrap_err();
+        assert!(PooledLogits::new(vec![]).is_err());
+        assert!(PooledLogits::new(vec![vec![]]).is_err());
+        assert!(PooledLogits::new(vec![vec![1.0], vec![1.0, 2.0]]).is_err());
+        let error = PooledLogits::new(vec![vec![1.0], vec![f32::NAN]]).unwrap_err();
         assert!(error.to_string().contains("view 1 is NaN"), "{error}");
+    }
+
+    #[test]
+    fn raw_messages_and_claims_judge_the_same_logits_alike() {
+        let word = Message::from_u64(0x0123_4567_89ab_cdef);
+        for (wrong, undecided) in [
+            (0, 0),
+            (9, 0),
+            (13, 0),
+            (14, 0),
+            (5, 8),
+            (5, 9),
+            (0, 13),
+            (0, 14),
+            (0, 64),
+        ] {
+            let logit = |(place, bit): (usize, bool)| match place {
+                place if place < undecided => [0.0, -0.0][place % 2],
+                place if place < undecided + wrong => {
+                    if bit {
+                        -1.5
+                    } else {
+                        1.5
+                    }
+                }
+                _ => {
+                    if bit {
+                        1.5
+                    } else {
+                        -1.5
+                    }
+                }
+            };
+            let logits: Vec<f32> = word.bits().enumerate().map(logit).collect();
+            let raw = PooledLogits::new(vec![logits.clone()]).unwrap();
+            let raw = raw.compare(&word, &RULE).unwrap().decision;
+            let claim = Claim {
+                scheme: Scheme::default(),
+                readings: &[HypothesisReading {
+                    name: "as given".into(),
+                    views: 1,
+                    logits,
+                }],
+                targets: &[Target {
+                    id: "asset".into(),
+                    word,
+                    pad: None,
+                }],
+                targets_tried: None,
+                other_tries: 1,
+                rate: RULE.false_positive_rate,
+            };
+            let claimed = claim.test().unwrap().answer;
+            let best = claimed.best.unwrap();
+            assert_eq!(
+                (raw.matched_bits, raw.p_value, raw.needed_bits),
+                (best.matched_bits, best.p_value, claimed.needed_bits),
+                "{wrong} {undecided}"
+            );
+            assert_eq!(raw.matched_bits as usize, 64 - wrong - undecided);
+            assert_eq!(raw.verdict, claimed.verdict);
+        }
     }
 }

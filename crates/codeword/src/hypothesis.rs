@@ -1,0 +1,133 @@
+//! What may have been done to a picture, and is undone before it is read.
+//!
+//! Each hypothesis is read for itself, and whoever decides on the best of them pays for all.
+use std::fmt;
+
+/// Steps in which windows are told, of a side.
+pub const WINDOW_STEPS: u32 = 12;
+
+/// What is undone before a picture is read: its tones first, then borders are cut off, then it is turned, then mirrored.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hypothesis {
+    /// Counterclockwise, 0 to 3.
+    pub quarter_turns: u8,
+    /// Left and right are exchanged.
+    pub mirrored: bool,
+    /// Borders of one colour are cut off.
+    pub trimmed: bool,
+    /// What was done to its tones.
+    pub correction: PhotometricCorrection,
+    /// A part of it is read, the rest is not.
+    pub window: Option<Window>,
+}
+
+/// What may have been done to the tones of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PhotometricCorrection {
+    /// Nothing: it is read as it is.
+    #[default]
+    None,
+    /// Something that left its background neither black nor white, such as noise: what is seen of it is made white.
+    WhiteBackground,
+    /// Its tones were changed, and with them its background.
+    Tone(Tone),
+}
+
+/// Something that was done to all pixels of a picture alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tone {
+    /// Values were multiplied by this.
+    Brightness(f32),
+    /// Values in [0, 1] were raised to this power.
+    Gamma(f32),
+    /// The distance of values from the picture's mean grey was multiplied by this.
+    Contrast(f32),
+    /// The distance of a pixel's values from its grey was multiplied by this.
+    Saturation(f32),
+}
+
+/// A part of a picture, of the same aspect; in twelfths of its sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// From the left edge.
+    pub left: u32,
+    /// From the top edge.
+    pub top: u32,
+    /// Of both sides.
+    pub side: u32,
+}
+
+/// In words, "as given" where nothing is undone.
+impl fmt::Display for Hypothesis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut undone = Vec::new();
+        match self.correction {
+            PhotometricCorrection::None => {}
+            PhotometricCorrection::WhiteBackground => undone.push("ground made white".to_owned()),
+            PhotometricCorrection::Tone(tone) => undone.push(format!("{tone} undone")),
+        }
+        if self.quarter_turns > 0 {
+            undone.push(format!("turned by {} degrees", 90 * u32::from(self.quarter_turns)));
+        }
+        if self.mirrored {
+            undone.push("mirrored".into());
+        }
+        if self.trimmed {
+            undone.push("without borders".into());
+        }
+        undone.extend(self.window.map(|window| window.to_string()));
+        match undone.is_empty() {
+            true => f.write_str("as given"),
+            false => f.write_str(&undone.join(", ")),
+        }
+    }
+}
+
+impl fmt::Display for Tone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Brightness(factor) => write!(f, "brightness x {factor:.2}"),
+            Self::Gamma(exponent) => write!(f, "gamma {exponent:.2}"),
+            Self::Contrast(factor) => write!(f, "contrast x {factor:.2}"),
+            Self::Saturation(factor) => write!(f, "saturation x {factor:.2}"),
+        }
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent =
+            |twelfths: u32| (100 * u64::from(twelfths) + u64::from(WINDOW_STEPS / 2)) / u64::from(WINDOW_STEPS);
+        let [left, top, side] = [self.left, self.top, self.side].map(percent);
+        write!(f, "{side} % of its sides from {left} % right and {top} % down")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hypotheses_are_told_in_words() {
+        assert_eq!(Hypothesis::default().to_string(), "as given");
+        let all = Hypothesis {
+            quarter_turns: 3,
+            mirrored: true,
+            trimmed: true,
+            correction: PhotometricCorrection::Tone(Tone::Brightness(0.81)),
+            window: Some(Window {
+                left: 3,
+                top: 6,
+                side: 6,
+            }),
+        };
+        let told = "brightness x 0.81 undone, turned by 270 degrees, mirrored, without borders, 50 % of its sides from \
+                    25 % right and 50 % down";
+        assert_eq!(all.to_string(), told);
+        let white = Hypothesis {
+            correction: PhotometricCorrection::WhiteBackground,
+            ..Hypothesis::default()
+        };
+        assert_eq!(white.to_string(), "ground made white");
+    }
+}
