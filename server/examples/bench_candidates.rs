@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use futures::{StreamExt, TryStreamExt, stream};
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobKind, KeyId, Ledger, Needs, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
-    candidates,
+    Completion, JobKind, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, Registry,
+    ResourceRequirements, SqliteLedger, candidates,
 };
 use guardsplat_server::notary::{self, Notary};
 use guardsplat_server::secrets::MasterKey;
@@ -116,7 +116,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         max_attempts: 1,
         trace_parent: None,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
     };
     let job = ledger.create_job(job, 0).await?.id;
     let lease = ledger

@@ -9,7 +9,7 @@ use super::submission::Submission;
 use super::{Api, own};
 use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, JobKind, Needs};
+use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
 
 /// When a submitter tries again while the queue is full.
 const QUEUE_RETRY: Duration = Duration::from_secs(10);
@@ -17,7 +17,7 @@ const QUEUE_RETRY: Duration = Duration::from_secs(10);
 impl Api {
     /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
     /// Says what the worker of one that there is room for must have, as far as its scene tells.
-    pub(super) async fn admit(&self, project: &str, submission: &Submission) -> Result<Needs> {
+    pub(super) async fn admit(&self, project: &str, submission: &Submission) -> Result<ResourceRequirements> {
         let limits = self.limits();
         let limit = limits.max_queued;
         let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
@@ -25,7 +25,7 @@ impl Api {
         let unlimited = !full && limits.max_job_memory.is_none() && quotas == [None, None];
         if !unlimited {
             if self.is_known(project, submission).await? {
-                return Ok(Needs::default());
+                return Ok(ResourceRequirements::default());
             }
             self.room_for_job(project, submission.kind).await?;
         }
@@ -36,7 +36,7 @@ impl Api {
             });
         }
         let Some(scene) = scene_of(submission) else {
-            return Ok(Needs::default());
+            return Ok(ResourceRequirements::default());
         };
         let summary = match (self.summary(project, scene).await, limits.max_job_memory) {
             // A job that nothing is held against does not hang on it either.
@@ -47,14 +47,14 @@ impl Api {
             (summary, _) => summary?,
         };
         let Some(summary) = summary else {
-            return Ok(Needs::default());
+            return Ok(ResourceRequirements::default());
         };
         if let Some(limit) = limits.max_job_memory {
             check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
         }
         let (least, likely) = taken(submission.kind, &summary);
         let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
-        Ok(Needs {
+        Ok(ResourceRequirements {
             memory: bytes(least),
             likely_memory: bytes(likely),
             clip: None,

@@ -124,8 +124,8 @@ impl Api {
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
         let priority = urgency(&submission, self.limits().max_priority)?;
-        let mut needs = self.admit(project, &submission).await?;
-        needs.clip = clip;
+        let mut requirements = self.admit(project, &submission).await?;
+        requirements.clip = clip;
         let fingerprint = self.fingerprint(project, &submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
@@ -140,7 +140,7 @@ impl Api {
             fingerprint,
             max_attempts: self.limits().max_attempts,
             priority,
-            needs,
+            requirements,
             trace_parent,
         };
         let id = new.id;

@@ -18,7 +18,7 @@ use super::status::chain;
 use super::{Api, clock, convert};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
-use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, Taker};
+use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, WorkerCapabilities};
 use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
@@ -45,8 +45,8 @@ impl Api {
         loop {
             listener.check_running()?;
             self.worker_is_there(&worker).await?;
-            let taker = self.taker(&worker).await?;
-            if let Some(lease) = self.claim(taker).await? {
+            let capabilities = self.capabilities(&worker).await?;
+            if let Some(lease) = self.claim(capabilities).await? {
                 let job = match self.for_worker(&lease).await {
                     Ok(job) => job,
                     Err(error) => {
@@ -97,13 +97,16 @@ impl Api {
 
     /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
     /// attempt would be lost, and the time of a lease with it.
-    async fn claim(&self, taker: Taker) -> Result<Option<Lease>> {
+    async fn claim(&self, capabilities: WorkerCapabilities) -> Result<Option<Lease>> {
         let (send, receive) = oneshot::channel();
         let api = self.clone();
         tokio::spawn(async move {
-            let mut claimed = api.ledger().claim_for(&taker, api.limits().lease, clock::now()).await;
+            let mut claimed = api
+                .ledger()
+                .claim_for(&capabilities, api.limits().lease, clock::now())
+                .await;
             if let Ok(Some(lease)) = &mut claimed {
-                tracing::info!(job = %lease.job.id, worker = taker.worker, attempt = lease.job.attempt, "job given to a worker");
+                tracing::info!(job = %lease.job.id, worker = capabilities.worker, attempt = lease.job.attempt, "job given to a worker");
                 api.metrics().given(&lease.job);
                 let span = api.traces().attempt(&lease.job);
                 // The worker's spans go below the attempt's.

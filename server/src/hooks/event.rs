@@ -254,7 +254,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::ledger::{DeliveryState, Failure as Failed, Needs};
+    use crate::ledger::{DeliveryState, Failure as Failed, ResourceRequirements};
 
     const SECRET: &str = "5ec2e75ec2e75ec2";
 
@@ -280,7 +280,7 @@ mod tests {
             revision: 5,
             trace_parent: None,
             priority: 0,
-            needs: Needs::default(),
+            requirements: ResourceRequirements::default(),
             queue_position: None,
         }
     }

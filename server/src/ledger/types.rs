@@ -3,8 +3,8 @@ use std::fmt;
 
 use uuid::Uuid;
 
-use super::queue::Needs;
 use super::registry::KeyState;
+use super::workers::ResourceRequirements;
 
 /// Name of a job; a version 7 UUID.
 pub type JobId = Uuid;
@@ -76,7 +76,7 @@ pub struct JobRow {
     /// How urgent it is.
     pub priority: i32,
     /// What its worker must have.
-    pub needs: Needs,
+    pub requirements: ResourceRequirements,
     /// What became of it.
     pub state: JobState,
     /// Somebody asked for the end of it while it was running.
@@ -124,7 +124,7 @@ pub struct NewJob {
     pub spec: Vec<u8>,
     /// Artifacts it reads; kept while it is queued or running.
     pub inputs: Vec<ArtifactId>,
-    /// The key it needs.
+    /// The key it requirements.
     pub key: Option<KeyId>,
     /// Names the request, so that it can be repeated.
     pub request_id: Option<Uuid>,
@@ -137,7 +137,7 @@ pub struct NewJob {
     /// How urgent it is: one of [`PRIORITIES`](super::queue::PRIORITIES).
     pub priority: i32,
     /// What its worker must have.
-    pub needs: Needs,
+    pub requirements: ResourceRequirements,
     /// What the request is a part of, as W3C Trace Context has it.
     pub trace_parent: Option<String>,
 }

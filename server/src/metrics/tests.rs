@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 
 use super::*;
-use crate::ledger::{Failure, JobKind, JobRow, JobState, Needs, REASON_WORKER_LOST, Running, Waiting};
+use crate::ledger::{Failure, JobKind, JobRow, JobState, REASON_WORKER_LOST, ResourceRequirements, Running, Waiting};
 
 fn job(state: JobState, attempt: i32) -> JobRow {
     JobRow {
@@ -26,7 +26,7 @@ fn job(state: JobState, attempt: i32) -> JobRow {
         revision: 2,
         trace_parent: None,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
         queue_position: None,
     }
 }

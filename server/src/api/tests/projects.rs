@@ -515,7 +515,7 @@ impl Server {
             self.worker.clone().release_job(release).await.unwrap();
         }
         let id = crate::api::names::Kind::Job.parse("name", job).unwrap();
-        let row = crate::ledger::Ledger::get_job(&*self.ledger(), id)
+        let row = crate::ledger::JobStore::get_job(&*self.ledger(), id)
             .await
             .unwrap()
             .unwrap();

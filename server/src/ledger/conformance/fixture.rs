@@ -4,8 +4,8 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use super::super::{
-    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, Needs,
-    NewArtifact, NewJob, Origin,
+    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, NewArtifact,
+    NewJob, Origin, ResourceRequirements,
 };
 
 /// How long the leases of the tests are.
@@ -38,7 +38,7 @@ pub fn new_job() -> NewJob {
         fingerprint: [7; 32],
         max_attempts: 3,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
         trace_parent: None,
     }
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use uuid::Uuid;
 
 use super::super::queue::PATIENCE;
-use super::super::{JobId, JobState, Ledger, Needs, NewJob, Result, Taker, retry::backoff};
+use super::super::{JobId, JobState, Ledger, NewJob, ResourceRequirements, Result, WorkerCapabilities, retry::backoff};
 use super::fixture::*;
 
 /// One thing that somebody does. Numbers choose among the jobs, requests and leases that there are.
@@ -230,9 +230,9 @@ impl Pair {
             request_id,
             spec: vec![u8::from(body)],
             fingerprint: [u8::from(body) + 2 * (priority + 1) as u8; 32],
-            needs: Needs {
+            requirements: ResourceRequirements {
                 memory,
-                ..Needs::default()
+                ..ResourceRequirements::default()
             },
             ..new_job()
         };
@@ -269,11 +269,11 @@ impl Pair {
 
     async fn claim(&mut self, memory: Option<i64>) {
         let (now, holder) = (self.now, self.leases.len());
-        let taker = Taker {
+        let capabilities = WorkerCapabilities {
             memory,
-            ..Taker::of_anything("worker-1")
+            ..WorkerCapabilities::of_anything("worker-1")
         };
-        let given = self.ledger.claim_for(&taker, LEASE, now).await.unwrap();
+        let given = self.ledger.claim_for(&capabilities, LEASE, now).await.unwrap();
         let next = self.next(memory);
         assert_eq!(
             given.as_ref().map(|lease| lease.job.id),

@@ -1,7 +1,7 @@
 //! What operators ask: counts, attempts and their ends, and another try for a job that failed.
 use super::super::{
-    Failure, JobKind, JobState, LedgerError, Needs, NewJob, Outcome, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
-    Running, Tally, Waiting,
+    Failure, JobKind, JobState, LedgerError, NewJob, Outcome, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+    ResourceRequirements, Running, Tally, Waiting,
 };
 use super::Factory;
 use super::fixture::*;
@@ -178,7 +178,7 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
     let mut memory = Vec::new();
     for (least, likely) in sizes {
         let running = NewJob {
-            needs: Needs {
+            requirements: ResourceRequirements {
                 memory: least,
                 likely_memory: likely,
                 clip: None,

@@ -3,7 +3,7 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use super::super::{JobKind, JobRow, JobState, LedgerError, Needs, NewJob};
+use super::super::{JobKind, JobRow, JobState, LedgerError, NewJob, ResourceRequirements};
 use super::Factory;
 use super::fixture::*;
 
@@ -16,7 +16,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         spec: vec![0, 255, 128],
         inputs: vec![input, input],
         priority: -10,
-        needs: Needs {
+        requirements: ResourceRequirements {
             memory: Some(1),
             likely_memory: Some(i64::MAX),
             clip: Some("ab".repeat(32)),
@@ -31,7 +31,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         kind: JobKind::Verify,
         spec: new.spec,
         priority: -10,
-        needs: new.needs,
+        requirements: new.requirements,
         state: JobState::Queued,
         cancel_requested: false,
         attempt: 0,

@@ -2,33 +2,101 @@
 //! changes.
 use std::time::Duration;
 
-use sqlx::postgres::PgRow;
-use sqlx::{PgConnection, Row};
+use sqlx::Row;
 
 use super::super::transition::{Next, after_attempt, after_release, end_of};
-use super::super::types::{Completion, Failure, JobId, JobRow};
-use super::super::{LedgerError, Result};
+use super::super::types::{Completion, Failure, JobId, JobRow, Lease};
+use super::super::workers::WorkerCapabilities;
+use super::super::{JobQueue, LedgerError, Result, token};
 use super::transition::leave;
-use super::{artifacts, jobs, keys, rows};
+use super::{DbConnection, DbLedger, DbRow, artifacts, jobs, keys, presence, queue, rows};
+
+#[tonic::async_trait]
+impl JobQueue for DbLedger {
+    async fn claim_for(&self, capabilities: &WorkerCapabilities, lease: Duration, now: i64) -> Result<Option<Lease>> {
+        let capabilities = capabilities.clone();
+        self.change(with!([capabilities] db => queue::claim(db, &capabilities, lease, now)))
+            .await
+    }
+
+    async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.read(with!([token] db => leased(db, id, &token))).await
+    }
+
+    async fn report(
+        &self,
+        id: JobId,
+        token: &str,
+        progress: Option<Vec<u8>>,
+        lease: Duration,
+        now: i64,
+    ) -> Result<bool> {
+        let token = token::hash(token);
+        self.change(with!([token, progress] db => report(db, id, &token, progress.as_deref(), lease, now)))
+            .await
+    }
+
+    async fn complete(&self, id: JobId, token: &str, completion: Completion, now: i64) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.change(with!([token, completion] db => complete(db, id, &token, &completion, now)))
+            .await
+    }
+
+    async fn fail(
+        &self,
+        id: JobId,
+        token: &str,
+        failure: Option<Failure>,
+        retryable: bool,
+        cancelled: bool,
+        now: i64,
+    ) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.change(with!([token, failure] db => fail(db, id, &token, failure, retryable, cancelled, now)))
+            .await
+    }
+
+    async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow> {
+        let token = token::hash(token);
+        self.change(with!([token] db => release(db, id, &token, now))).await
+    }
+
+    async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()> {
+        self.change(with!([] db => presence::renew(db, lease, now))).await
+    }
+
+    async fn reap(&self, now: i64) -> Result<Vec<JobId>> {
+        self.change(with!([] db => presence::reap(db, now))).await
+    }
+
+    async fn queue(&self) -> Result<Vec<JobId>> {
+        self.read(with!([] db => queue::all(db))).await
+    }
+
+    async fn queue_depth(&self) -> Result<i64> {
+        self.read(with!([] db => jobs::queue_depth(db))).await
+    }
+}
 
 /// The job, if the token with this hash is its lease.
-pub(super) async fn leased(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+pub(super) async fn leased(db: &mut DbConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
     let query = sqlx::query("SELECT * FROM jobs WHERE id = $1").bind(id);
     holds(query.fetch_optional(db).await?, id, token)
 }
 
 /// The same, and the lease stays what it is until the transaction ends.
-pub(super) async fn leased_meanwhile(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
-    let query = sqlx::query("SELECT * FROM jobs WHERE id = $1 FOR SHARE").bind(id);
+pub(super) async fn leased_meanwhile(db: &mut DbConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+    let query = sqlx::query(concat!("SELECT * FROM jobs WHERE id = $1", for_share!())).bind(id);
     holds(query.fetch_optional(db).await?, id, token)
 }
 
 /// The same, for whoever is going to change the job.
-async fn leased_alone(db: &mut PgConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
+async fn leased_alone(db: &mut DbConnection, id: JobId, token: &[u8]) -> Result<JobRow> {
     holds(jobs::locked(db, id).await?, id, token)
 }
 
-fn holds(row: Option<PgRow>, id: JobId, token: &[u8]) -> Result<JobRow> {
+fn holds(row: Option<DbRow>, id: JobId, token: &[u8]) -> Result<JobRow> {
     let row = row.ok_or_else(|| LedgerError::no_job(id))?;
     let current: Option<Vec<u8>> = row.try_get("lease_token")?;
     if current.as_deref() == Some(token) {
@@ -39,7 +107,7 @@ fn holds(row: Option<PgRow>, id: JobId, token: &[u8]) -> Result<JobRow> {
 }
 
 pub(super) async fn report(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: JobId,
     token: &[u8],
     progress: Option<&[u8]>,
@@ -64,7 +132,7 @@ pub(super) async fn report(
 }
 
 pub(super) async fn complete(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: JobId,
     token: &[u8],
     completion: &Completion,
@@ -100,14 +168,14 @@ pub(super) async fn complete(
 }
 
 /// Whether this attempt completed the job in just this way before.
-fn completed(row: &PgRow, token: &[u8], fingerprint: &[u8]) -> Result<bool> {
+fn completed(row: &DbRow, token: &[u8], fingerprint: &[u8]) -> Result<bool> {
     let by: Option<Vec<u8>> = row.try_get("completed_token")?;
     let said: Option<Vec<u8>> = row.try_get("completed_fingerprint")?;
     Ok(by.as_deref() == Some(token) && said.as_deref() == Some(fingerprint))
 }
 
 pub(super) async fn fail(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: JobId,
     token: &[u8],
     failure: Option<Failure>,
@@ -120,7 +188,7 @@ pub(super) async fn fail(
     leave(db, id, next, now).await
 }
 
-pub(super) async fn release(db: &mut PgConnection, id: JobId, token: &[u8], now: i64) -> Result<JobRow> {
+pub(super) async fn release(db: &mut DbConnection, id: JobId, token: &[u8], now: i64) -> Result<JobRow> {
     let job = leased_alone(db, id, token).await?;
     leave(db, id, after_release(&job), now).await
 }

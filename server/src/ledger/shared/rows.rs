@@ -1,27 +1,27 @@
 //! Rows of the tables, read into the ledger's types.
 use sqlx::Row;
-use sqlx::postgres::PgRow;
 
-use super::super::queue::{Needs, SeenWorker};
 use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
-use super::super::{Result, numbers};
+use super::super::workers::{ResourceRequirements, SeenWorker};
+use super::super::{Result, discriminants};
+use super::DbRow;
 
-pub(super) fn job(row: &PgRow) -> Result<JobRow> {
+pub(super) fn job(row: &DbRow) -> Result<JobRow> {
     let reason: Option<i32> = row.try_get("failure_reason")?;
     let message: Option<String> = row.try_get("failure_message")?;
     Ok(JobRow {
         id: row.try_get("id")?,
         project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
-        kind: numbers::job_kind(number(row, "kind")?)?,
+        kind: discriminants::job_kind(number(row, "kind")?)?,
         spec: row.try_get("spec")?,
         priority: row.try_get("priority")?,
-        needs: Needs {
+        requirements: ResourceRequirements {
             memory: row.try_get("memory")?,
             likely_memory: row.try_get("likely_memory")?,
             clip: row.try_get("clip")?,
         },
-        state: numbers::job_state(number(row, "state")?)?,
+        state: discriminants::job_state(number(row, "state")?)?,
         cancel_requested: row.try_get("cancel_requested")?,
         attempt: row.try_get("attempt")?,
         max_attempts: row.try_get("max_attempts")?,
@@ -39,7 +39,7 @@ pub(super) fn job(row: &PgRow) -> Result<JobRow> {
     })
 }
 
-pub(super) fn worker(row: &PgRow) -> Result<SeenWorker> {
+pub(super) fn worker(row: &DbRow) -> Result<SeenWorker> {
     let clips: String = row.try_get("clips")?;
     Ok(SeenWorker {
         name: row.try_get("name")?,
@@ -49,7 +49,7 @@ pub(super) fn worker(row: &PgRow) -> Result<SeenWorker> {
     })
 }
 
-pub(super) fn artifact(row: &PgRow) -> Result<ArtifactRow> {
+pub(super) fn artifact(row: &DbRow) -> Result<ArtifactRow> {
     Ok(ArtifactRow {
         id: row.try_get("id")?,
         project: row.try_get("project")?,
@@ -59,12 +59,12 @@ pub(super) fn artifact(row: &PgRow) -> Result<ArtifactRow> {
         job: row.try_get("job_id")?,
         secret: row.try_get("secret")?,
         path: row.try_get("path")?,
-        state: numbers::artifact_state(number(row, "state")?)?,
+        state: discriminants::artifact_state(number(row, "state")?)?,
         create_time: row.try_get("create_time")?,
     })
 }
 
-pub(super) fn key(row: &PgRow) -> Result<KeyRow> {
+pub(super) fn key(row: &DbRow) -> Result<KeyRow> {
     let bits = number(row, "bits")?;
     Ok(KeyRow {
         id: row.try_get("id")?,
@@ -80,18 +80,18 @@ pub(super) fn key(row: &PgRow) -> Result<KeyRow> {
         create_time: row.try_get("create_time")?,
         job: row.try_get("job_id")?,
         artifact: row.try_get("artifact_id")?,
-        state: numbers::key_state(number(row, "state")?)?,
+        state: discriminants::key_state(number(row, "state")?)?,
         state_reason: row.try_get("state_reason")?,
         state_time: row.try_get("state_time")?,
     })
 }
 
-pub(super) fn number(row: &PgRow, column: &str) -> Result<i64> {
+pub(super) fn number(row: &DbRow, column: &str) -> Result<i64> {
     Ok(i64::from(row.try_get::<i32, _>(column)?))
 }
 
 /// A value that always has so many bytes.
-pub(super) fn bytes<const N: usize>(row: &PgRow, column: &str) -> Result<[u8; N]> {
+pub(super) fn bytes<const N: usize>(row: &DbRow, column: &str) -> Result<[u8; N]> {
     let bytes: Vec<u8> = row.try_get(column)?;
     <[u8; N]>::try_from(bytes).map_err(|bytes| {
         sqlx::Error::ColumnDecode {

@@ -1,82 +1,70 @@
-//! What operators ask: counts, attempts, and another try.
-use sqlx::postgres::PgRow;
-use sqlx::{Connection, PgConnection, Row};
-use uuid::Uuid;
+//! How much there is to do, and how much a project takes.
+use sqlx::{Connection as _, Row};
 
-use super::super::operations::{AttemptRow, OperationsLedger, Outcome, Running, Tally, Waiting, count};
-use super::super::types::{ArtifactId, Failure, JobId, JobRow, JobState};
-use super::super::{LedgerError, Result, numbers};
-use super::{PostgresLedger, jobs, rows, with};
+use super::super::statistics::{Running, Statistics, Tally, Usage, Waiting, count};
+use super::super::{LedgerError, Result, discriminants};
+use super::{DbConnection, DbLedger, SNAPSHOT, rows};
 
 /// Queued jobs by kind.
-pub(super) const QUEUED: &str =
-    "SELECT kind, count(*) AS count, min(queue_time) AS since FROM jobs WHERE state = 1 GROUP BY kind";
+pub(super) const QUEUED: &str = concat!(
+    "SELECT kind, count(*) AS count, min(queue_time) AS since FROM jobs",
+    indexed_by!("jobs_queue"),
+    " WHERE state = 1 GROUP BY kind"
+);
 
-/// Running jobs by kind. The sum is one without limits.
-pub(super) const RUNNING: &str = "SELECT kind, count(*) AS count, \
-    least(coalesce(sum(coalesce(likely_memory, memory)), 0), 9223372036854775807)::bigint AS memory \
-    FROM jobs WHERE state = 2 GROUP BY kind";
+/// Running jobs by kind.
+pub(super) const RUNNING: &str = concat!(
+    "SELECT kind, count(*) AS count, ",
+    total!("coalesce(likely_memory, memory)"),
+    " AS memory FROM jobs",
+    indexed_by!("jobs_leases"),
+    " WHERE state = 2 GROUP BY kind"
+);
 
 /// Failed jobs by kind and reason.
-pub(super) const FAILED: &str = "SELECT kind, coalesce(failure_reason, 0) AS reason, count(*) AS count \
-    FROM jobs WHERE state = 4 GROUP BY kind, failure_reason";
+pub(super) const FAILED: &str = concat!(
+    "SELECT kind, coalesce(failure_reason, 0) AS reason, count(*) AS count FROM jobs",
+    indexed_by!("jobs_failed"),
+    " WHERE state = 4 GROUP BY kind, failure_reason"
+);
 
-/// A page of a project's jobs that failed for one of some reasons.
-pub(super) const PAGE_OF_FAILED: &str = "SELECT * FROM jobs WHERE project = $4 AND state = 4 \
-    AND coalesce(failure_reason, 0) = ANY($5) AND (create_time, id) < ($1, $2) \
-    ORDER BY create_time DESC, id DESC LIMIT $3";
+/// What a project takes; both from indexes alone. PostgreSQL's sum of bigints is of another type.
+pub(super) const USAGE: &str = "SELECT \
+    (SELECT count(*) FROM jobs WHERE project = $1 AND state = 1) AS queued_jobs, \
+    (SELECT CAST(coalesce(sum(size), 0) AS bigint) FROM artifacts WHERE project = $1 AND state IN (2, 3)) AS artifact_bytes";
 
 #[tonic::async_trait]
-impl OperationsLedger for PostgresLedger {
+impl Statistics for DbLedger {
     async fn tally(&self) -> Result<Tally> {
-        self.database.read(with!([] db => tally(db))).await
+        self.read(with!([] db => tally(db))).await
     }
 
-    async fn list_failed(
-        &self,
-        project: &str,
-        reasons: &[i32],
-        before: Option<(i64, JobId)>,
-        limit: u32,
-    ) -> Result<Vec<JobRow>> {
-        let (project, reasons) = (project.to_owned(), reasons.to_vec());
-        self.database
-            .read(with!([project, reasons] db => list_failed(db, &project, &reasons, before, limit)))
-            .await
-    }
-
-    async fn attempts(&self, job: JobId) -> Result<Vec<AttemptRow>> {
-        self.database.read(with!([] db => attempts(db, job))).await
-    }
-
-    async fn requeue(&self, job: JobId, inputs: &[ArtifactId], now: i64) -> Result<JobRow> {
-        let inputs = inputs.to_vec();
-        self.database
-            .change(with!([inputs] db => requeue(db, job, &inputs, now)))
-            .await
+    async fn usage(&self, project: &str) -> Result<Usage> {
+        let project = project.to_owned();
+        self.read(with!([project] db => usage(db, &project))).await
     }
 }
 
-async fn tally(db: &mut PgConnection) -> Result<Tally> {
+async fn tally(db: &mut DbConnection) -> Result<Tally> {
     // One snapshot, so that no job is counted twice, or not at all.
-    let mut db = db.begin_with("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY").await?;
+    let mut db = db.begin_with(SNAPSHOT).await?;
     let mut tally = Tally::default();
     for row in sqlx::query(QUEUED).fetch_all(&mut *db).await? {
         tally.queued.push(Waiting {
-            kind: numbers::job_kind(rows::number(&row, "kind")?)?,
+            kind: discriminants::job_kind(rows::number(&row, "kind")?)?,
             count: count(row.try_get("count")?),
             since: row.try_get("since")?,
         });
     }
     for row in sqlx::query(RUNNING).fetch_all(&mut *db).await? {
         tally.running.push(Running {
-            kind: numbers::job_kind(rows::number(&row, "kind")?)?,
+            kind: discriminants::job_kind(rows::number(&row, "kind")?)?,
             count: count(row.try_get("count")?),
             memory: count(row.try_get("memory")?),
         });
     }
     for row in sqlx::query(FAILED).fetch_all(&mut *db).await? {
-        let kind = numbers::job_kind(rows::number(&row, "kind")?)?;
+        let kind = discriminants::job_kind(rows::number(&row, "kind")?)?;
         tally
             .failed
             .push((kind, row.try_get("reason")?, count(row.try_get("count")?)));
@@ -85,48 +73,11 @@ async fn tally(db: &mut PgConnection) -> Result<Tally> {
     Ok(tally)
 }
 
-async fn list_failed(
-    db: &mut PgConnection,
-    project: &str,
-    reasons: &[i32],
-    before: Option<(i64, JobId)>,
-    limit: u32,
-) -> Result<Vec<JobRow>> {
-    let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
-    let query = sqlx::query(PAGE_OF_FAILED).bind(time).bind(id).bind(i64::from(limit));
-    let found = query.bind(project).bind(reasons).fetch_all(db).await?;
-    found.iter().map(rows::job).collect()
-}
-
-async fn attempts(db: &mut PgConnection, job: JobId) -> Result<Vec<AttemptRow>> {
-    let query = sqlx::query("SELECT * FROM job_attempts WHERE job_id = $1 ORDER BY number DESC");
-    query.bind(job).fetch_all(db).await?.iter().map(attempt).collect()
-}
-
-async fn requeue(db: &mut PgConnection, id: JobId, inputs: &[ArtifactId], now: i64) -> Result<JobRow> {
-    let row = jobs::locked(db, id).await?.ok_or_else(|| LedgerError::no_job(id))?;
-    let job = rows::job(&row)?;
-    if job.state != JobState::Failed {
-        return Err(LedgerError::NotFailed(id));
-    }
-    jobs::inputs_are_there(db, &job.project, inputs).await?;
-    let queued = sqlx::query(
-        "UPDATE jobs SET state = 1, attempt = 0, progress = NULL, failure_reason = NULL, failure_message = NULL, \
-         end_time = NULL, run_after = NULL, queue_time = $2, update_time = $2, revision = revision + 1 \
-         WHERE id = $1 RETURNING *",
-    );
-    rows::job(&queued.bind(id).bind(now).fetch_one(db).await?)
-}
-
-fn attempt(row: &PgRow) -> Result<AttemptRow> {
-    let reason: Option<i32> = row.try_get("failure_reason")?;
-    let message: Option<String> = row.try_get("failure_message")?;
-    Ok(AttemptRow {
-        number: row.try_get("number")?,
-        worker: row.try_get("worker")?,
-        start_time: row.try_get("start_time")?,
-        end_time: row.try_get("end_time")?,
-        outcome: Outcome::from_number(rows::number(row, "outcome")?)?,
-        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+async fn usage(db: &mut DbConnection, project: &str) -> Result<Usage> {
+    let row = sqlx::query(USAGE).bind(project).fetch_one(db).await?;
+    let number = |column| Ok::<_, LedgerError>(u64::try_from(row.try_get::<i64, _>(column)?).unwrap_or_default());
+    Ok(Usage {
+        queued_jobs: number("queued_jobs")?,
+        artifact_bytes: number("artifact_bytes")?,
     })
 }

@@ -5,7 +5,8 @@ use sqlx::{Connection, Row, SqliteConnection};
 
 use super::super::super::conformance::fixture::*;
 use super::super::super::{
-    JobState, KeyState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, SqliteLedger,
+    CommitmentLog, JobQueue, JobState, JobStore, KeyState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED,
+    REASON_WORKER_LOST, SqliteLedger,
 };
 use super::super::open;
 use super::Folder;

@@ -5,7 +5,7 @@ use futures::future::join_all;
 use uuid::Uuid;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Ledger, LedgerError, NewJob};
+use super::super::super::{JobQueue, JobStore, LedgerError, NewJob};
 use super::Folder;
 use super::file::raw;
 
