@@ -4,9 +4,10 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use futures::{StreamExt, TryStreamExt, stream};
+use guardsplat_proto::v1::{KeyResult, KeySpec};
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobKind, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, Registry,
+    Completion, JobResult, JobSpec, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, Registry,
     ResourceRequirements, SqliteLedger, candidates,
 };
 use guardsplat_server::notary::{self, Notary};
@@ -106,8 +107,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         id: Uuid::now_v7(),
         project: DEFAULT_PROJECT.into(),
         display_name: "key".into(),
-        kind: JobKind::CreateKey,
-        spec: Vec::new(),
+        spec: JobSpec::CreateKey(KeySpec::default()),
         inputs: Vec::new(),
         key: None,
         request_id: None,
@@ -149,7 +149,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
     };
     let id = key.id;
     let completion = Completion {
-        result: Vec::new(),
+        result: JobResult::CreateKey(KeyResult::default()),
         outputs: Vec::new(),
         key: Some(key),
         fingerprint: [0; 32],

@@ -27,7 +27,7 @@ impl Api {
             if self.is_known(project, submission).await? {
                 return Ok(ResourceRequirements::default());
             }
-            self.room_for_job(project, submission.kind).await?;
+            self.room_for_job(project, submission.spec.kind()).await?;
         }
         if full {
             return Err(Error::QueueFull {
@@ -50,9 +50,9 @@ impl Api {
             return Ok(ResourceRequirements::default());
         };
         if let Some(limit) = limits.max_job_memory {
-            check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
+            check(&Kind::Artifact.name(scene), submission.spec.kind(), &summary, limit)?;
         }
-        let (least, likely) = taken(submission.kind, &summary);
+        let (least, likely) = taken(submission.spec.kind(), &summary);
         let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
         Ok(ResourceRequirements {
             memory: bytes(least),
@@ -107,7 +107,7 @@ impl Api {
 
 /// The artifact that is a scene, or may be one: a worker takes several suspects for pictures.
 fn scene_of(submission: &Submission) -> Option<ArtifactId> {
-    match (submission.kind, &submission.inputs[..]) {
+    match (submission.spec.kind(), &submission.inputs[..]) {
         (JobKind::Embed | JobKind::Verify, [scene]) => Some(*scene),
         _ => None,
     }

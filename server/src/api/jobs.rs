@@ -45,13 +45,13 @@ impl JobService for Api {
         let caller = caller(&request)?;
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
         let job = self.own_job(&caller.project, id).await?;
-        caller.must(own::scope_of(job.kind))?;
+        caller.must(own::scope_of(job.kind()))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
         // A running job ends when its worker has heard of it.
         self.metrics().job_ended(&row);
         self.changes().job(id);
         self.changes().queue_moved();
-        Ok(Response::new(convert::job(row)?))
+        Ok(Response::new(convert::job(row)))
     }
 
     type WatchJobStream = BoxStream<'static, Result<WatchJobResponse, Status>>;
@@ -94,7 +94,7 @@ fn urgency(submission: &Submission, highest: i32) -> Result<i32> {
             format!("is {priority}, the highest that this server takes is {highest}"),
         )),
         Some(priority) => Ok(priority),
-        None if submission.kind == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
+        None if submission.spec.kind() == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
         None => Ok(highest.min(0)),
     }
 }
@@ -102,7 +102,7 @@ fn urgency(submission: &Submission, highest: i32) -> Result<i32> {
 impl Api {
     async fn submit(&self, request: CreateJobRequest, trace_parent: Option<String>, caller: &Caller) -> Result<Job> {
         let submission = submission::check(request)?;
-        caller.must(own::scope_of(submission.kind))?;
+        caller.must(own::scope_of(submission.spec.kind()))?;
         let project = caller.project.as_str();
         let mut clip = None;
         if let Some(id) = submission.key {
@@ -110,7 +110,7 @@ impl Api {
             if let Some((field, text)) = &submission.message {
                 message::check(field, text, key.bits)?;
             }
-            if let Err(error) = keys::usable(&key, submission.kind)
+            if let Err(error) = keys::usable(&key, submission.spec.kind())
                 && !self.is_known(project, &submission).await?
             {
                 return Err(error);
@@ -120,7 +120,7 @@ impl Api {
             }
             clip = Some(key.clip_sha256).filter(|hash| !hash.is_empty());
         }
-        if submission.kind == JobKind::Verify {
+        if submission.spec.kind() == JobKind::Verify {
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
         let priority = urgency(&submission, self.limits().max_priority)?;
@@ -131,7 +131,6 @@ impl Api {
             id: Uuid::now_v7(),
             project: project.to_owned(),
             display_name: submission.display_name,
-            kind: submission.kind,
             spec: submission.spec,
             inputs: submission.inputs,
             key: submission.key,
@@ -148,7 +147,7 @@ impl Api {
         let row = row.map_err(|error| own::as_asked(error, submission.request_id))?;
         // A request that was sent again has made its job before.
         if row.id == id {
-            self.metrics().created(row.kind);
+            self.metrics().created(row.kind());
         }
         self.changes().queue_grew();
         self.told(row).await

@@ -3,9 +3,7 @@ use std::time::Duration;
 
 use futures::stream::{self, BoxStream, StreamExt};
 use guardsplat_proto::v1::job::Spec;
-use guardsplat_proto::v1::{
-    DownloadKeyResponse, EmbedSpec, Job, LeaseJobRequest, LeaseJobResponse, VerifySpec, failure,
-};
+use guardsplat_proto::v1::{DownloadKeyResponse, Job, LeaseJobRequest, LeaseJobResponse};
 use secrecy::ExposeSecret;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
@@ -18,7 +16,7 @@ use super::status::chain;
 use super::{Api, clock, convert};
 use crate::artifacts::{ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
-use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, WorkerCapabilities};
+use crate::ledger::{Failure, FailureReason, JobRow, JobSpec, KeyId, KeyRow, KeyState, Lease, WorkerCapabilities};
 use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
@@ -71,7 +69,7 @@ impl Api {
 
     /// A job as its worker is told it: with the word to embed, where that is an asset's.
     async fn for_worker(&self, lease: &Lease) -> Result<Job> {
-        let mut job = convert::job(lease.job.clone())?;
+        let mut job = convert::job(lease.job.clone());
         if let Some(Spec::Embed(spec)) = &mut job.spec
             && let Some(word) = self.word_of(spec).await?
         {
@@ -85,7 +83,7 @@ impl Api {
         let id = lease.job.id;
         tracing::error!(job = %id, error = %chain(error), "could not be given to a worker");
         let failure = Failure {
-            reason: failure::Reason::Internal.into(),
+            reason: FailureReason::Internal,
             message: error.to_string(),
         };
         let failed = self
@@ -113,7 +111,7 @@ impl Api {
                 if let Some(span) = &span {
                     lease.job.trace_parent = Some(traces::text(traces::context(span)));
                 }
-                let (id, kind, now) = (lease.job.id, lease.job.kind, Instant::now().into_std());
+                let (id, kind, now) = (lease.job.id, lease.job.kind(), Instant::now().into_std());
                 api.stages().begin(id, kind, span, now);
                 api.changes().job(lease.job.id);
                 api.changes().queue_moved();
@@ -178,7 +176,7 @@ impl Api {
             name: Kind::Key.name(key.id),
         };
         let failure = Failure {
-            reason: failure::Reason::InvalidInput.into(),
+            reason: FailureReason::InvalidInput,
             message: format!("{refusal}; the reason that was given: {}", key.state_reason),
         };
         let failed = self
@@ -196,10 +194,10 @@ impl Api {
 }
 
 pub(super) fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
-    let name = match job.kind {
-        JobKind::Embed => convert::decode::<EmbedSpec>(&job.spec)?.key,
-        JobKind::Verify => convert::decode::<VerifySpec>(&job.spec)?.key,
-        JobKind::CreateKey => return Ok(None),
+    let name = match &job.spec {
+        JobSpec::Embed(spec) => &spec.key,
+        JobSpec::Verify(spec) => &spec.key,
+        JobSpec::CreateKey(_) => return Ok(None),
     };
-    Kind::Key.parse("job.key", &name).map(Some)
+    Kind::Key.parse("job.key", name).map(Some)
 }

@@ -98,7 +98,7 @@ impl Api {
         };
         Ok(Job {
             waiting_reason: waiting_reason.unwrap_or_default(),
-            ..convert::job(row)?
+            ..convert::job(row)
         })
     }
 }

@@ -5,11 +5,10 @@ use futures::stream::BoxStream;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::worker_service_server::WorkerService;
 use guardsplat_proto::v1::{
-    Artifact, CompleteJobRequest, CompleteJobResponse, DownloadKeyRequest, DownloadKeyResponse, EmbedResult,
-    FailJobRequest, FailJobResponse, Failure, LeaseJobRequest, LeaseJobResponse, Progress, ReleaseJobRequest,
-    ReleaseJobResponse, ReportJobRequest, ReportJobResponse, UploadOutputRequest, failure,
+    Artifact, CompleteJobRequest, CompleteJobResponse, DownloadKeyRequest, DownloadKeyResponse, FailJobRequest,
+    FailJobResponse, Failure, LeaseJobRequest, LeaseJobResponse, Progress, ReleaseJobRequest, ReleaseJobResponse,
+    ReportJobRequest, ReportJobResponse, UploadOutputRequest, failure,
 };
-use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::claims::Told;
@@ -18,7 +17,7 @@ use super::problems::Problems;
 use super::upload::Incoming;
 use super::{Api, clock, completion, convert, text};
 use crate::error::{Error, Result};
-use crate::ledger::{self, JobKind, JobRow};
+use crate::ledger::{self, FailureReason, JobResult, JobRow};
 use crate::metrics;
 
 /// Most bytes of a failure's message; the rest is cut off.
@@ -85,7 +84,7 @@ impl WorkerService for Api {
         // What is said again was counted before.
         if !job.state.is_over() {
             self.count_mark(&done);
-            self.metrics().memory_taken(done.kind, peak, on_device);
+            self.metrics().memory_taken(done.kind(), peak, on_device);
             self.attempt_over(&done);
         }
         Ok(Response::new(CompleteJobResponse {}))
@@ -113,7 +112,7 @@ impl WorkerService for Api {
             .await;
         let failed = failed.map_err(Error::from)?;
         self.metrics()
-            .memory_taken(failed.kind, peak_memory_bytes, peak_device_memory_bytes);
+            .memory_taken(failed.kind(), peak_memory_bytes, peak_device_memory_bytes);
         self.attempt_over(&failed);
         Ok(Response::new(FailJobResponse {}))
     }
@@ -137,7 +136,7 @@ impl Api {
         } = request;
         let id = Kind::Job.parse("name", &name)?;
         let stage = progress.as_ref().map(Progress::stage);
-        let progress = progress.map(encoded_progress).transpose()?;
+        let progress = progress.map(checked_progress).transpose()?;
         let (lease, now) = (self.limits().lease, Instant::now());
         let Some(progress) = self.reports().due(id, &token, progress, lease, now) else {
             let job = self.ledger().leased_job(id, &token).await?;
@@ -185,16 +184,13 @@ impl Api {
 
     /// Counts a marked scene that is handed out.
     fn count_mark(&self, job: &JobRow) {
-        if job.kind == JobKind::Embed
-            && let Some(result) = &job.result
-            && let Ok(result) = convert::decode::<EmbedResult>(result)
-        {
-            self.metrics().marked(&result);
+        if let Some(JobResult::Embed(result)) = &job.result {
+            self.metrics().marked(result);
         }
     }
 }
 
-fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
+fn checked_progress(progress: Progress) -> Result<Progress> {
     let mut problems = Problems::default();
     let stage = Stage::try_from(progress.stage).ok();
     let known = stage.is_some_and(|stage| stage != Stage::Unspecified);
@@ -202,7 +198,7 @@ fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
     problems.check(progress.done >= 0, "progress.done", "is negative");
     problems.check(progress.total >= 0, "progress.total", "is negative");
     problems.finish()?;
-    Ok(progress.encode_to_vec())
+    Ok(progress)
 }
 
 fn checked_failure(failure: Option<Failure>) -> Result<ledger::Failure> {
@@ -221,7 +217,7 @@ fn checked_failure(failure: Option<Failure>) -> Result<ledger::Failure> {
         }
     }
     Ok(ledger::Failure {
-        reason: failure.reason,
+        reason: FailureReason::from_number(failure.reason),
         message: text::shortened(failure.message, MAX_FAILURE_BYTES),
     })
 }

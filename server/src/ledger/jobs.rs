@@ -1,7 +1,7 @@
 //! Jobs as their owners see them: queued, looked at, listed, cancelled, tried again.
 use uuid::Uuid;
 
-use super::types::{ArtifactId, Failure, JobId, JobRow, JobState, NewJob};
+use super::types::{ArtifactId, Failure, FailureReason, JobId, JobRow, JobState, NewJob};
 use super::{LedgerError, Result};
 
 /// How an attempt ended. Numbers are kept in the database, and are those of `guardsplat.v1.JobAttempt.Outcome`.
@@ -88,7 +88,7 @@ pub trait JobStore: Send + Sync + 'static {
     async fn list_failed(
         &self,
         project: &str,
-        reasons: &[i32],
+        reasons: &[FailureReason],
         before: Option<(i64, JobId)>,
         limit: u32,
     ) -> Result<Vec<JobRow>>;
@@ -110,8 +110,7 @@ pub trait JobStore: Send + Sync + 'static {
     async fn requeue(&self, job: JobId, inputs: &[ArtifactId], now: i64) -> Result<JobRow>;
 }
 
-/// Reasons as bits, for a database that takes no lists.
-pub(super) fn bits(reasons: &[i32]) -> i64 {
-    let bit = |&reason: &i32| u32::try_from(reason).ok().and_then(|reason| 1_i64.checked_shl(reason));
-    reasons.iter().filter_map(bit).fold(0, |all, bit| all | bit)
+/// Reasons as bits, as not every database takes lists.
+pub(super) fn bits(reasons: &[FailureReason]) -> i64 {
+    reasons.iter().fold(0, |all, &reason| all | 1 << reason as i32)
 }

@@ -15,6 +15,7 @@ mod shared;
 mod artifacts;
 pub mod candidates;
 mod chain;
+mod codec;
 mod commitments;
 #[cfg(test)]
 pub mod conformance;
@@ -36,6 +37,7 @@ mod token;
 mod tokens;
 mod transition;
 mod types;
+mod work;
 mod workers;
 
 use tokio::sync::broadcast;
@@ -60,9 +62,10 @@ pub use sqlite::SqliteLedger;
 pub use statistics::{Running, Statistics, Tally, Usage, Waiting};
 pub use tokens::{NewToken, TokenId, TokenLedger, TokenRow};
 pub use types::{
-    ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, JobState, KeyId, KeyRow,
-    Lease, NewArtifact, NewJob, NewKey, Origin, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
+    ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobRow, JobState,
+    KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey, Origin,
 };
+pub use work::{JobResult, JobSpec, Progress};
 pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPresence};
 
 /// What the service keeps of its work, by capability. A call that returned `Ok` is on disk.

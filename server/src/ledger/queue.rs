@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::Result;
 use super::types::{Completion, Failure, JobId, JobRow, Lease};
+use super::work::Progress;
 use super::workers::WorkerCapabilities;
 
 /// What may be asked for.
@@ -44,7 +45,7 @@ pub trait JobQueue: Send + Sync + 'static {
         &self,
         id: JobId,
         token: &str,
-        progress: Option<Vec<u8>>,
+        progress: Option<Progress>,
         lease: Duration,
         now: i64,
     ) -> Result<bool>;

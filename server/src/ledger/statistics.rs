@@ -1,6 +1,6 @@
 //! How much there is to do, and how much a project takes.
 use super::Result;
-use super::types::JobKind;
+use super::types::{FailureReason, JobKind};
 
 /// How many jobs there are to do, being done, and given up.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub struct Tally {
     /// Running jobs by kind; a kind of which none runs may be missing.
     pub running: Vec<Running>,
     /// Failed jobs by kind and reason.
-    pub failed: Vec<(JobKind, i32, u64)>,
+    pub failed: Vec<(JobKind, FailureReason, u64)>,
 }
 
 /// The queued jobs of a kind.

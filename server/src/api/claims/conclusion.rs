@@ -3,17 +3,15 @@ use guardsplat_codeword::{Answer, Framing, ReadPayload, Verdict};
 use guardsplat_evidence::{Evidence, View};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
-use prost::Message as _;
 
 use super::decision::Decided;
 use super::{Claim, framing, of_job};
-use crate::api::convert::decode;
 use crate::api::evidence::{Facts, Files, Read};
 use crate::api::lease::needed_key;
 use crate::api::names::Kind;
 use crate::api::{Api, evidence};
 use crate::error::{Error, Result};
-use crate::ledger::{Completion, JobKind, JobRow, KeyRow};
+use crate::ledger::{Completion, JobResult, JobRow, KeyRow};
 
 /// What a worker told besides the result.
 pub(in crate::api) struct Told {
@@ -48,9 +46,10 @@ impl Api {
             framings: framing::checked(&told.readings, key.bits)?,
             views: evidence::checked_views(&told.views)?,
         };
-        let report = match job.kind {
-            JobKind::Verify => self.verified(job, &key, &claim, told, completion).await?,
-            _ => self.marked(job, &key, &claim, told, completion).await?,
+        let report = match &mut completion.result {
+            JobResult::Embed(result) => self.marked(job, &key, &claim, told, result).await?,
+            JobResult::Verify(result) => self.verified(job, &key, &claim, told, result).await?,
+            JobResult::CreateKey(_) => return Ok(()),
         };
         let signed = guardsplat_evidence::sign(&report, self.notary().report_key())
             .map_err(|error| Error::internal("writing evidence", error))?;
@@ -60,20 +59,15 @@ impl Api {
         let json = json.await?;
         completion.outputs.extend([html, json]);
         let [evidence_html, evidence_json] = [html, json].map(|id| Kind::Artifact.name(id));
-        completion.result = match job.kind {
-            JobKind::Verify => VerifyResult {
-                evidence_html,
-                evidence_json,
-                ..decode(&completion.result)?
+        match &mut completion.result {
+            JobResult::Embed(result) => {
+                (result.evidence_html, result.evidence_json) = (evidence_html, evidence_json);
             }
-            .encode_to_vec(),
-            _ => EmbedResult {
-                evidence_html,
-                evidence_json,
-                ..decode(&completion.result)?
+            JobResult::Verify(result) => {
+                (result.evidence_html, result.evidence_json) = (evidence_html, evidence_json);
             }
-            .encode_to_vec(),
-        };
+            JobResult::CreateKey(_) => {}
+        }
         Ok(())
     }
 
@@ -89,7 +83,7 @@ impl Api {
         key: &KeyRow,
         claim: &Claim,
         told: Checked<'_>,
-        completion: &mut Completion,
+        result: &mut VerifyResult,
     ) -> Result<Evidence> {
         let Checked { told, framings, views } = told;
         if framings.is_empty() {
@@ -97,7 +91,7 @@ impl Api {
             return Err(Error::invalid("readings", reason));
         }
         let decided = self.decide(claim, key, &framings).await?;
-        let result = answered(decode(&completion.result)?, &decided, framings.len());
+        *result = answered(std::mem::take(result), &decided, framings.len());
         let facts = Facts {
             job,
             key,
@@ -111,7 +105,6 @@ impl Api {
             framings: framing::kinds(&told.readings),
             named: matches!(claim, Claim::Asset(_)),
         };
-        completion.result = result.encode_to_vec();
         evidence::of_verification(&facts, files, &read)
     }
 
@@ -121,10 +114,9 @@ impl Api {
         key: &KeyRow,
         claim: &Claim,
         told: Checked<'_>,
-        completion: &mut Completion,
+        result: &mut EmbedResult,
     ) -> Result<Evidence> {
         let Checked { told, framings, views } = told;
-        let mut result: EmbedResult = decode(&completion.result)?;
         // The word that was embedded is as secret as its pad.
         result.message.clear();
         let decided = match framings.is_empty() {
@@ -143,9 +135,8 @@ impl Api {
             device: &result.device,
             views,
         };
-        let files = Files::of_marking(self, job, &result).await?;
-        completion.result = result.encode_to_vec();
-        evidence::of_marking(&facts, files, &result, read.as_ref())
+        let files = Files::of_marking(self, job, result).await?;
+        evidence::of_marking(&facts, files, result, read.as_ref())
     }
 }
 

@@ -519,6 +519,9 @@ impl Server {
             .await
             .unwrap()
             .unwrap();
-        KeyResult::decode(row.result.unwrap().as_slice()).unwrap().key
+        match row.result {
+            Some(crate::ledger::JobResult::CreateKey(result)) => result.key,
+            other => panic!("{other:?}"),
+        }
     }
 }

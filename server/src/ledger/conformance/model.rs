@@ -140,7 +140,7 @@ impl Pair {
                 let Some((lease, id, token)) = self.lease(choice) else {
                     return;
                 };
-                let done = self.ledger.report(id, &token, news.map(|n| vec![n]), LEASE, now).await;
+                let done = self.ledger.report(id, &token, news.map(progress), LEASE, now).await;
                 let cancel = done.as_ref().ok().copied();
                 self.fenced(lease, &done, |job| {
                     assert_eq!(cancel, Some(job.cancel));
@@ -228,7 +228,7 @@ impl Pair {
             project: project.into(),
             priority,
             request_id,
-            spec: vec![u8::from(body)],
+            spec: spec(body.into()),
             fingerprint: [u8::from(body) + 2 * (priority + 1) as u8; 32],
             requirements: ResourceRequirements {
                 memory,
@@ -397,7 +397,7 @@ impl Pair {
                     job.state,
                     job.cancel,
                     job.attempt,
-                    job.progress.map(|p| vec![p]),
+                    job.progress.map(progress),
                     job.run_after,
                     job.revision
                 ),

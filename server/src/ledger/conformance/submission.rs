@@ -12,8 +12,7 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
     let input = upload(&*ledger, at(0)).await;
     let new = NewJob {
         display_name: "räumlich, \u{1f600}".into(),
-        kind: JobKind::Verify,
-        spec: vec![0, 255, 128],
+        spec: spec_of(JobKind::Verify),
         inputs: vec![input, input],
         priority: -10,
         requirements: ResourceRequirements {
@@ -28,7 +27,6 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         project: OURS.into(),
         id: new.id,
         display_name: new.display_name,
-        kind: JobKind::Verify,
         spec: new.spec,
         priority: -10,
         requirements: new.requirements,
@@ -69,7 +67,7 @@ pub(crate) async fn the_same_request_is_the_same_job(factory: &dyn Factory) {
     assert_eq!(ledger.create_job(again.clone(), at(5)).await.unwrap(), made);
 
     let other = NewJob {
-        spec: vec![3, 2, 1],
+        spec: spec(321),
         fingerprint: [8; 32],
         ..again.clone()
     };
@@ -110,13 +108,13 @@ pub(crate) async fn a_request_is_the_same_if_its_artifacts_hold_the_same(factory
         ledger.create_job(new, at(1))
     };
     // Other names for the same content; the same names, but nobody knows any more what they stood for.
-    let renamed = again(|new| new.spec = vec![4]).await.unwrap();
+    let renamed = again(|new| new.spec = spec(4)).await.unwrap();
     let gone = again(|new| new.fingerprint = [8; 32]).await.unwrap();
     assert_eq!([renamed.id, gone.id], [made.id; 2]);
     assert_eq!(renamed.spec, first.spec);
     for other in [
-        again(|new| (new.spec, new.fingerprint) = (vec![4], [8; 32])),
-        again(|new| (new.kind, new.fingerprint) = (JobKind::Verify, [8; 32])),
+        again(|new| (new.spec, new.fingerprint) = (spec(4), [8; 32])),
+        again(|new| (new.spec, new.fingerprint) = (spec_of(JobKind::Verify), [8; 32])),
         again(|new| (new.display_name, new.fingerprint) = ("another".into(), [8; 32])),
     ] {
         refused!(other.await, LedgerError::RequestIdReused(id) if Some(id) == first.request_id);

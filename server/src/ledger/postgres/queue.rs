@@ -5,7 +5,7 @@ use sqlx::{PgConnection, Row};
 
 use super::super::queue::PATIENCE;
 use super::super::transition::{end_of, micros};
-use super::super::types::{JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
+use super::super::types::{FailureReason, JobId, JobRow, JobState, Lease};
 use super::super::workers::WorkerCapabilities;
 use super::super::{Result, token};
 use super::{hooks, rows};
@@ -101,7 +101,7 @@ pub(super) async fn claim(
             .bind(token::hash(&token))
             .bind(end_of(lease, now))
             .bind(now)
-            .bind(REASON_ATTEMPTS_EXHAUSTED)
+            .bind(FailureReason::AttemptsExhausted as i32)
             .bind(now.saturating_sub(micros(PATIENCE)))
             .bind(capabilities.memory)
             .bind(capabilities.likely_memory)

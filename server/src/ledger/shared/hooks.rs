@@ -102,7 +102,7 @@ pub(super) async fn announce(db: &mut DbConnection, job: &JobRow, now: i64) -> R
     ));
     let wanting: Vec<Uuid> = wanting
         .bind(&job.project)
-        .bind(kind_bit(job.kind))
+        .bind(kind_bit(job.kind()))
         .bind(state_bit(job.state))
         .fetch_all(&mut *db)
         .await?;

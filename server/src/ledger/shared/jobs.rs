@@ -5,8 +5,8 @@ use sqlx::{Connection as _, Row};
 use uuid::Uuid;
 
 use super::super::transition::{self, Cancel, Next};
-use super::super::types::{ArtifactId, JobId, JobRow, JobState, NewJob};
-use super::super::{AttemptRow, JobStore, LedgerError, Result, idempotency};
+use super::super::types::{ArtifactId, FailureReason, JobId, JobRow, JobState, NewJob};
+use super::super::{AttemptRow, JobStore, LedgerError, Result, codec, idempotency};
 use super::transition::leave;
 use super::{DbConnection, DbLedger, DbRow, SNAPSHOT, inputs, queue, retries, rows};
 
@@ -55,7 +55,7 @@ impl JobStore for DbLedger {
     async fn list_failed(
         &self,
         project: &str,
-        reasons: &[i32],
+        reasons: &[FailureReason],
         before: Option<(i64, JobId)>,
         limit: u32,
     ) -> Result<Vec<JobRow>> {
@@ -100,8 +100,8 @@ pub(super) async fn create(db: &mut DbConnection, new: &NewJob, now: i64) -> Res
     )
     .bind(new.id)
     .bind(&new.display_name)
-    .bind(new.kind as i32)
-    .bind(&new.spec)
+    .bind(new.spec.kind() as i32)
+    .bind(codec::encode_spec(&new.spec))
     .bind(new.key)
     .bind(new.request_id)
     .bind(new.fingerprint.as_slice())

@@ -6,8 +6,9 @@ use sqlx::Row;
 
 use super::super::transition::{Next, after_attempt, after_release, end_of};
 use super::super::types::{Completion, Failure, JobId, JobRow, Lease};
+use super::super::work::Progress;
 use super::super::workers::WorkerCapabilities;
-use super::super::{JobQueue, LedgerError, Result, token};
+use super::super::{JobQueue, LedgerError, Result, codec, token};
 use super::transition::leave;
 use super::{DbConnection, DbLedger, DbRow, artifacts, jobs, keys, presence, queue, rows};
 
@@ -28,12 +29,12 @@ impl JobQueue for DbLedger {
         &self,
         id: JobId,
         token: &str,
-        progress: Option<Vec<u8>>,
+        progress: Option<Progress>,
         lease: Duration,
         now: i64,
     ) -> Result<bool> {
         let token = token::hash(token);
-        self.change(with!([token, progress] db => report(db, id, &token, progress.as_deref(), lease, now)))
+        self.change(with!([token, progress] db => report(db, id, &token, progress.as_ref(), lease, now)))
             .await
     }
 
@@ -110,12 +111,13 @@ pub(super) async fn report(
     db: &mut DbConnection,
     id: JobId,
     token: &[u8],
-    progress: Option<&[u8]>,
+    progress: Option<&Progress>,
     lease: Duration,
     now: i64,
 ) -> Result<bool> {
     let job = leased_alone(db, id, token).await?;
-    let news = progress.is_some() && progress != job.progress.as_deref();
+    let progress = progress.map(codec::encode_progress);
+    let news = progress.is_some() && progress != job.progress.as_ref().map(codec::encode_progress);
     sqlx::query(
         "UPDATE jobs SET lease_expires = $2, progress = CASE WHEN $3 THEN $4 ELSE progress END, \
          update_time = CASE WHEN $3 THEN $5 ELSE update_time END, \
@@ -150,7 +152,9 @@ pub(super) async fn complete(
     {
         return rows::job(row);
     }
-    holds(row, id, token)?;
+    if holds(row, id, token)?.kind() != result.kind() {
+        return Err(LedgerError::ResultOfAnotherKind(id));
+    }
     for output in outputs {
         artifacts::publish(db, *output, id, token, false, now).await?;
     }

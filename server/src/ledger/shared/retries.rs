@@ -3,7 +3,7 @@ use sqlx::Row;
 use uuid::Uuid;
 
 use super::super::jobs::{AttemptRow, Outcome, bits};
-use super::super::types::{ArtifactId, Failure, JobId, JobRow, JobState};
+use super::super::types::{ArtifactId, FailureReason, JobId, JobRow, JobState};
 use super::super::{LedgerError, Result};
 use super::{DbConnection, DbRow, inputs, jobs, rows};
 
@@ -15,7 +15,7 @@ pub(super) const PAGE_OF_FAILED: &str = "SELECT * FROM jobs WHERE project = $4 A
 pub(super) async fn list_failed(
     db: &mut DbConnection,
     project: &str,
-    reasons: &[i32],
+    reasons: &[FailureReason],
     before: Option<(i64, JobId)>,
     limit: u32,
 ) -> Result<Vec<JobRow>> {
@@ -46,14 +46,12 @@ pub(super) async fn requeue(db: &mut DbConnection, id: JobId, inputs: &[Artifact
 }
 
 fn attempt(row: &DbRow) -> Result<AttemptRow> {
-    let reason: Option<i32> = row.try_get("failure_reason")?;
-    let message: Option<String> = row.try_get("failure_message")?;
     Ok(AttemptRow {
         number: row.try_get("number")?,
         worker: row.try_get("worker")?,
         start_time: row.try_get("start_time")?,
         end_time: row.try_get("end_time")?,
         outcome: Outcome::from_number(rows::number(row, "outcome")?)?,
-        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+        failure: rows::failure(row)?,
     })
 }

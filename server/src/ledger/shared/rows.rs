@@ -1,20 +1,20 @@
 //! Rows of the tables, read into the ledger's types.
 use sqlx::Row;
 
-use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
+use super::super::types::{ArtifactRow, Failure, FailureReason, JobRow, KeyRow};
 use super::super::workers::{ResourceRequirements, SeenWorker};
-use super::super::{Result, discriminants};
+use super::super::{Result, codec, discriminants};
 use super::DbRow;
 
 pub(super) fn job(row: &DbRow) -> Result<JobRow> {
-    let reason: Option<i32> = row.try_get("failure_reason")?;
-    let message: Option<String> = row.try_get("failure_message")?;
+    let kind = discriminants::job_kind(number(row, "kind")?)?;
+    let progress: Option<Vec<u8>> = row.try_get("progress")?;
+    let result: Option<Vec<u8>> = row.try_get("result")?;
     Ok(JobRow {
         id: row.try_get("id")?,
         project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
-        kind: discriminants::job_kind(number(row, "kind")?)?,
-        spec: row.try_get("spec")?,
+        spec: codec::decode_spec(kind, row.try_get("spec")?)?,
         priority: row.try_get("priority")?,
         requirements: ResourceRequirements {
             memory: row.try_get("memory")?,
@@ -25,9 +25,9 @@ pub(super) fn job(row: &DbRow) -> Result<JobRow> {
         cancel_requested: row.try_get("cancel_requested")?,
         attempt: row.try_get("attempt")?,
         max_attempts: row.try_get("max_attempts")?,
-        progress: row.try_get("progress")?,
-        result: row.try_get("result")?,
-        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+        progress: progress.as_deref().map(codec::decode_progress).transpose()?,
+        result: result.map(|bytes| codec::decode_result(kind, &bytes)).transpose()?,
+        failure: failure(row)?,
         create_time: row.try_get("create_time")?,
         update_time: row.try_get("update_time")?,
         start_time: row.try_get("start_time")?,
@@ -37,6 +37,16 @@ pub(super) fn job(row: &DbRow) -> Result<JobRow> {
         trace_parent: row.try_get("trace_parent")?,
         queue_position: None,
     })
+}
+
+/// Why a job or an attempt failed.
+pub(super) fn failure(row: &DbRow) -> Result<Option<Failure>> {
+    let reason: Option<i32> = row.try_get("failure_reason")?;
+    let message: Option<String> = row.try_get("failure_message")?;
+    Ok(reason.zip(message).map(|(reason, message)| Failure {
+        reason: FailureReason::from_number(reason),
+        message,
+    }))
 }
 
 pub(super) fn worker(row: &DbRow) -> Result<SeenWorker> {

@@ -2,7 +2,7 @@
 use sqlx::{Connection as _, Row};
 
 use super::super::statistics::{Running, Statistics, Tally, Usage, Waiting, count};
-use super::super::{LedgerError, Result, discriminants};
+use super::super::{FailureReason, LedgerError, Result, discriminants};
 use super::{DbConnection, DbLedger, SNAPSHOT, rows};
 
 /// Queued jobs by kind.
@@ -65,9 +65,8 @@ async fn tally(db: &mut DbConnection) -> Result<Tally> {
     }
     for row in sqlx::query(FAILED).fetch_all(&mut *db).await? {
         let kind = discriminants::job_kind(rows::number(&row, "kind")?)?;
-        tally
-            .failed
-            .push((kind, row.try_get("reason")?, count(row.try_get("count")?)));
+        let reason = FailureReason::from_number(row.try_get("reason")?);
+        tally.failed.push((kind, reason, count(row.try_get("count")?)));
     }
     db.commit().await?;
     Ok(tally)

@@ -48,12 +48,12 @@ async fn what_one_server_changes_the_others_hear() {
     expect(first.job.id, false, true).await;
     let id = queue(&*one, at(2)).await;
     expect(id, true, false).await;
-    one.report(first.job.id, &first.token, Some(vec![1]), LEASE, at(2))
+    one.report(first.job.id, &first.token, Some(progress(1)), LEASE, at(2))
         .await
         .unwrap();
     expect(first.job.id, false, false).await;
     // The lease is extended, and that is all.
-    one.report(first.job.id, &first.token, Some(vec![1]), LEASE, at(3))
+    one.report(first.job.id, &first.token, Some(progress(1)), LEASE, at(3))
         .await
         .unwrap();
     one.release(first.job.id, &first.token, at(4)).await.unwrap();

@@ -125,7 +125,7 @@ async fn a_thousand_submissions() {
                         ledger
                             .create_job(
                                 NewJob {
-                                    spec: vec![0; 200],
+                                    spec: spec(7),
                                     ..new_job()
                                 },
                                 at(i),
