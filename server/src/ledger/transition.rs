@@ -9,7 +9,7 @@ use super::{LedgerError, Result, retry};
 #[derive(Debug)]
 pub(super) enum Next {
     /// Done, with its result.
-    Succeeded(JobResult),
+    Succeeded(Box<JobResult>),
     /// Given up.
     Failed(Failure),
     /// Ended as asked.
@@ -34,7 +34,7 @@ pub(super) struct Left {
 impl Next {
     pub(super) fn row(self, now: i64) -> Left {
         let (state, result, failure, run_after, uncounted) = match self {
-            Self::Succeeded(result) => (JobState::Succeeded, Some(result), None, None, 0),
+            Self::Succeeded(result) => (JobState::Succeeded, Some(*result), None, None, 0),
             Self::Failed(failure) => (JobState::Failed, None, Some(failure), None, 0),
             Self::Cancelled => (JobState::Cancelled, None, None, None, 0),
             Self::Retry(failure, run_after) => (JobState::Queued, None, Some(failure), Some(run_after), 0),

@@ -388,7 +388,7 @@ impl Pair {
                     row.state,
                     row.cancel_requested,
                     row.attempt,
-                    row.progress.clone(),
+                    row.progress,
                     row.run_after,
                     row.revision
                 ),

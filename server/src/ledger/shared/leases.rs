@@ -168,7 +168,7 @@ pub(super) async fn complete(
         .bind(fingerprint.as_slice())
         .execute(&mut *db)
         .await?;
-    leave(db, id, Next::Succeeded(result.clone()), now).await
+    leave(db, id, Next::Succeeded(Box::new(result.clone())), now).await
 }
 
 /// Whether this attempt completed the job in just this way before.
