@@ -1,5 +1,5 @@
 //! The server's one error type: what happened, told so that the caller can do something about it.
-//! What it becomes on the wire is decided in one place, `api::status`.
+//! What it becomes on the wire is decided in one place, `grpc::status`.
 use std::error::Error as StdError;
 use std::time::Duration;
 
@@ -262,4 +262,16 @@ fn list(violations: &[Violation]) -> String {
         .map(|v| format!("{}: {}", v.field, v.description))
         .collect();
     each.join("; ")
+}
+
+/// An error and what caused it in one line, for the log.
+pub fn chain(error: &(dyn std::error::Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text.push_str(": ");
+        text.push_str(&error.to_string());
+        cause = error.source();
+    }
+    text
 }

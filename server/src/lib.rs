@@ -1,10 +1,10 @@
 //! The GuardSplat server: API, job ledger, keys and claims. No GPU code.
 pub mod access;
-pub mod api;
 pub mod artifacts;
 pub mod backup;
 pub mod embedded;
 pub mod error;
+pub mod grpc;
 pub mod hooks;
 pub mod ledger;
 pub mod marks;
@@ -13,6 +13,8 @@ pub mod notary;
 pub mod offline;
 pub mod run;
 pub mod secrets;
+pub mod service;
 pub mod settings;
+pub mod tasks;
 pub mod tls;
 pub mod traces;

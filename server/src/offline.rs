@@ -10,11 +10,11 @@ use secrecy::ExposeSecret;
 use uuid::Uuid;
 
 use crate::access::{self, DEFAULT_PROJECT, Scope, Scopes, check_project};
-use crate::api;
 use crate::backup;
 use crate::error::{Error, Result};
 use crate::ledger::{NewToken, TokenLedger, TokenRow};
 use crate::run::{ledger, startup};
+use crate::service::{clock, text};
 use crate::settings::Settings;
 
 /// Tokens read at a time.
@@ -117,8 +117,8 @@ pub async fn run(settings: &Settings, command: Command) -> Result<Said> {
 
 async fn create(ledger: &dyn TokenLedger, arguments: Create) -> Result<Said> {
     check_project("--project", &arguments.project)?;
-    api::check_display_name("--display-name", &arguments.display_name)?;
-    let now = api::now();
+    text::display_name("--display-name", &arguments.display_name)?;
+    let now = clock::now();
     let length = arguments
         .expires
         .map(|time| i64::try_from(time.as_micros()).unwrap_or(i64::MAX));
@@ -164,7 +164,7 @@ async fn revoke(ledger: &dyn TokenLedger, name: &str) -> Result<Said> {
     let id = name.strip_prefix("tokens/").unwrap_or(name);
     let id =
         Uuid::try_parse(id).map_err(|_| Error::invalid("TOKEN", "must be the id of a token, or tokens/ and it"))?;
-    let row = ledger.revoke_token(id, api::now()).await?;
+    let row = ledger.revoke_token(id, clock::now()).await?;
     Ok(Said {
         out: vec![line(&row)],
         err: Vec::new(),

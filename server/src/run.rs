@@ -18,16 +18,21 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::access;
-use crate::api::{self, Api, Door, Guard, Keep, Limits, Rates};
 use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
+use crate::grpc::guard::Guard;
+use crate::grpc::listener::{self, Door};
 use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::metrics::{self, Page};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
+use crate::service::rate_limit::Rates;
+use crate::service::retention::Keep;
+use crate::service::{Limits, Service, clock};
 use crate::settings::{Access, Settings};
+use crate::tasks::{deliveries, housekeeping, remote_changes};
 use crate::tls;
 use crate::traces::Traces;
 pub(crate) use folder::DataFolder;
@@ -65,7 +70,7 @@ pub struct Server {
     metrics: Option<TcpListener>,
     ledger: Arc<dyn Ledger>,
     store: ArtifactStore,
-    api: Api,
+    api: Service,
     poster: Poster,
     /// Held until the end, so that no other server uses the folder.
     _folder: DataFolder,
@@ -87,12 +92,12 @@ impl Server {
             .await
             .map_err(|error| Error::Startup(format!("listening on {}: {error}", settings.listen)))?;
         let address = listener.local_addr().map_err(startup)?;
-        let notary = Notary::open(ledger.as_ref(), &master, api::now())
+        let notary = Notary::open(ledger.as_ref(), &master, clock::now())
             .await
             .map_err(startup)?;
         store::claim(&store, &notary).await?;
         let traces = Traces::from_environment()?;
-        let api = Api::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
+        let api = Service::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
         let poster = poster(&settings)?;
         let tls = tls::load(&settings)?;
         let mut worker = None;
@@ -180,13 +185,13 @@ impl Server {
                 tls: None,
                 measured: self.api.measured(),
             };
-            tokio::spawn(api::serve(routes.clone(), door, listener, drained.clone()))
+            tokio::spawn(listener::serve(routes.clone(), door, listener, drained.clone()))
         });
-        let mut calls = tokio::spawn(api::serve(routes, self.door, self.listener, drained));
-        let housekeeping = tokio::spawn(api::housekeeping(self.api.clone()));
-        let deliveries = tokio::spawn(api::deliveries(self.api.clone(), self.poster));
+        let mut calls = tokio::spawn(listener::serve(routes, self.door, self.listener, drained));
+        let housekeeping = tokio::spawn(housekeeping::housekeeping(self.api.clone()));
+        let deliveries = tokio::spawn(deliveries::deliveries(self.api.clone(), self.poster));
         // It ends with the API.
-        tokio::spawn(api::relay(self.api.clone()));
+        tokio::spawn(remote_changes::relay(self.api.clone()));
         let worker = self
             .worker
             .map(|worker| EmbeddedWorker::start(worker, Backoff::default()));

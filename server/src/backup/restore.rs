@@ -4,7 +4,6 @@ use std::path::Path;
 
 use super::take::is_whole;
 use super::{ARTIFACTS, LEDGER, MANIFEST, MASTER_KEY, Manifest, VERSION, embedded_only, failed, files};
-use crate::api;
 use crate::artifacts::ArtifactPath;
 use crate::error::{Error, Result};
 use crate::ledger::sqlite::copy;
@@ -13,6 +12,7 @@ use crate::notary::Notary;
 use crate::offline::Said;
 use crate::run::{DataFolder, startup};
 use crate::secrets::{self, KeySource};
+use crate::service::clock;
 use crate::settings::Settings;
 
 /// Puts a backup into the data folder, which must be empty or not there yet. The ledger comes last: a folder without one
@@ -112,7 +112,7 @@ async fn try_master_key(settings: &Settings, data: &Path) -> Result<String> {
     };
     let master = secrets::load(source, data).map_err(startup)?;
     let ledger = SqliteLedger::open(&data.join(LEDGER)).await.map_err(startup)?;
-    let opened = Notary::open(&ledger, &master, api::now()).await;
+    let opened = Notary::open(&ledger, &master, clock::now()).await;
     ledger.close().await;
     opened.map_err(startup)?;
     Ok("the master key opens what is in it".into())

@@ -1,5 +1,5 @@
 //! Hooks: what is sent to registered URLs when jobs are over, how it is signed, and where it may be sent to. What is kept
-//! of it is in [`crate::ledger::hooks`]; who sends it when, in `api::deliveries`.
+//! of it is in [`crate::ledger::hooks`]; who sends it when, in `tasks::deliveries`.
 pub mod address;
 pub mod event;
 mod pace;
@@ -34,4 +34,9 @@ impl Default for Rules {
             give_up_after: Duration::from_secs(3 * 24 * 60 * 60),
         }
     }
+}
+
+/// What a hook's secret is sealed for.
+pub(crate) fn secret_context(id: crate::ledger::HookId) -> String {
+    format!("hooks/{id}")
 }

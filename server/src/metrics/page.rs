@@ -15,9 +15,9 @@ use tokio::sync::{Mutex, Semaphore, watch};
 use tokio::time::{sleep, timeout};
 
 use super::Metrics;
-use crate::api;
 use crate::ledger::{Ledger, LedgerError};
 use crate::run::Readiness;
+use crate::service::{clock, placement};
 
 /// Connections at a time; more wait.
 const CONNECTIONS: usize = 64;
@@ -99,10 +99,10 @@ impl Page {
     }
 
     async fn measured(&self) -> Response<Full<Bytes>> {
-        let now = api::now();
+        let now = clock::now();
         let counting = async {
             let tally = self.ledger.tally().await?;
-            Ok::<_, LedgerError>((tally, self.ledger.workers_since(api::seen_since(now)).await?))
+            Ok::<_, LedgerError>((tally, self.ledger.workers_since(placement::seen_since(now)).await?))
         };
         let counted = match timeout(COUNT, counting).await {
             Ok(Ok(counted)) => Some(counted),

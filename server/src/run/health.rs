@@ -15,10 +15,10 @@ use tonic_health::ServingStatus;
 use tonic_health::pb::health_server::{Health as HealthApi, HealthServer};
 use tonic_health::server::{HealthReporter, health_reporter};
 
-use crate::api::Alive;
 use crate::artifacts::ArtifactStore;
 use crate::ledger::Ledger;
 use crate::metrics::Metrics;
+use crate::service::worker_presence::Alive;
 
 /// How often the ledger is asked, and how long it may take to answer.
 pub const EVERY: Duration = Duration::from_secs(5);

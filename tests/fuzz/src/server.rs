@@ -1,6 +1,6 @@
 //! What the server reads of callers, and of its own folder.
 use crate::memory::bounded;
-use guardsplat_server::api::strangers;
+use guardsplat_server::grpc::fuzz_api;
 use guardsplat_server::secrets::MasterKey;
 use guardsplat_server::settings;
 use std::sync::LazyLock;
@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 /// Page tokens: one that is taken is the one that would be given.
 pub fn page_token(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    if let Ok(Some(token)) = bounded(data.len(), || strangers::page_token(text)) {
+    if let Ok(Some(token)) = bounded(data.len(), || fuzz_api::page_token(text)) {
         assert_eq!(token, text);
     }
 }
@@ -17,20 +17,20 @@ pub fn page_token(data: &[u8]) {
 pub fn names(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     bounded(data.len(), || {
-        if let Ok(name) = strangers::name(text) {
+        if let Ok(name) = fuzz_api::name(text) {
             assert_eq!(name, text);
         }
-        if strangers::file_name(text).is_ok() {
+        if fuzz_api::file_name(text).is_ok() {
             assert!(!text.contains(['/', '\\', '\n']) && text != "..");
         }
-        let _ = strangers::display_name(text);
+        let _ = fuzz_api::display_name(text);
     });
 }
 
 /// Requests on the wire: jobs, and what uploads announce.
 pub fn requests(data: &[u8]) {
-    let _ = bounded(data.len(), || strangers::create_job(data));
-    let _ = bounded(data.len(), || strangers::announce(data));
+    let _ = bounded(data.len(), || fuzz_api::create_job(data));
+    let _ = bounded(data.len(), || fuzz_api::announce(data));
 }
 
 /// Key files as the server keeps them, under a master key of zeros; and master keys.

@@ -37,7 +37,7 @@ pub fn message(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     for bits in [1, 3, 4, 32, 33, MAX_BITS] {
         let parsed = bounded(data.len(), || Message::parse(text, bits));
-        let checked = guardsplat_server::api::strangers::message(text, bits as u32);
+        let checked = guardsplat_server::grpc::fuzz_api::message(text, bits as u32);
         assert_eq!(parsed.is_ok(), checked.is_ok(), "{bits} bits");
         if let Ok(message) = parsed {
             assert_eq!(

@@ -1,0 +1,166 @@
+//! `ArtifactService`: scenes and pictures, in and out.
+use futures::stream::{self, BoxStream, StreamExt};
+use guardsplat_proto::v1::artifact_service_server::ArtifactService;
+use guardsplat_proto::v1::{
+    Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, FinishUploadRequest,
+    GetArtifactRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, StartUploadRequest, StartUploadResponse,
+    UploadArtifactRequest, download_artifact_response,
+};
+use tonic::{Request, Response, Status, Streaming};
+use uuid::Uuid;
+
+use crate::artifacts::ArtifactPath;
+use crate::error::chain;
+use crate::error::{Error, Result};
+use crate::grpc::guard::caller;
+use crate::grpc::upload_stream::Incoming;
+use crate::ledger::{ArtifactRow, NewArtifact, Origin};
+use crate::service::Service;
+use crate::service::clock;
+use crate::service::names::Kind;
+use crate::service::to_proto;
+use crate::service::upload;
+
+#[tonic::async_trait]
+impl ArtifactService for Service {
+    async fn upload_artifact(
+        &self,
+        request: Request<Streaming<UploadArtifactRequest>>,
+    ) -> Result<Response<Artifact>, Status> {
+        let project = caller(&request)?.project;
+        let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
+        let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
+        self.metrics().uploaded(false, row.size);
+        Ok(Response::new(to_proto::artifact(row)))
+    }
+
+    async fn start_upload(
+        &self,
+        request: Request<StartUploadRequest>,
+    ) -> Result<Response<StartUploadResponse>, Status> {
+        let project = caller(&request)?.project;
+        let metadata = request.into_inner().metadata;
+        Ok(Response::new(self.start(&project, metadata).await?))
+    }
+
+    async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
+        let project = caller(&request)?.project;
+        let finished = async { Ok(self.finish(&project, &request.get_ref().upload).await?) };
+        let (row, new) = self.within_upload_time(finished).await?;
+        if new {
+            self.metrics().uploaded(false, row.size);
+        }
+        Ok(Response::new(to_proto::artifact(row)))
+    }
+
+    type DownloadArtifactStream = BoxStream<'static, Result<DownloadArtifactResponse, Status>>;
+
+    async fn download_artifact(
+        &self,
+        request: Request<DownloadArtifactRequest>,
+    ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
+        let caller = caller(&request)?;
+        let DownloadArtifactRequest { name, offset } = request.into_inner();
+        let id = Kind::Artifact.parse("name", &name)?;
+        let row = self.readable_artifact(&caller, id).await?;
+        let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
+        let path = ArtifactPath::parse(&row.path).map_err(Error::from)?;
+        let bytes = self.store().read(&path, offset).await.map_err(Error::from)?;
+        let respond = |payload| DownloadArtifactResponse { payload: Some(payload) };
+        let first = respond(download_artifact_response::Payload::Artifact(to_proto::artifact(row)));
+        let rest = bytes.into_stream().map(move |chunk| match chunk {
+            Ok(chunk) => Ok(respond(download_artifact_response::Payload::Chunk(chunk.into()))),
+            Err(error) => Err(Error::from(error).into()),
+        });
+        Ok(Response::new(stream::iter([Ok(first)]).chain(rest).boxed()))
+    }
+
+    async fn get_download_url(
+        &self,
+        request: Request<GetDownloadUrlRequest>,
+    ) -> Result<Response<GetDownloadUrlResponse>, Status> {
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        // Never a secret one: those are not even there.
+        let row = self.readable_artifact(&caller(&request)?, id).await?;
+        Ok(Response::new(self.signed(row).await?))
+    }
+
+    async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let row = self.own_artifact(&caller(&request)?.project, id).await?;
+        Ok(Response::new(to_proto::artifact(row)))
+    }
+
+    async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
+        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let row = self.own_artifact(&caller(&request)?.project, id).await?;
+        self.ledger()
+            .delete_artifact(row.id, clock::now())
+            .await
+            .map_err(Error::from)?;
+        // It is gone for everybody from here on. What is left of it is collected later if this fails.
+        if let Err(error) = self.remove_bytes(&row).await {
+            tracing::warn!(artifact = %row.id, error = %chain(&error), "the bytes of a deleted artifact are left for later");
+        }
+        Ok(Response::new(()))
+    }
+}
+
+impl Service {
+    /// An address for an artifact, where the server is to give any and the store has some.
+    async fn signed(&self, row: ArtifactRow) -> Result<GetDownloadUrlResponse> {
+        let (mut url, mut expire_time) = (None, None);
+        if let Some(lifetime) = self.limits().signed_url {
+            let path = ArtifactPath::parse(&row.path)?;
+            // From before it is signed, so that it is not good for longer than is said.
+            let now = clock::now();
+            url = self.store().download_url(&path, lifetime).await?;
+            expire_time = url
+                .as_ref()
+                .map(|_| clock::timestamp(now.saturating_add(clock::micros(lifetime))));
+        }
+        Ok(GetDownloadUrlResponse {
+            artifact: Some(to_proto::artifact(row)),
+            url: url.unwrap_or_default(),
+            expire_time,
+        })
+    }
+
+    async fn receive_upload(
+        &self,
+        project: String,
+        mut incoming: Incoming<UploadArtifactRequest>,
+    ) -> Result<ArtifactRow, Status> {
+        let metadata = incoming.metadata().await?;
+        let announced = upload::announced("metadata", &metadata)?;
+        self.room_for_bytes(&project, announced.size).await?;
+        let id = Uuid::now_v7();
+        let path = ArtifactPath::upload(id);
+        // The writer comes first: it refuses what is too large. It leaves nothing if it is dropped.
+        let mut writer = self.store().write(&path, announced).await.map_err(Error::from)?;
+        let new = NewArtifact {
+            id,
+            display_name: metadata.display_name,
+            size: metadata.size_bytes,
+            sha256: metadata.sha256,
+            origin: Origin::Upload { project },
+            secret: false,
+            evidence: false,
+            path: path.to_string(),
+        };
+        // The row comes before the file does, so that no file is ever without one.
+        self.ledger()
+            .create_artifact(new, clock::now())
+            .await
+            .map_err(Error::from)?;
+        while let Some(chunk) = incoming.chunk().await? {
+            writer.chunk(chunk).await.map_err(Error::from)?;
+        }
+        writer.finish().await.map_err(Error::from)?;
+        Ok(self
+            .ledger()
+            .artifact_ready(id, None, clock::now())
+            .await
+            .map_err(Error::from)?)
+    }
+}

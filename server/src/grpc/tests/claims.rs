@@ -1,0 +1,446 @@
+//! Marking assets and claims about them, from submission to evidence; workers are played by the tests.
+use std::time::Duration;
+
+use guardsplat_codeword::Word;
+use guardsplat_evidence::{Checked, Picture, Verdict as Told, VerifyingKey, check};
+use guardsplat_proto::v1::asset::Original;
+use guardsplat_proto::v1::complete_job_request::Result as Output;
+use guardsplat_proto::v1::job::{Result as JobResult, Spec, State};
+use guardsplat_proto::v1::key::State as KeyState;
+use guardsplat_proto::v1::verify_result::Verdict;
+use guardsplat_proto::v1::{
+    CompleteJobRequest, DownloadArtifactRequest, EmbedResult, EmbedSpec, FramedReading, Job, SeenView,
+    UpdateKeyStateRequest, VerifyResult, VerifySpec, download_artifact_response,
+};
+use tonic::{Code, Status};
+use uuid::Uuid;
+
+use super::harness::{Server, invalid, not_found, refused, sha256};
+use super::registry::{asset, create_asset, create_owner, public_key};
+use crate::service::Limits;
+
+/// A server with a key of 64 bits and two owners, of whom the first has two assets and the second one.
+struct Bench {
+    server: Server,
+    key: String,
+    owners: [String; 2],
+    /// With their original.
+    assets: Vec<(String, String)>,
+}
+
+/// A view that a worker saw, three levels off the original.
+fn seen(value: u8) -> SeenView {
+    let png = |value| Picture::from_rgb(2, 1, &[value; 6]).unwrap().png().unwrap().to_vec();
+    SeenView {
+        name: "view 1".into(),
+        read: png(value),
+        original: png(value - 3),
+    }
+}
+
+async fn bench_with(limits: Limits) -> Bench {
+    let server = Server::with(limits).await;
+    let key = server.key(64, b"key file").await;
+    let mut owners = Vec::new();
+    for name in ["Studio Nord", "Studio Süd"] {
+        owners.push(create_owner(&server, name, "").await.unwrap().name);
+    }
+    let mut assets = Vec::new();
+    for (owner, bytes) in [(0, b"first"), (0, b"other"), (1, b"third")] {
+        let scene = server.upload("scene.ply", bytes).await.name;
+        let new = asset(&owners[owner], &key, Original::Artifact(scene.clone()));
+        assets.push((create_asset(&server, new, "").await.unwrap().name, scene));
+    }
+    let [one, two] = <[String; 2]>::try_from(owners).unwrap();
+    Bench {
+        server,
+        key,
+        owners: [one, two],
+        assets,
+    }
+}
+
+async fn bench() -> Bench {
+    bench_with(Limits::default()).await
+}
+
+fn embed(key: &str, scene: &str, asset: &str) -> EmbedSpec {
+    EmbedSpec {
+        scene: scene.into(),
+        key: key.into(),
+        asset: asset.into(),
+        ..EmbedSpec::default()
+    }
+}
+
+fn logits(word: &str, wrong: usize) -> Vec<f32> {
+    let word = Word::from_u64(u64::from_str_radix(word, 16).unwrap());
+    let sign = |(i, bit): (usize, bool)| {
+        if bit != (i % 10 == 3 && i / 10 < wrong) {
+            4.0
+        } else {
+            -4.0
+        }
+    };
+    word.bits().enumerate().map(sign).collect()
+}
+
+fn framed(quarter_turns: u32, logits: Vec<f32>) -> FramedReading {
+    FramedReading {
+        quarter_turns,
+        views: 20,
+        logits,
+        ..FramedReading::default()
+    }
+}
+
+impl Bench {
+    async fn submit(&self, spec: Spec) -> Result<Job, Status> {
+        let job = Job {
+            spec: Some(spec),
+            ..Job::default()
+        };
+        self.server.submit(job, "").await.map(|answer| answer.into_inner())
+    }
+
+    async fn embed(&self, scene: &str, asset: &str) -> Result<Job, Status> {
+        self.submit(Spec::Embed(embed(&self.key, scene, asset))).await
+    }
+
+    async fn verify(&self, claim: VerifySpec) -> Result<Job, Status> {
+        let suspect = self.server.upload("suspect.ply", b"suspect").await.name;
+        let spec = VerifySpec {
+            suspects: vec![suspect],
+            key: self.key.clone(),
+            ..claim
+        };
+        self.submit(Spec::Verify(spec)).await
+    }
+
+    /// The word that a worker is told to embed.
+    async fn word(&self, which: usize) -> String {
+        let (asset, scene) = &self.assets[which];
+        let job = self.embed(scene, asset).await.unwrap();
+        let (leased, token) = self.server.take().await;
+        assert_eq!(leased.name, job.name);
+        let Some(Spec::Embed(spec)) = leased.spec else { panic!() };
+        assert_eq!((spec.message.len(), &spec.asset), (16, asset));
+        let result = EmbedResult {
+            scene: self.server.stored(&job.name, &token, b"marked", false).await,
+            comparison: self.server.stored(&job.name, &token, b"picture", false).await,
+            message: spec.message.clone(),
+            bit_accuracy: 1.0,
+            ..EmbedResult::default()
+        };
+        let readings = vec![framed(0, logits(&spec.message, 0))];
+        self.complete(&job.name, &token, Output::EmbedResult(result), readings)
+            .await
+            .unwrap();
+        spec.message
+    }
+
+    async fn complete(
+        &self,
+        job: &str,
+        token: &str,
+        result: Output,
+        readings: Vec<FramedReading>,
+    ) -> Result<(), Status> {
+        let request = CompleteJobRequest {
+            name: job.into(),
+            lease_token: token.into(),
+            result: Some(result),
+            readings,
+            engine: "a test".into(),
+            views: vec![seen(103)],
+            ..CompleteJobRequest::default()
+        };
+        self.server.worker.clone().complete_job(request).await.map(|_| ())
+    }
+
+    /// What comes of a claim on these readings.
+    async fn claimed(&self, claim: VerifySpec, readings: Vec<FramedReading>) -> (VerifyResult, Checked) {
+        let job = self.verify(claim).await.unwrap().name;
+        let (_, token) = self.server.take().await;
+        let read = VerifyResult {
+            verdict: Verdict::Inconclusive.into(),
+            message: "what was read".into(),
+            views: 20,
+            ..VerifyResult::default()
+        };
+        self.complete(&job, &token, Output::VerifyResult(read.clone()), readings.clone())
+            .await
+            .unwrap();
+        let Some(JobResult::VerifyResult(result)) = self.server.job(&job).await.result else {
+            panic!()
+        };
+        // Said again because the answer was lost, it is answered in the same way, and leaves no second report.
+        self.complete(&job, &token, Output::VerifyResult(read.clone()), readings)
+            .await
+            .unwrap();
+        let other = self
+            .complete(&job, &token, Output::VerifyResult(read), Vec::new())
+            .await;
+        refused(other, Code::Aborted, "LEASE_LOST");
+        assert_eq!(
+            self.server.job(&job).await.result,
+            Some(JobResult::VerifyResult(result.clone()))
+        );
+        assert_eq!(result.message, "");
+        let checked = self.report(&result.evidence_html).await;
+        assert!(checked.holds(), "{checked:?}");
+        let views = &checked.evidence.as_ref().unwrap().views;
+        let difference = Picture::from_rgb(2, 1, &[30; 6]).unwrap();
+        assert_eq!(
+            views.iter().map(|v| v.difference.clone()).collect::<Vec<_>>(),
+            [Some(difference)]
+        );
+        assert!(self.report(&result.evidence_json).await.holds());
+        (result, checked)
+    }
+
+    async fn report(&self, artifact: &str) -> Checked {
+        let request = DownloadArtifactRequest {
+            name: artifact.into(),
+            offset: 0,
+        };
+        let answer = self.server.artifacts.clone().download_artifact(request).await;
+        let (mut stream, mut bytes) = (answer.unwrap().into_inner(), Vec::new());
+        while let Some(message) = stream.message().await.unwrap() {
+            if let Some(download_artifact_response::Payload::Chunk(chunk)) = message.payload {
+                bytes.extend(chunk);
+            }
+        }
+        let key = public_key(&self.server).await.to_bytes();
+        check(&bytes, &VerifyingKey::from_bytes(&key).unwrap())
+    }
+}
+
+fn of_asset(asset: &str) -> VerifySpec {
+    VerifySpec {
+        asset: asset.into(),
+        ..VerifySpec::default()
+    }
+}
+
+fn of_owner(owner: &str) -> VerifySpec {
+    VerifySpec {
+        owner: owner.into(),
+        ..VerifySpec::default()
+    }
+}
+
+fn search() -> VerifySpec {
+    VerifySpec {
+        search: true,
+        ..VerifySpec::default()
+    }
+}
+
+#[tokio::test]
+async fn an_asset_is_marked_with_a_word_that_only_its_worker_is_told() {
+    let bench = bench().await;
+    let word = bench.word(0).await;
+    // The same every time, and another one for each asset.
+    assert_eq!(bench.word(0).await, word);
+    assert_ne!(bench.word(1).await, word);
+    let request = guardsplat_proto::v1::ListJobsRequest::default();
+    let jobs = bench.server.jobs.clone().list_jobs(request).await.unwrap().into_inner();
+    assert!(!format!("{jobs:?}").contains(&word));
+    let Some(JobResult::EmbedResult(result)) = jobs.jobs[0].result.clone() else {
+        panic!()
+    };
+    assert_eq!((result.message.as_str(), jobs.jobs[0].state()), ("", State::Succeeded));
+    let checked = bench.report(&result.evidence_html).await;
+    assert!(checked.holds(), "{checked:?}");
+    let evidence = checked.evidence.unwrap();
+    let read = evidence.verification.unwrap();
+    let decision = read.decision.unwrap();
+    assert_eq!(
+        (read.verdict, decision.matched, decision.hypotheses),
+        (Told::Match, 64, 1)
+    );
+    let hashes: Vec<_> = evidence.inputs.iter().map(|input| input.sha256.to_string()).collect();
+    assert_eq!(hashes, [sha256(b"other"), sha256(b"marked")]);
+}
+
+#[tokio::test]
+async fn what_can_not_be_marked_is_refused_by_field() {
+    let bench = bench().await;
+    let ((first, scene), (second, _)) = (&bench.assets[0], &bench.assets[1]);
+    let nowhere = format!("assets/{}", Uuid::now_v7());
+    assert_eq!(not_found(bench.embed(scene, &nowhere).await), nowhere);
+    assert_eq!(invalid(bench.embed(scene, "assets/x").await), ["job.embed.asset"]);
+    // Another original.
+    assert_eq!(invalid(bench.embed(scene, second).await), ["job.embed.scene"]);
+    // Two messages, or none.
+    let both = EmbedSpec {
+        message: "0".repeat(16),
+        ..embed(&bench.key, scene, first)
+    };
+    assert_eq!(invalid(bench.submit(Spec::Embed(both)).await), ["job.embed.message"]);
+    assert_eq!(invalid(bench.embed(scene, "").await), ["job.embed.message"]);
+    // An asset of another key, and a key whose bits are too few.
+    let short = bench.server.key(32, b"short key").await;
+    let foreign = Spec::Embed(embed(&short, scene, first));
+    assert_eq!(invalid(bench.submit(foreign).await), ["job.embed.asset"]);
+    let new = asset(&bench.owners[0], &short, Original::Artifact(scene.clone()));
+    let of_short = create_asset(&bench.server, new, "").await.unwrap().name;
+    let spec = Spec::Embed(embed(&short, scene, &of_short));
+    assert_eq!(invalid(bench.submit(spec).await), ["job.embed.key"]);
+    let revoke = UpdateKeyStateRequest {
+        name: bench.key.clone(),
+        state: KeyState::Revoked.into(),
+        reason: "stolen".into(),
+    };
+    bench.server.keys.clone().update_key_state(revoke).await.unwrap();
+    refused(bench.embed(scene, first).await, Code::FailedPrecondition, "KEY_REVOKED");
+    refused(
+        bench.verify(of_asset(first)).await,
+        Code::FailedPrecondition,
+        "KEY_REVOKED",
+    );
+}
+
+#[tokio::test]
+async fn a_claim_is_decided_by_the_server_and_leaves_evidence() {
+    let bench = bench().await;
+    let word = bench.word(0).await;
+    let read = || vec![framed(0, logits(&word, 4))];
+    let (first, second) = (&bench.assets[0].0, &bench.assets[1].0);
+
+    let (result, checked) = bench.claimed(of_asset(first), read()).await;
+    assert_eq!(result.verdict(), Verdict::Match);
+    assert_eq!((&result.asset, &result.owner), (first, &bench.owners[0]));
+    assert_eq!(
+        (result.matched_bits, result.needed_bits, result.bits),
+        (Some(60), Some(51), 64)
+    );
+    assert_eq!((result.payload_number, result.corrected_bits), (Some(1), Some(4)));
+    assert_eq!((result.hypotheses, result.framings, result.assets), (Some(1), 1, 1));
+    assert!(result.p_value.unwrap() < 1e-10 && result.threshold == Some(1e-6));
+    let told = checked.evidence.unwrap();
+    assert_eq!((told.engine.as_str(), told.key.id), ("a test", bench.key.clone()));
+    let told = told.verification.unwrap();
+    assert!(told.found.unwrap().owner.starts_with("Studio Nord (owners/"));
+    assert_eq!(told.strip.len(), 64);
+
+    // Another asset's mark is not there.
+    let (result, _) = bench.claimed(of_asset(second), read()).await;
+    assert_eq!((result.verdict(), result.asset.as_str()), (Verdict::NoMatch, ""));
+    assert_eq!((result.payload_number, result.hypotheses), (None, Some(1)));
+
+    // Whoever tries more pays more: two assets of the owner, three of the key, and two framings.
+    let (result, _) = bench.claimed(of_owner(&bench.owners[0]), read()).await;
+    assert_eq!(
+        (result.verdict(), &result.asset, result.hypotheses),
+        (Verdict::Match, first, Some(2))
+    );
+    let (result, _) = bench.claimed(of_owner(&bench.owners[1]), read()).await;
+    assert_eq!((result.verdict(), result.assets), (Verdict::NoMatch, 1));
+    let two = vec![framed(0, vec![-1.0; 64]), framed(3, logits(&word, 4))];
+    let (result, checked) = bench.claimed(search(), two).await;
+    assert_eq!((result.verdict(), &result.asset), (Verdict::Match, first));
+    assert_eq!(
+        (
+            result.hypotheses,
+            result.framings,
+            result.assets,
+            result.framing.as_str()
+        ),
+        (Some(6), 2, 3, "turned by 270 degrees")
+    );
+    let tried = checked.evidence.unwrap().verification.unwrap().tried;
+    assert_eq!((tried.owners, tried.assets, tried.framings.len()), (2, 3, 2));
+
+    // A search that finds nothing shows nobody's word.
+    let (result, checked) = bench.claimed(search(), vec![framed(0, vec![1.0; 64])]).await;
+    assert_eq!(result.verdict(), Verdict::NoMatch);
+    let strip = checked.evidence.unwrap().verification.unwrap().strip;
+    assert!(strip.len() == 64 && strip.iter().all(|bit| bit.wanted.is_none()));
+
+    // Nothing that was read decides nothing.
+    let (result, _) = bench
+        .claimed(of_asset(first), vec![framed(0, vec![f32::NAN; 64])])
+        .await;
+    assert_eq!(result.verdict(), Verdict::Inconclusive);
+    assert!(result.reason.contains("at most 0 of 64 bits"), "{}", result.reason);
+}
+
+#[tokio::test]
+async fn claims_that_nothing_can_decide_say_why() {
+    let mut bench = bench().await;
+    let nobody = create_owner(&bench.server, "nobody", "").await.unwrap().name;
+    let (result, checked) = bench.claimed(of_owner(&nobody), vec![framed(0, vec![1.0; 64])]).await;
+    assert_eq!(
+        (result.verdict(), result.assets, result.p_value),
+        (Verdict::UnknownKey, 0, None)
+    );
+    assert!(result.reason.contains("no asset is registered"), "{}", result.reason);
+    assert_eq!(
+        checked.evidence.unwrap().verification.unwrap().verdict,
+        Told::UnknownKey
+    );
+    // A key whose assets can't be marked.
+    bench.key = bench.server.key(32, b"short key").await;
+    let (result, _) = bench.claimed(search(), vec![framed(0, vec![1.0; 32])]).await;
+    assert_eq!(result.verdict(), Verdict::Inconclusive);
+    assert!(
+        result.reason.contains("has 32 bits, and assets are marked with 64"),
+        "{}",
+        result.reason
+    );
+}
+
+#[tokio::test]
+async fn the_rate_is_a_setting_and_may_be_out_of_reach() {
+    let limits = Limits {
+        false_positive_rate: 1e-19,
+        ..Limits::default()
+    };
+    let bench = bench_with(limits).await;
+    let word = bench.word(0).await;
+    let read = || vec![framed(0, logits(&word, 0))];
+    let (result, _) = bench.claimed(of_asset(&bench.assets[0].0), read()).await;
+    assert_eq!((result.verdict(), result.needed_bits), (Verdict::Match, Some(64)));
+    // 2^-64 is 5.4e-20: two hypotheses are too many.
+    let (result, checked) = bench.claimed(of_owner(&bench.owners[0]), read()).await;
+    assert_eq!((result.verdict(), result.needed_bits), (Verdict::Inconclusive, None));
+    let told = checked.evidence.unwrap().verification.unwrap();
+    assert_eq!(told.reason, Some(guardsplat_evidence::Reason::TooManyHypotheses));
+}
+
+#[tokio::test]
+async fn claims_and_readings_are_checked() {
+    let bench = bench().await;
+    let two = VerifySpec {
+        search: true,
+        ..of_asset(&bench.assets[0].0)
+    };
+    assert_eq!(invalid(bench.verify(two).await), ["job.verify.search"]);
+    let malformed = VerifySpec {
+        asset: "assets/x".into(),
+        ..VerifySpec::default()
+    };
+    assert_eq!(invalid(bench.verify(malformed).await), ["job.verify.asset"]);
+    for (collection, claim) in [("assets", of_asset as fn(&str) -> _), ("owners", of_owner)] {
+        let nowhere = format!("{collection}/{}", Uuid::now_v7());
+        assert_eq!(not_found(bench.verify(claim(&nowhere)).await), nowhere);
+    }
+    let job = bench.verify(search()).await.unwrap().name;
+    let (_, token) = bench.server.take().await;
+    let complete = async |readings| {
+        let read = VerifyResult {
+            verdict: Verdict::Inconclusive.into(),
+            ..VerifyResult::default()
+        };
+        bench.complete(&job, &token, Output::VerifyResult(read), readings).await
+    };
+    assert_eq!(invalid(complete(Vec::new()).await), ["readings"]);
+    let short = vec![framed(0, vec![1.0; 63])];
+    assert_eq!(invalid(complete(short).await), ["readings[0].logits"]);
+    let twice = vec![framed(0, vec![1.0; 64]); 2];
+    assert_eq!(invalid(complete(twice).await), ["readings[1]"]);
+    complete(vec![framed(0, vec![1.0; 64])]).await.unwrap();
+    assert!(bench.server.lease(Duration::ZERO).await.job.is_none());
+}

@@ -1,0 +1,139 @@
+//! Whether there is room for a job: in the queue, and for its scene in the memory that a job may take.
+use std::path::Path;
+use std::time::Duration;
+
+use guardsplat_scene::{HEAD, Summary};
+
+use crate::artifacts::{ArtifactPath, StoreError};
+use crate::error::{Error, Result};
+use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
+use crate::service::Service;
+use crate::service::names::Kind;
+use crate::service::ownership;
+use crate::service::submission::Submission;
+
+/// When a submitter tries again while the queue is full.
+const QUEUE_RETRY: Duration = Duration::from_secs(10);
+
+impl Service {
+    /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
+    /// Says what the worker of one that there is room for must have, as far as its scene tells.
+    pub(crate) async fn admit(&self, project: &str, submission: &Submission) -> Result<ResourceRequirements> {
+        let limits = self.limits();
+        let limit = limits.max_queued;
+        let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
+        let quotas = [limits.max_queued_of_project, limits.max_bytes_of_project];
+        let unlimited = !full && limits.max_job_memory.is_none() && quotas == [None, None];
+        if !unlimited {
+            if self.is_known(project, submission).await? {
+                return Ok(ResourceRequirements::default());
+            }
+            self.room_for_job(project, submission.spec.kind()).await?;
+        }
+        if full {
+            return Err(Error::QueueFull {
+                limit,
+                retry_after: QUEUE_RETRY,
+            });
+        }
+        let Some(scene) = scene_of(submission) else {
+            return Ok(ResourceRequirements::default());
+        };
+        let summary = match (self.summary(project, scene).await, limits.max_job_memory) {
+            // A job that nothing is held against does not hang on it either.
+            (Err(error), None) => {
+                tracing::warn!(%error, scene = %scene, "what a scene takes is not known");
+                None
+            }
+            (summary, _) => summary?,
+        };
+        let Some(summary) = summary else {
+            return Ok(ResourceRequirements::default());
+        };
+        if let Some(limit) = limits.max_job_memory {
+            check(&Kind::Artifact.name(scene), submission.spec.kind(), &summary, limit)?;
+        }
+        let (least, likely) = taken(submission.spec.kind(), &summary);
+        let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
+        Ok(ResourceRequirements {
+            memory: bytes(least),
+            likely_memory: bytes(likely),
+            clip: None,
+        })
+    }
+
+    /// Refuses a job that would be one too many.
+    pub(crate) async fn room_in_queue(&self) -> Result<()> {
+        let limit = self.limits().max_queued;
+        if u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) < limit {
+            return Ok(());
+        }
+        Err(Error::QueueFull {
+            limit,
+            retry_after: QUEUE_RETRY,
+        })
+    }
+
+    /// Whether a request made a job before.
+    pub(crate) async fn is_known(&self, project: &str, submission: &Submission) -> Result<bool> {
+        match submission.request_id {
+            Some(request) => {
+                let job = self.ledger().find_request(ownership::request(project, request)).await?;
+                Ok(job.is_some_and(|job| job.project == project))
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// What the first bytes of an artifact tell of a scene. What is none, or not there any more, is for others to
+    /// refuse, who know more of it.
+    async fn summary(&self, project: &str, id: ArtifactId) -> Result<Option<Summary>> {
+        let Some(row) = self.find_artifact(project, id).await? else {
+            return Ok(None);
+        };
+        let path = ArtifactPath::parse(&row.path)?;
+        let (head, size) = match self.store().head(&path, HEAD).await {
+            Err(StoreError::Gone { .. }) => return Ok(None),
+            head => head?,
+        };
+        let name = Kind::Artifact.name(id);
+        Ok(
+            guardsplat_scene::summary(Path::new(&name), &head, size).unwrap_or_else(|refusal| {
+                tracing::debug!(%refusal, "not known to be a scene");
+                None
+            }),
+        )
+    }
+}
+
+/// The artifact that is a scene, or may be one: a worker takes several suspects for pictures.
+fn scene_of(submission: &Submission) -> Option<ArtifactId> {
+    match (submission.spec.kind(), &submission.inputs[..]) {
+        (JobKind::Embed | JobKind::Verify, [scene]) => Some(*scene),
+        _ => None,
+    }
+}
+
+/// Bytes that a scene takes at least, and probably.
+fn taken(kind: JobKind, summary: &Summary) -> (u64, u64) {
+    match kind {
+        JobKind::Embed => (summary.least_to_mark(), summary.likely_to_mark()),
+        JobKind::Verify | JobKind::CreateKey => (summary.least_to_read(), summary.likely_to_read()),
+    }
+}
+
+/// Refuses a scene that takes more than `limit` bytes, whatever else its job asks for.
+fn check(name: &str, kind: JobKind, summary: &Summary, limit: u64) -> Result<()> {
+    let (needed, likely) = taken(kind, summary);
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::SceneDoesNotFit {
+        name: name.to_owned(),
+        gaussians: summary.gaussians,
+        degree: summary.degree,
+        needed,
+        likely,
+        limit,
+    })
+}

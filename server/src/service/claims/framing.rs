@@ -1,0 +1,215 @@
+//! Framings as workers tell of them: checked, and named for people.
+use std::collections::HashSet;
+
+use guardsplat_codeword::Framing;
+use guardsplat_evidence as evidence;
+use guardsplat_proto::v1::FramedReading;
+use guardsplat_proto::v1::undone::Kind;
+
+use crate::error::Result;
+use crate::service::violations::Problems;
+
+/// Most framings. Workers try some seventy tones, with borders and without, and some thirty parts.
+const MOST: usize = 1024;
+/// What parts of pictures are told in.
+const TWELFTHS: u32 = 12;
+
+/// What was read in each framing, checked against the bits of the key.
+pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<Framing>> {
+    let mut problems = Problems::default();
+    if readings.len() > MOST {
+        let reason = format!("has {} entries, at most {MOST} are taken", readings.len());
+        problems.add("readings", reason);
+    }
+    let mut seen = HashSet::new();
+    for (i, reading) in readings.iter().take(MOST).enumerate() {
+        let field = |name: &str| format!("readings[{i}].{name}");
+        let turns = reading.quarter_turns;
+        problems.check(turns < 4, &field("quarter_turns"), "must be 0 to 3");
+        problems.check(reading.views > 0, &field("views"), "must be at least 1");
+        if reading.logits.len() != bits as usize {
+            let reason = format!("has {} values, the key has {bits} bits", reading.logits.len());
+            problems.add(field("logits"), reason);
+        }
+        if let Some(undone) = &reading.undone {
+            let known = undone.kind() != Kind::Unspecified;
+            problems.check(known, &field("undone.kind"), "must be given");
+            let positive = undone.factor.is_finite() && undone.factor > 0.0;
+            problems.check(positive, &field("undone.factor"), "must be above 0");
+        }
+        if let Some(part) = &reading.part {
+            let inside = |from: u32| from <= TWELFTHS && part.side_twelfths <= TWELFTHS - from;
+            let inside = part.side_twelfths > 0 && inside(part.left_twelfths) && inside(part.top_twelfths);
+            problems.check(inside, &field("part"), "must lie within the picture's twelve twelfths");
+        }
+        let part = reading
+            .part
+            .map(|part| (part.left_twelfths, part.top_twelfths, part.side_twelfths));
+        let undone = reading.undone.map(|undone| (undone.kind, undone.factor.to_bits()));
+        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone, part)) {
+            problems.add(format!("readings[{i}]"), "is in the same framing as another one");
+        }
+    }
+    problems.finish()?;
+    let framing = |reading: &FramedReading| Framing {
+        name: name(reading),
+        views: reading.views,
+        logits: reading.logits.clone(),
+    };
+    Ok(readings.iter().map(framing).collect())
+}
+
+/// What was done to the pictures, in words.
+fn name(reading: &FramedReading) -> String {
+    let mut done = Vec::new();
+    if let Some(undone) = &reading.undone {
+        let factor = undone.factor;
+        done.push(match undone.kind() {
+            Kind::Unspecified => "undone".to_owned(),
+            Kind::Ground => "ground made white".to_owned(),
+            Kind::Brightness => format!("brightness x {factor:.2} undone"),
+            Kind::Gamma => format!("gamma {factor:.2} undone"),
+            Kind::Contrast => format!("contrast x {factor:.2} undone"),
+            Kind::Saturation => format!("saturation x {factor:.2} undone"),
+        });
+    }
+    if reading.quarter_turns > 0 {
+        done.push(format!("turned by {} degrees", 90 * reading.quarter_turns));
+    }
+    if reading.mirrored {
+        done.push("mirrored".to_owned());
+    }
+    if reading.trimmed {
+        done.push("without borders".to_owned());
+    }
+    if let Some(part) = &reading.part {
+        let percent = |twelfths: u32| (100 * twelfths + TWELFTHS / 2) / TWELFTHS;
+        let [side, left, top] = [part.side_twelfths, part.left_twelfths, part.top_twelfths].map(percent);
+        done.push(format!("{side} % of its sides from {left} % right and {top} % down"));
+    }
+    match done.is_empty() {
+        true => "as given".into(),
+        false => done.join(", "),
+    }
+}
+
+/// The same by kinds, for the report: as much as was done counts under what changes most.
+pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::Framing> {
+    use evidence::FramingKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
+    let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
+        _ if reading.undone.is_some() => Tone,
+        _ if reading.part.is_some() => Crop,
+        (true, ..) => Crop,
+        (_, true, _) => Mirrored,
+        (_, _, 0) => AsGiven,
+        _ => QuarterTurn,
+    };
+    let count = |wanted| readings.iter().filter(|reading| kind(reading) == wanted).count() as u32;
+    let each = [AsGiven, Tone, QuarterTurn, Mirrored, Crop].map(|kind| evidence::Framing {
+        kind,
+        variants: count(kind),
+        pooled: false,
+    });
+    each.into_iter().filter(|framing| framing.variants > 0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use guardsplat_proto::v1::{PicturePart, Undone};
+
+    fn reading(quarter_turns: u32, mirrored: bool, trimmed: bool) -> FramedReading {
+        FramedReading {
+            quarter_turns,
+            mirrored,
+            trimmed,
+            views: 1,
+            logits: vec![1.0; 64],
+            undone: None,
+            part: None,
+        }
+    }
+
+    fn part(left: u32, top: u32, side: u32) -> FramedReading {
+        FramedReading {
+            part: Some(PicturePart {
+                left_twelfths: left,
+                top_twelfths: top,
+                side_twelfths: side,
+            }),
+            ..reading(0, false, false)
+        }
+    }
+
+    fn brightened(factor: f32) -> FramedReading {
+        FramedReading {
+            undone: Some(Undone {
+                kind: Kind::Brightness.into(),
+                factor,
+            }),
+            ..reading(0, false, false)
+        }
+    }
+
+    fn all() -> Vec<FramedReading> {
+        let each = (0..16).map(|i| reading(i % 4, i & 4 > 0, i & 8 > 0));
+        each.collect()
+    }
+
+    #[test]
+    fn every_framing_has_a_name_and_counts_once() {
+        let names: HashSet<_> = checked(&all(), 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names.len(), 16);
+        assert!(names.contains("as given") && names.contains("turned by 270 degrees, mirrored, without borders"));
+        let counts: Vec<_> = kinds(&all()).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 3, 4, 8]);
+    }
+
+    #[test]
+    fn tones_are_framings_of_their_own() {
+        let readings = [reading(0, false, false), brightened(0.81), brightened(1.5)];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "brightness x 0.81 undone");
+        assert_eq!(names.iter().collect::<HashSet<_>>().len(), 3);
+        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 2]);
+        assert!(checked(&[brightened(0.81), brightened(0.81)], 64).is_err());
+        assert!(checked(&[brightened(0.0)], 64).is_err() && checked(&[brightened(f32::NAN)], 64).is_err());
+    }
+
+    #[test]
+    fn parts_are_framings_of_their_own_and_lie_within_the_picture() {
+        let readings = [reading(0, false, false), part(3, 0, 6), part(4, 0, 6)];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "50 % of its sides from 25 % right and 0 % down");
+        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 2]);
+        assert!(checked(&[part(3, 0, 6), part(3, 0, 6)], 64).is_err());
+        for outside in [
+            part(7, 0, 6),
+            part(0, 7, 6),
+            part(0, 0, 0),
+            part(13, 0, 1),
+            part(0, u32::MAX, 1),
+        ] {
+            assert!(checked(&[outside], 64).is_err());
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_told_by_field() {
+        let mut wrong = reading(4, false, false);
+        wrong.views = 0;
+        wrong.logits.pop();
+        let readings = [reading(0, false, false), wrong, reading(0, false, false)];
+        let Err(Error::Invalid(violations)) = checked(&readings, 64) else {
+            panic!("was taken")
+        };
+        let fields: Vec<_> = violations.iter().map(|v| v.field.as_str()).collect();
+        let second = ["quarter_turns", "views", "logits"].map(|name| format!("readings[1].{name}"));
+        assert_eq!(fields[..3], second);
+        assert_eq!(fields[3..], ["readings[2]"]);
+        assert!(checked(&vec![all(); 65].concat(), 64).is_err());
+    }
+}

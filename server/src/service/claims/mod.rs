@@ -1,0 +1,139 @@
+//! Whose mark a job writes or looks for: named in its spec, checked when it is submitted, decided when it was read.
+mod conclusion;
+mod decision;
+mod framing;
+
+use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
+
+use crate::error::{Error, Result};
+use crate::ledger::{AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
+use crate::marks;
+use crate::service::Service;
+use crate::service::names::Kind;
+use crate::service::submission::Submission;
+use crate::service::upload;
+use crate::service::violations::Problems;
+
+pub(crate) use conclusion::Told;
+pub(crate) use decision::Decided;
+
+/// What a claim is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Claim {
+    /// This asset's mark.
+    Asset(AssetId),
+    /// The mark of any asset of this owner.
+    Owner(OwnerId),
+    /// That of any asset of the key.
+    Search,
+}
+
+/// The asset that a scene is to be marked as, if one is named.
+pub fn of_embed(spec: &EmbedSpec) -> Result<Option<Claim>> {
+    match spec.asset.as_str() {
+        "" => Ok(None),
+        name => Kind::Asset
+            .parse("job.embed.asset", name)
+            .map(|id| Some(Claim::Asset(id))),
+    }
+}
+
+/// The claim on a suspect, if there is one.
+pub fn of_verify(spec: &VerifySpec) -> Result<Option<Claim>> {
+    let given = [
+        ("job.verify.message", !spec.message.is_empty()),
+        ("job.verify.asset", !spec.asset.is_empty()),
+        ("job.verify.owner", !spec.owner.is_empty()),
+        ("job.verify.search", spec.search),
+    ];
+    let mut problems = Problems::default();
+    for (field, _) in given.iter().filter(|(_, given)| *given).skip(1) {
+        problems.add(*field, "is one too many: give one of message, asset, owner and search");
+    }
+    let asset = match spec.asset.as_str() {
+        "" => None,
+        name => problems.take(Kind::Asset.parse("job.verify.asset", name))?,
+    };
+    let owner = match spec.owner.as_str() {
+        "" => None,
+        name => problems.take(Kind::Owner.parse("job.verify.owner", name))?,
+    };
+    problems.finish()?;
+    let search = spec.search.then_some(Claim::Search);
+    Ok(asset.map(Claim::Asset).or(owner.map(Claim::Owner)).or(search))
+}
+
+/// The claim of a job that is kept.
+pub(crate) fn of_job(job: &JobRow) -> Result<Option<Claim>> {
+    match &job.spec {
+        JobSpec::Embed(spec) => of_embed(spec),
+        JobSpec::Verify(spec) => of_verify(spec),
+        JobSpec::CreateKey(_) => Ok(None),
+    }
+}
+
+impl Service {
+    /// Refuses a claim on what is not there, is of another key, or can't be marked as is asked.
+    pub(crate) async fn check_claim(
+        &self,
+        project: &str,
+        claim: &Claim,
+        key: &KeyRow,
+        submission: &Submission,
+    ) -> Result<()> {
+        let (field, key_field) = match submission.spec.kind() {
+            JobKind::Embed => ("job.embed.asset", "job.embed.key"),
+            _ => ("job.verify.asset", "job.verify.key"),
+        };
+        let id = match claim {
+            Claim::Search => return Ok(()),
+            Claim::Owner(id) => {
+                return self.own_owner(project, *id).await.map(|_| ());
+            }
+            Claim::Asset(id) => *id,
+        };
+        let asset = self.own_asset(project, id).await?;
+        if asset.key != key.id {
+            let reason = format!("was registered for {}, not for this key", Kind::Key.name(asset.key));
+            return Err(Error::invalid(field, reason));
+        }
+        if submission.spec.kind() != JobKind::Embed {
+            return Ok(());
+        }
+        if key.bits != marks::bits() {
+            let reason = format!("has {} bits, assets are marked with {}", key.bits, marks::bits());
+            return Err(Error::invalid(key_field, reason));
+        }
+        // One that is gone is told of by the ledger, which also knows whether the same was asked for before.
+        let Some(scene) = self.scene(project, submission).await? else {
+            return Ok(());
+        };
+        if upload::digest(&scene) != Some(asset.sha256) {
+            let reason = format!(
+                "has the SHA-256 {scene}, and the original that was registered has {}",
+                hex::encode(asset.sha256)
+            );
+            return Err(Error::invalid("job.embed.scene", reason));
+        }
+        Ok(())
+    }
+
+    /// SHA-256 of the first input, if it is there.
+    async fn scene(&self, project: &str, submission: &Submission) -> Result<Option<String>> {
+        let Some(&id) = submission.inputs.first() else {
+            return Ok(None);
+        };
+        Ok(self.find_artifact(project, id).await?.map(|row| row.sha256))
+    }
+
+    /// The word that an asset of a key is marked with, in hexadecimal, for the worker that marks it.
+    pub(crate) async fn word_of(&self, spec: &EmbedSpec) -> Result<Option<String>> {
+        let Some(Claim::Asset(id)) = of_embed(spec)? else {
+            return Ok(None);
+        };
+        let key = Kind::Key.parse("job.embed.key", &spec.key)?;
+        let asset = self.ledger().candidate(id).await?;
+        let asset = asset.ok_or_else(|| Kind::Asset.not_found(id))?;
+        Ok(Some(marks::mark(self.master(), key, &asset)?.word.to_string()))
+    }
+}

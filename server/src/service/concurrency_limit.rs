@@ -1,0 +1,70 @@
+//! How many watches a caller may have open: so many, by project where tokens are asked for, by address where not.
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::error::{Error, Result};
+use crate::service::rate_limit::Payer;
+
+/// Counts what callers have open. What is kept is bounded by what is open.
+#[derive(Default)]
+pub struct Places(Mutex<HashMap<Payer, u32>>);
+
+/// Of one watch, for as long as its stream is there: also of one that was shed, since it still takes room.
+pub struct Place {
+    places: Arc<Places>,
+    payer: Payer,
+}
+
+impl Places {
+    /// A place for one more, if the caller has fewer than `most`; 0 is no limit.
+    pub fn take(self: &Arc<Self>, payer: Payer, most: u32) -> Result<Place> {
+        let mut open = self.lock();
+        let count = open.get(&payer).copied().unwrap_or(0);
+        if most > 0 && count >= most {
+            return Err(Error::TooManyWatches { limit: most });
+        }
+        open.insert(payer.clone(), count.saturating_add(1));
+        drop(open);
+        Ok(Place {
+            places: self.clone(),
+            payer,
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<Payer, u32>> {
+        // What it holds is whole at every moment.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut open = self.places.lock();
+        match open.get_mut(&self.payer) {
+            Some(count) if *count > 1 => *count -= 1,
+            _ => drop(open.remove(&self.payer)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_caller_has_so_many_at_once_and_others_have_theirs() {
+        let places = Arc::new(Places::default());
+        let take = |name: &str, most| places.take(Payer::Project(name.into()), most);
+        let (first, _second) = (take("one", 2).unwrap(), take("one", 2).unwrap());
+        assert!(matches!(take("one", 2), Err(Error::TooManyWatches { limit: 2 })));
+        let other = take("other", 2).unwrap();
+        drop(first);
+        let third = take("one", 2).unwrap();
+        assert!(take("one", 2).is_err());
+        drop((third, other));
+        assert_eq!(places.lock().len(), 1);
+        let many: Vec<_> = (0..100).map(|_| take("one", 0).unwrap()).collect();
+        drop(many);
+        take("one", 2).unwrap();
+    }
+}

@@ -1,0 +1,119 @@
+//! A decided claim as the report tells it.
+use guardsplat_codeword::{Answer, ReadPayload, Verdict as Decision};
+use guardsplat_evidence as evidence;
+use guardsplat_evidence::{Bit, Found, Framing, Reason, Tried, Verdict, Verification};
+
+use super::{Decided, payload};
+use crate::error::Result;
+use crate::ledger::KeyRow;
+use crate::service::names::Kind;
+
+/// A claim that was decided, with how it was read.
+pub struct Read<'a> {
+    /// The outcome.
+    pub decided: &'a Decided,
+    /// The framings that were tried.
+    pub framings: Vec<Framing>,
+    /// Whether the claim named the asset, whose owner may see its word even where it does not match.
+    pub named: bool,
+}
+
+impl Read<'_> {
+    /// What the report says of it.
+    pub fn verification(&self, key: &KeyRow) -> Result<Verification> {
+        let answer = &self.decided.tested.answer;
+        let verdict = match answer.verdict {
+            Decision::Match => Verdict::Match,
+            Decision::NoMatch => Verdict::NoMatch,
+            Decision::Inconclusive => Verdict::Inconclusive,
+            Decision::UnknownKey => Verdict::UnknownKey,
+        };
+        Ok(Verification {
+            verdict,
+            reason: self.reason(),
+            note: self.note(),
+            tried: Tried {
+                framings: self.framings.clone(),
+                owners: self.decided.tried.owners,
+                assets: self.decided.tried.assets,
+            },
+            views: answer.best.as_ref().map_or(0, |best| best.views),
+            decision: answer.best.as_ref().map(|best| {
+                let (bits, corrected) = (answer.bits, corrected(answer));
+                evidence::Decision::new(bits, best.matched_bits, corrected, answer.hypotheses, answer.rate)
+            }),
+            found: self.found(key)?,
+            strip: self.strip(),
+        })
+    }
+
+    fn reason(&self) -> Option<Reason> {
+        let answer = &self.decided.tested.answer;
+        let inconclusive = answer.verdict == Decision::Inconclusive;
+        inconclusive.then(|| match answer.needed_bits {
+            Some(_) => Reason::WeakReading,
+            None if self.decided.too_few_bits() => Reason::TooFewBits,
+            None => Reason::TooManyHypotheses,
+        })
+    }
+
+    fn note(&self) -> Option<String> {
+        let answer = &self.decided.tested.answer;
+        let framing = answer.best.as_ref().map(|best| match best.undecided_bits {
+            0 => format!("best in this framing: {}", best.framing),
+            bits => format!("best in this framing: {}; {bits} bits were undecided", best.framing),
+        });
+        answer.reason.clone().or(framing)
+    }
+
+    fn found(&self, key: &KeyRow) -> Result<Option<Found>> {
+        let matches = self.decided.tested.answer.verdict == Decision::Match;
+        let Some(best) = self.decided.best.as_ref().filter(|_| matches) else {
+            return Ok(None);
+        };
+        let named = |display_name: &str, name: String| match display_name {
+            "" => name,
+            display_name => format!("{display_name} ({name})"),
+        };
+        Ok(Some(Found {
+            owner: named(&best.owner.display_name, Kind::Owner.name(best.owner.id)),
+            asset: named(&best.asset.display_name, Kind::Asset.name(best.asset.id)),
+            payload: Some(payload(key, best.asset.payload)?),
+        }))
+    }
+
+    fn strip(&self) -> Vec<Bit> {
+        let tested = &self.decided.tested;
+        let Some(confidences) = &tested.confidences else {
+            return Vec::new();
+        };
+        // A search that found nothing is nobody's business but the searcher's, who owns none of these assets.
+        let known = self.named || tested.answer.verdict == Decision::Match;
+        let target = self.decided.best.as_ref().filter(|_| known);
+        let mut wanted = target.into_iter().flat_map(|best| best.target.word.bits());
+        let read = confidences.word.bits();
+        let each = read.zip(&confidences.bits).zip(&self.decided.logits);
+        each.map(|((read, &confidence), &logit)| {
+            let wanted = wanted.next();
+            Bit {
+                // An undecided bit matches nothing.
+                wanted: wanted.filter(|_| logit.abs() > 0.0),
+                read,
+                confidence: Some(f64::from(confidence)).filter(|c| c.is_finite()),
+                logit: Some(f64::from(logit)).filter(|logit| logit.is_finite()),
+            }
+        })
+        .collect()
+    }
+}
+
+fn corrected(answer: &Answer) -> Option<u32> {
+    match answer.payload {
+        Some(ReadPayload::Read {
+            corrected_bits,
+            as_registered: true,
+            ..
+        }) => Some(corrected_bits),
+        _ => None,
+    }
+}

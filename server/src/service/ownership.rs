@@ -1,0 +1,118 @@
+//! What a caller may see: what is of their own project. What is another's is not there, in the same words.
+use guardsplat_commitment::Signed;
+use sha2::{Digest, Sha256};
+use uuid::{Builder, Uuid};
+
+use crate::access::{Caller, DEFAULT_PROJECT, Scope};
+use crate::error::{Error, Result};
+use crate::ledger::{
+    ArtifactId, ArtifactRow, AssetId, AssetRow, CommitmentId, JobId, JobKind, JobRow, KeyId, KeyRow, LedgerError,
+    OwnerId, OwnerRow,
+};
+use crate::service::Service;
+use crate::service::names::Kind;
+
+impl Service {
+    pub(crate) async fn own_job(&self, project: &str, id: JobId) -> Result<JobRow> {
+        let row = self.ledger().get_job(id).await?;
+        let own = row.filter(|row| row.project == project);
+        own.ok_or_else(|| Kind::Job.not_found(id))
+    }
+
+    /// A visible artifact, if there is one that is this project's.
+    pub(crate) async fn find_artifact(&self, project: &str, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+        let row = self.ledger().get_artifact(id).await?;
+        Ok(row.filter(|row| row.project == project))
+    }
+
+    pub(crate) async fn own_artifact(&self, project: &str, id: ArtifactId) -> Result<ArtifactRow> {
+        let own = self.find_artifact(project, id).await?;
+        own.ok_or_else(|| Kind::Artifact.not_found(id))
+    }
+
+    /// An artifact whose bytes the caller may have: one of their own project; for workers what a running job reads.
+    pub(crate) async fn readable_artifact(&self, caller: &Caller, id: ArtifactId) -> Result<ArtifactRow> {
+        let row = self.ledger().get_artifact(id).await?;
+        let row = row.ok_or_else(|| Kind::Artifact.not_found(id))?;
+        let works = [Scope::Embed, Scope::Verify].into_iter().any(|s| caller.scopes.has(s));
+        let own = works && row.project == caller.project;
+        if own || caller.scopes.has(Scope::Worker) && self.ledger().is_being_read(id).await? {
+            return Ok(row);
+        }
+        Err(Kind::Artifact.not_found(id))
+    }
+
+    pub(crate) async fn own_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {
+        let row = self.ledger().get_key(id).await?;
+        let own = row.filter(|row| row.project == project);
+        own.ok_or_else(|| Kind::Key.not_found(id))
+    }
+
+    pub(crate) async fn own_owner(&self, project: &str, id: OwnerId) -> Result<OwnerRow> {
+        let row = self.ledger().get_owner(id).await?;
+        let own = row.filter(|row| row.project == project);
+        own.ok_or_else(|| Kind::Owner.not_found(id))
+    }
+
+    pub(crate) async fn own_asset(&self, project: &str, id: AssetId) -> Result<AssetRow> {
+        let row = self.ledger().get_asset(id).await?;
+        let own = row.filter(|row| row.project == project);
+        own.ok_or_else(|| Kind::Asset.not_found(id))
+    }
+
+    pub(crate) async fn own_commitment(&self, project: &str, id: CommitmentId) -> Result<Signed> {
+        let missing = || Kind::Commitment.not_found(id);
+        let signed = self.ledger().get_commitment(id).await?.ok_or_else(missing)?;
+        let asset = self.ledger().get_asset(signed.commitment.asset).await?;
+        let own = asset.is_some_and(|asset| asset.project == project);
+        own.then_some(signed).ok_or_else(missing)
+    }
+}
+
+/// What one must be allowed to do for a job of this kind.
+pub(crate) fn scope_of(kind: JobKind) -> Scope {
+    match kind {
+        JobKind::Embed | JobKind::CreateKey => Scope::Embed,
+        JobKind::Verify => Scope::Verify,
+    }
+}
+
+/// The name that a request of a project has in the ledger, so that nobody's requests are in the way of anybody else's.
+pub(crate) fn request(project: &str, id: Uuid) -> Uuid {
+    if project == DEFAULT_PROJECT {
+        // As before there were projects, so that requests of then are known.
+        return id;
+    }
+    let mut hash = Sha256::new_with_prefix(b"guardsplat request id\0");
+    hash.update(project.as_bytes());
+    hash.update(b"\0");
+    hash.update(id.as_bytes());
+    let hash = hash.finalize();
+    Builder::from_custom_bytes(std::array::from_fn(|i| hash[i])).into_uuid()
+}
+
+/// The ledger's error, with the request id as the caller gave it.
+pub(crate) fn as_asked(error: LedgerError, asked: Option<Uuid>) -> Error {
+    match (error, asked) {
+        (LedgerError::RequestIdReused(_), Some(request_id)) => Error::RequestIdReused { request_id },
+        (error, _) => error.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_of_projects_are_apart() {
+        let id = Uuid::new_v4();
+        assert_eq!(request(DEFAULT_PROJECT, id), id);
+        let names = [request("a", id), request("b", id), request("a", Uuid::new_v4()), id];
+        for (i, name) in names.iter().enumerate() {
+            assert!(!names[..i].contains(name));
+        }
+        assert_eq!(request("a", id), names[0]);
+        let told = as_asked(LedgerError::RequestIdReused(names[0]), Some(id)).to_string();
+        assert!(told.contains(&id.to_string()), "{told}");
+    }
+}

@@ -1,0 +1,40 @@
+//! What a project may take: queued jobs, and bytes of artifacts. What arrives at the same moment may go over by itself.
+use crate::error::{Error, Result};
+use crate::ledger::JobKind;
+use crate::service::Service;
+
+impl Service {
+    /// Refuses a job of a project that has as many queued as it may, or that would leave a file where there is no room.
+    pub(crate) async fn room_for_job(&self, project: &str, kind: JobKind) -> Result<()> {
+        let limits = self.limits();
+        if let Some(limit) = limits.max_queued_of_project
+            && self.ledger().usage(project).await?.queued_jobs >= limit
+        {
+            return Err(used_up("queued jobs", project, limit));
+        }
+        match kind {
+            JobKind::Embed => self.room_for_bytes(project, 1).await,
+            JobKind::Verify | JobKind::CreateKey => Ok(()),
+        }
+    }
+
+    /// Refuses bytes that would take a project over what it may have.
+    pub(crate) async fn room_for_bytes(&self, project: &str, bytes: u64) -> Result<()> {
+        let Some(limit) = self.limits().max_bytes_of_project else {
+            return Ok(());
+        };
+        let used = self.ledger().usage(project).await?.artifact_bytes;
+        if used.saturating_add(bytes) > limit {
+            return Err(used_up("bytes of artifacts", project, limit));
+        }
+        Ok(())
+    }
+}
+
+fn used_up(what: &'static str, project: &str, limit: u64) -> Error {
+    Error::QuotaUsedUp {
+        what,
+        project: project.to_owned(),
+        limit,
+    }
+}

@@ -1,0 +1,85 @@
+//! Commitments as they are told: one, all in their order, and as documents that stand for themselves.
+use guardsplat_commitment::{Document, Signed};
+use guardsplat_proto::v1::{Commitment, ListCommitmentsRequest, ListCommitmentsResponse, PublicKey};
+use uuid::Uuid;
+
+use crate::error::{Error, Result};
+use crate::service::Service;
+use crate::service::clock::timestamp;
+use crate::service::names::Kind;
+use crate::service::page;
+
+/// What page tokens of this list are bound to.
+const QUERY: &[&[u8]] = &[b"commitments"];
+
+impl Service {
+    pub(crate) async fn commitment(&self, project: &str, name: &str) -> Result<Signed> {
+        let id = Kind::Commitment.parse("name", name)?;
+        self.own_commitment(project, id).await
+    }
+
+    pub(crate) async fn page_of_commitments(
+        &self,
+        project: &str,
+        request: &ListCommitmentsRequest,
+    ) -> Result<ListCommitmentsResponse> {
+        let size = page::size(request.page_size)?;
+        let after = page::position(QUERY, &request.page_token)?.map_or(0, |(sequence, _)| sequence);
+        // One more than asked for tells whether there is another page.
+        let rows = self.ledger().list_commitments(project, after, size + 1).await?;
+        let (rows, next_page_token) = page::cut(QUERY, rows, size, |row| (sequence(row), row.commitment.id));
+        Ok(ListCommitmentsResponse {
+            commitments: rows.iter().map(to_proto).collect(),
+            next_page_token,
+        })
+    }
+
+    pub(crate) async fn head(&self, project: &str) -> Result<Commitment> {
+        let head = self.ledger().head(project).await?;
+        // The chain itself has no name; none has this id.
+        let head = head.ok_or_else(|| Kind::Commitment.not_found(Uuid::nil()))?;
+        Ok(to_proto(&head))
+    }
+
+    pub(crate) async fn document(&self, project: &str, name: &str) -> Result<String> {
+        let document = Document {
+            signed: self.commitment(project, name).await?,
+            public_key: self.notary().public_key(),
+        };
+        document
+            .to_json()
+            .map_err(|error| Error::internal("writing a commitment", error))
+    }
+
+    pub(crate) fn public_key(&self) -> Result<PublicKey> {
+        let key = self.notary().public_key();
+        let pem = key
+            .to_pem()
+            .map_err(|error| Error::internal("writing the public key", error))?;
+        Ok(PublicKey { hex: key.to_hex(), pem })
+    }
+}
+
+/// A commitment for the API.
+pub(crate) fn to_proto(signed: &Signed) -> Commitment {
+    let commitment = &signed.commitment;
+    Commitment {
+        name: Kind::Commitment.name(commitment.id),
+        sequence: sequence(signed),
+        previous_hash: hex::encode(commitment.previous),
+        asset: Kind::Asset.name(commitment.asset),
+        owner: Kind::Owner.name(commitment.owner),
+        sha256: hex::encode(commitment.sha256),
+        key: Kind::Key.name(commitment.key),
+        payload_number: i64::try_from(commitment.payload).unwrap_or(i64::MAX),
+        nonce_hash: hex::encode(commitment.nonce_hash),
+        commit_time: Some(timestamp(commitment.time)),
+        hash: hex::encode(signed.hash()),
+        signature: hex::encode(signed.signature),
+    }
+}
+
+/// The place in the chain, which the ledger keeps as a number that fits.
+fn sequence(signed: &Signed) -> i64 {
+    i64::try_from(signed.commitment.sequence).unwrap_or(i64::MAX)
+}
