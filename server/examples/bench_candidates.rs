@@ -4,10 +4,11 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use futures::{StreamExt, TryStreamExt, stream};
+use guardsplat_proto::v1::{KeyResult, KeySpec};
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobKind, KeyId, Ledger, Needs, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, SqliteLedger,
-    candidates,
+    Completion, JobResult, JobSpec, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, Registry,
+    ResourceRequirements, SqliteLedger, candidates,
 };
 use guardsplat_server::notary::{self, Notary};
 use guardsplat_server::secrets::MasterKey;
@@ -106,8 +107,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         id: Uuid::now_v7(),
         project: DEFAULT_PROJECT.into(),
         display_name: "key".into(),
-        kind: JobKind::CreateKey,
-        spec: Vec::new(),
+        spec: JobSpec::CreateKey(KeySpec::default()),
         inputs: Vec::new(),
         key: None,
         request_id: None,
@@ -116,7 +116,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         max_attempts: 1,
         trace_parent: None,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
     };
     let job = ledger.create_job(job, 0).await?.id;
     let lease = ledger
@@ -149,7 +149,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
     };
     let id = key.id;
     let completion = Completion {
-        result: Vec::new(),
+        result: JobResult::CreateKey(KeyResult::default()),
         outputs: Vec::new(),
         key: Some(key),
         fingerprint: [0; 32],

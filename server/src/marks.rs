@@ -9,12 +9,12 @@ use secrecy::zeroize::Zeroizing;
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::ledger::{Candidate, KeyId};
+use crate::ledger::{Candidate, KeyId, MARK_CODE};
 use crate::notary;
 use crate::secrets::MasterKey;
 
-/// The code of all marks: 2 bits of version, 10 of the key and 24 of the payload number in 64.
-pub const CODE: Code = Code::Bch36;
+/// The code of all marks, by which the ledger numbers them.
+pub const CODE: Code = MARK_CODE;
 
 /// Bits that a key must have for its assets to be marked.
 pub fn bits() -> u32 {

@@ -128,7 +128,7 @@ mod tests {
     use uuid::Uuid;
 
     use super::*;
-    use crate::ledger::SqliteLedger;
+    use crate::ledger::{CommitmentLog as _, SqliteLedger};
 
     #[test]
     fn nonces_open_in_their_place_only() {

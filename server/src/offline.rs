@@ -12,7 +12,7 @@ use uuid::Uuid;
 use crate::access::{self, DEFAULT_PROJECT, Scope, Scopes, check_project};
 use crate::backup;
 use crate::error::{Error, Result};
-use crate::ledger::{AccessLedger, NewToken, TokenRow};
+use crate::ledger::{NewToken, TokenLedger, TokenRow};
 use crate::run::{ledger, startup};
 use crate::service::{clock, text};
 use crate::settings::Settings;
@@ -115,7 +115,7 @@ pub async fn run(settings: &Settings, command: Command) -> Result<Said> {
     said
 }
 
-async fn create(ledger: &dyn AccessLedger, arguments: Create) -> Result<Said> {
+async fn create(ledger: &dyn TokenLedger, arguments: Create) -> Result<Said> {
     check_project("--project", &arguments.project)?;
     text::display_name("--display-name", &arguments.display_name)?;
     let now = clock::now();
@@ -144,7 +144,7 @@ async fn create(ledger: &dyn AccessLedger, arguments: Create) -> Result<Said> {
     })
 }
 
-async fn list(ledger: &dyn AccessLedger, project: Option<&str>) -> Result<Said> {
+async fn list(ledger: &dyn TokenLedger, project: Option<&str>) -> Result<Said> {
     let mut said = Said::default();
     let mut before = None;
     loop {
@@ -160,7 +160,7 @@ async fn list(ledger: &dyn AccessLedger, project: Option<&str>) -> Result<Said> 
     Ok(said)
 }
 
-async fn revoke(ledger: &dyn AccessLedger, name: &str) -> Result<Said> {
+async fn revoke(ledger: &dyn TokenLedger, name: &str) -> Result<Said> {
     let id = name.strip_prefix("tokens/").unwrap_or(name);
     let id =
         Uuid::try_parse(id).map_err(|_| Error::invalid("TOKEN", "must be the id of a token, or tokens/ and it"))?;

@@ -104,7 +104,7 @@ impl Traces {
         let context = below(Some(&request));
         let attributes = [
             KeyValue::new("guardsplat.job", job.id.to_string()),
-            KeyValue::new("guardsplat.kind", metrics::kind(job.kind)),
+            KeyValue::new("guardsplat.kind", metrics::kind(job.kind())),
             KeyValue::new("guardsplat.attempt", i64::from(job.attempt)),
         ];
         if metrics::is_first(job) {
@@ -114,7 +114,7 @@ impl Traces {
                 .with_attributes(attributes.clone());
             waited.start_with_context(tracer, &context);
         }
-        let name = match metrics::kind(job.kind) {
+        let name = match metrics::kind(job.kind()) {
             "embed" => "embed",
             "verify" => "verify",
             _ => "create key",

@@ -42,13 +42,13 @@ impl JobService for Service {
         let caller = caller(&request)?;
         let id = Kind::Job.parse("name", &request.get_ref().name)?;
         let job = self.own_job(&caller.project, id).await?;
-        caller.must(ownership::scope_of(job.kind))?;
+        caller.must(ownership::scope_of(job.kind()))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
         // A running job ends when its worker has heard of it.
         self.metrics().job_ended(&row);
         self.changes().job(id);
         self.changes().queue_moved();
-        Ok(Response::new(to_proto::job(row)?))
+        Ok(Response::new(to_proto::job(row)))
     }
 
     type WatchJobStream = BoxStream<'static, Result<WatchJobResponse, Status>>;

@@ -31,7 +31,7 @@ impl Service {
         let announced = upload::announced("metadata.upload", &upload)?;
         let token = metadata.lease_token;
         let leased = self.ledger().leased_job(job, &token).await.map_err(Error::from)?;
-        if metadata.secret && leased.kind != JobKind::CreateKey {
+        if metadata.secret && leased.kind() != JobKind::CreateKey {
             return Err(Error::invalid("metadata.secret", "only jobs that make a key have secret outputs").into());
         }
         let id = Uuid::now_v7();

@@ -90,7 +90,7 @@ impl WorkerService for Service {
         // What is said again was counted before.
         if !job.state.is_over() {
             self.count_mark(&done);
-            self.metrics().memory_taken(done.kind, peak, on_device);
+            self.metrics().memory_taken(done.kind(), peak, on_device);
             self.attempt_over(&done);
         }
         Ok(Response::new(CompleteJobResponse {}))
@@ -118,7 +118,7 @@ impl WorkerService for Service {
             .await;
         let failed = failed.map_err(Error::from)?;
         self.metrics()
-            .memory_taken(failed.kind, peak_memory_bytes, peak_device_memory_bytes);
+            .memory_taken(failed.kind(), peak_memory_bytes, peak_device_memory_bytes);
         self.attempt_over(&failed);
         Ok(Response::new(FailJobResponse {}))
     }

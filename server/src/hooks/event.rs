@@ -1,12 +1,10 @@
 //! What a hook is sent: a CloudEvents 1.0 message in structured JSON that says what became of a job. It has figures and
 //! names, and never a message, a payload or a key.
 use guardsplat_proto::v1::failure::Reason;
-use guardsplat_proto::v1::{EmbedResult, Failure, KeyResult, VerifyResult};
-use prost::{DecodeError, Message};
 use serde::Serialize;
 use uuid::Uuid;
 
-use crate::ledger::{ArtifactId, ArtifactRow, DeliveryRow, JobKind, JobRow, JobState};
+use crate::ledger::{ArtifactId, ArtifactRow, DeliveryRow, FailureReason, JobKind, JobResult, JobRow, JobState};
 
 /// What such a message is, for the header.
 pub const CONTENT_TYPE: &str = "application/cloudevents+json; charset=utf-8";
@@ -90,47 +88,32 @@ pub fn event_type(state: JobState) -> String {
 }
 
 /// Artifacts that came out of a job, and what each is.
-///
-/// # Errors
-/// That the ledger's row can't be read.
-pub fn outputs(job: &JobRow) -> Result<Vec<(&'static str, ArtifactId)>, DecodeError> {
-    let Some(result) = job.result.as_deref() else {
-        return Ok(Vec::new());
-    };
-    let named = match job.kind {
-        JobKind::Embed => {
-            let result = EmbedResult::decode(result)?;
-            vec![
-                ("scene", result.scene),
-                ("comparison", result.comparison),
-                ("evidence_html", result.evidence_html),
-                ("evidence_json", result.evidence_json),
-            ]
-        }
-        JobKind::Verify => {
-            let result = VerifyResult::decode(result)?;
-            vec![
-                ("evidence_html", result.evidence_html),
-                ("evidence_json", result.evidence_json),
-            ]
-        }
-        JobKind::CreateKey => Vec::new(),
+pub fn outputs(job: &JobRow) -> Vec<(&'static str, ArtifactId)> {
+    let named = match &job.result {
+        Some(JobResult::Embed(result)) => vec![
+            ("scene", &result.scene),
+            ("comparison", &result.comparison),
+            ("evidence_html", &result.evidence_html),
+            ("evidence_json", &result.evidence_json),
+        ],
+        Some(JobResult::Verify(result)) => vec![
+            ("evidence_html", &result.evidence_html),
+            ("evidence_json", &result.evidence_json),
+        ],
+        Some(JobResult::CreateKey(_)) | None => Vec::new(),
     };
     let id = |name: &str| Uuid::try_parse(name.strip_prefix("artifacts/")?).ok();
     let found = named.iter().filter_map(|(role, name)| Some((*role, id(name)?)));
-    Ok(found.collect())
+    found.collect()
 }
 
 /// The message for a delivery; the same however often it is sent.
-///
-/// # Errors
-/// That the ledger's row can't be read.
 pub fn body(
     delivery: &DeliveryRow,
     job: &JobRow,
     asked_id: Option<Uuid>,
     artifacts: Vec<(&'static str, ArtifactRow)>,
-) -> Result<Vec<u8>, DecodeError> {
+) -> Vec<u8> {
     let failure = job.failure.as_ref().filter(|_| job.state == JobState::Failed);
     let event = Event {
         specversion: "1.0",
@@ -143,7 +126,7 @@ pub fn body(
         data: Data {
             job: format!("jobs/{}", job.id),
             display_name: &job.display_name,
-            kind: match job.kind {
+            kind: match job.kind() {
                 JobKind::Embed => "embed",
                 JobKind::Verify => "verify",
                 JobKind::CreateKey => "create_key",
@@ -154,59 +137,47 @@ pub fn body(
             create_time: time(job.create_time),
             end_time: time(delivery.create_time),
             artifacts: artifacts.into_iter().map(artifact).collect(),
-            figures: figures(job)?,
+            figures: figures(job),
             failure_reason: failure.map(|failure| reason(failure.reason)),
         },
     };
     // Structs with text for keys always have a JSON form.
-    Ok(serde_json::to_vec(&event).unwrap_or_default())
+    serde_json::to_vec(&event).unwrap_or_default()
 }
 
-fn figures(job: &JobRow) -> Result<Option<Figures>, DecodeError> {
-    let Some(result) = job.result.as_deref() else {
-        return Ok(None);
-    };
-    let some = |text: String| Some(text).filter(|text| !text.is_empty());
-    Ok(Some(match job.kind {
-        JobKind::Embed => {
-            let result = EmbedResult::decode(result)?;
-            Figures::Embed {
-                bit_accuracy: result.bit_accuracy,
-                bit_accuracy_worst_view: result.bit_accuracy_worst_view,
-                message_recovered: result.message_recovered,
-                psnr_db: result.psnr_db,
-                ssim: result.ssim,
-                lpips: result.lpips,
-                steps: result.steps,
-                gaussians: result.gaussians,
-                changed_gaussians: result.changed_gaussians,
-                target_missed: result.target_missed,
-            }
-        }
-        JobKind::Verify => {
-            let result = VerifyResult::decode(result)?;
-            Figures::Verify {
-                verdict: word(result.verdict().as_str_name(), "VERDICT_"),
-                p_value: result.p_value,
-                threshold: result.threshold,
-                matched_bits: result.matched_bits,
-                needed_bits: result.needed_bits,
-                bits: result.bits,
-                views: result.views,
-                bit_accuracy: result.bit_accuracy,
-                asset: some(result.asset),
-                owner: some(result.owner),
-            }
-        }
-        JobKind::CreateKey => {
-            let result = KeyResult::decode(result)?;
-            Figures::CreateKey {
-                key: result.key,
-                bit_accuracy_unseen: result.bit_accuracy_unseen,
-                bit_accuracy_unseen_noisy: result.bit_accuracy_unseen_noisy,
-            }
-        }
-    }))
+fn figures(job: &JobRow) -> Option<Figures> {
+    let some = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+    Some(match job.result.as_ref()? {
+        JobResult::Embed(result) => Figures::Embed {
+            bit_accuracy: result.bit_accuracy,
+            bit_accuracy_worst_view: result.bit_accuracy_worst_view,
+            message_recovered: result.message_recovered,
+            psnr_db: result.psnr_db,
+            ssim: result.ssim,
+            lpips: result.lpips,
+            steps: result.steps,
+            gaussians: result.gaussians,
+            changed_gaussians: result.changed_gaussians,
+            target_missed: result.target_missed.clone(),
+        },
+        JobResult::Verify(result) => Figures::Verify {
+            verdict: word(result.verdict().as_str_name(), "VERDICT_"),
+            p_value: result.p_value,
+            threshold: result.threshold,
+            matched_bits: result.matched_bits,
+            needed_bits: result.needed_bits,
+            bits: result.bits,
+            views: result.views,
+            bit_accuracy: result.bit_accuracy,
+            asset: some(&result.asset),
+            owner: some(&result.owner),
+        },
+        JobResult::CreateKey(result) => Figures::CreateKey {
+            key: result.key.clone(),
+            bit_accuracy_unseen: result.bit_accuracy_unseen,
+            bit_accuracy_unseen_noisy: result.bit_accuracy_unseen_noisy,
+        },
+    })
 }
 
 fn artifact((role, row): (&'static str, ArtifactRow)) -> Artifact {
@@ -219,12 +190,9 @@ fn artifact((role, row): (&'static str, ArtifactRow)) -> Artifact {
     }
 }
 
-fn reason(number: i32) -> String {
-    let failure = Failure {
-        reason: number,
-        message: String::new(),
-    };
-    let known: Reason = failure.reason();
+fn reason(reason: FailureReason) -> String {
+    // Numbers are those of the API.
+    let known = Reason::try_from(reason as i32).unwrap_or_default();
     word(known.as_str_name(), "REASON_")
 }
 
@@ -254,22 +222,23 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::ledger::{DeliveryState, Failure as Failed, Needs};
+    use guardsplat_proto::v1::{EmbedSpec, KeyResult, KeySpec, VerifyResult, VerifySpec};
+
+    use crate::ledger::{DeliveryState, Failure as Failed, JobSpec, Progress, ResourceRequirements};
 
     const SECRET: &str = "5ec2e75ec2e75ec2";
 
-    fn row(kind: JobKind, state: JobState, result: Option<Vec<u8>>) -> JobRow {
+    fn row(spec: JobSpec, state: JobState, result: Option<JobResult>) -> JobRow {
         JobRow {
             id: Uuid::from_u128(7),
             project: "studio".into(),
             display_name: "a \"scene\"".into(),
-            kind,
-            spec: SECRET.into(),
+            spec,
             state,
             cancel_requested: false,
             attempt: 2,
             max_attempts: 3,
-            progress: Some(SECRET.into()),
+            progress: Some(Progress::default()),
             result,
             failure: None,
             create_time: 1_000_000,
@@ -280,7 +249,7 @@ mod tests {
             revision: 5,
             trace_parent: None,
             priority: 0,
-            needs: Needs::default(),
+            requirements: ResourceRequirements::default(),
             queue_position: None,
         }
     }
@@ -301,7 +270,7 @@ mod tests {
             last_time: None,
             end_time: None,
         };
-        let body = body(&delivery, job, None, Vec::new()).unwrap();
+        let body = body(&delivery, job, None, Vec::new());
         let text = String::from_utf8(body.clone()).unwrap();
         assert!(!text.contains(SECRET) && !text.contains("4711"), "{text}");
         serde_json::from_slice(&body).unwrap()
@@ -319,8 +288,15 @@ mod tests {
             asset: "assets/7".into(),
             ..VerifyResult::default()
         };
-        let job = row(JobKind::Verify, JobState::Succeeded, Some(result.encode_to_vec()));
-        assert_eq!(outputs(&job).unwrap(), [("evidence_json", Uuid::from_u128(3))]);
+        let job = row(
+            JobSpec::Verify(VerifySpec {
+                message: SECRET.into(),
+                ..VerifySpec::default()
+            }),
+            JobState::Succeeded,
+            Some(JobResult::Verify(result)),
+        );
+        assert_eq!(outputs(&job), [("evidence_json", Uuid::from_u128(3))]);
         let event = event(&job);
         assert_eq!(event["type"], "guardsplat.job.succeeded.v1");
         assert_eq!(
@@ -346,19 +322,26 @@ mod tests {
             ..KeyResult::default()
         };
         let made = event(&row(
-            JobKind::CreateKey,
+            JobSpec::CreateKey(KeySpec::default()),
             JobState::Succeeded,
-            Some(result.encode_to_vec()),
+            Some(JobResult::CreateKey(result)),
         ));
         assert_eq!(made["data"]["figures"]["key"], "keys/7");
         // What is no number has no form in JSON.
         assert_eq!(made["data"]["figures"]["bit_accuracy_unseen"], Value::Null);
         let failed = JobRow {
             failure: Some(Failed {
-                reason: Reason::TargetMissed.into(),
+                reason: FailureReason::TargetMissed,
                 message: format!("read {SECRET}"),
             }),
-            ..row(JobKind::Embed, JobState::Failed, None)
+            ..row(
+                JobSpec::Embed(EmbedSpec {
+                    message: SECRET.into(),
+                    ..EmbedSpec::default()
+                }),
+                JobState::Failed,
+                None,
+            )
         };
         let told = event(&failed);
         assert_eq!(

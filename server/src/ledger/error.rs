@@ -104,6 +104,18 @@ pub enum LedgerError {
         /// The value.
         value: i64,
     },
+    /// A row holds a message that is none.
+    #[error("the {what} of a job that the ledger holds can't be read")]
+    Undecodable {
+        /// What kind of message.
+        what: &'static str,
+        /// Why not.
+        #[source]
+        source: prost::DecodeError,
+    },
+    /// The result is of another kind than the job.
+    #[error("the result of job {0} is one of another kind of job")]
+    ResultOfAnotherKind(JobId),
     /// The ledger has been closed.
     #[error("the ledger is closed")]
     Closed,

@@ -1,5 +1,4 @@
-//! The order of the queue, and the workers that it is given to: a trait of its own beside [`super::Ledger`], which has
-//! it as a supertrait.
+//! The queue: the order in which jobs are given to workers, and the leases that they are given under.
 //!
 //! Jobs of one project and one priority are a *lane*, and leave it in the order of their `queue_time`. Of all lanes the
 //! one of the highest priority is served first; of several the one whose project has the fewest running jobs; of those
@@ -8,7 +7,9 @@
 use std::time::Duration;
 
 use super::Result;
-use super::types::{JobId, JobRow, Lease};
+use super::types::{Completion, Failure, JobId, JobRow, Lease};
+use super::work::Progress;
+use super::workers::WorkerCapabilities;
 
 /// What may be asked for.
 pub const PRIORITIES: std::ops::RangeInclusive<i32> = -10..=10;
@@ -16,77 +17,82 @@ pub const PRIORITIES: std::ops::RangeInclusive<i32> = -10..=10;
 /// After so long without a turn a lane gets one, whatever its priority.
 pub const PATIENCE: Duration = Duration::from_secs(10 * 60);
 
-/// What a job asks of the worker that it is given to.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Needs {
-    /// Bytes of memory that it takes at least; none where that is not known.
-    pub memory: Option<i64>,
-    /// Bytes that it will probably take.
-    pub likely_memory: Option<i64>,
-    /// SHA-256 of the CLIP of its key, lower-case hexadecimal.
-    pub clip: Option<String>,
-}
-
-/// Who takes a job, and which ones may be given.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Taker {
-    /// The worker.
-    pub worker: String,
-    /// Most bytes of memory that a job may take at least; none for no limit.
-    pub memory: Option<i64>,
-    /// Most bytes that a job may probably take; none for no limit.
-    pub likely_memory: Option<i64>,
-    /// CLIPs that it can load; any, when there are none.
-    pub clips: Vec<String>,
-}
-
-impl Taker {
-    /// A worker that takes whatever comes.
-    pub fn of_anything(worker: &str) -> Self {
-        Self {
-            worker: worker.to_owned(),
-            ..Self::default()
-        }
-    }
-
-    /// CLIPs as a statement takes them: none for any.
-    pub(super) fn clips(&self) -> Option<&[String]> {
-        Some(&self.clips[..]).filter(|clips| !clips.is_empty())
-    }
-}
-
-/// A worker as it described itself when it asked for a job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SeenWorker {
-    /// What it calls itself.
-    pub name: String,
-    /// What it computes on.
-    pub device: String,
-    /// Bytes of memory that a job may take there; none where it did not say.
-    pub memory: Option<i64>,
-    /// CLIPs that it can load; any, when there are none.
-    pub clips: Vec<String>,
-}
-
-/// What the service keeps of the queue's order, and of who takes jobs.
+/// The queue, and jobs as workers see them: leased, reported on, ended.
 #[tonic::async_trait]
-pub trait QueueLedger: Send + Sync + 'static {
+pub trait JobQueue: Send + Sync + 'static {
     /// Gives the next job that it can hold to a worker, counting the attempt. A job whose attempts are used up is never
     /// given out; it fails here.
-    async fn claim_for(&self, taker: &Taker, lease: Duration, now: i64) -> Result<Option<Lease>>;
+    async fn claim_for(&self, capabilities: &WorkerCapabilities, lease: Duration, now: i64) -> Result<Option<Lease>>;
 
-    /// Notes that a worker was seen, and forgets those that were not for a day.
-    async fn note_worker(&self, worker: SeenWorker, now: i64) -> Result<()>;
+    /// Gives the next job to a worker that takes any, as [`JobQueue::claim_for`] does.
+    async fn claim(&self, worker: &str, lease: Duration, now: i64) -> Result<Option<Lease>> {
+        self.claim_for(&WorkerCapabilities::of_anything(worker), lease, now)
+            .await
+    }
 
-    /// Workers that were seen since then, or that have a job, by name.
-    async fn workers_since(&self, since: i64) -> Result<Vec<SeenWorker>>;
+    /// The job, if `token` is its current lease.
+    ///
+    /// # Errors
+    /// `NotFound`, `LeaseLost`.
+    async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow>;
 
-    /// One job as it stands, without its position in the queue.
-    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>>;
+    /// Extends the lease to `now + lease`, stores progress, and says whether the job is to end. The revision moves only
+    /// when the progress did.
+    ///
+    /// # Errors
+    /// `NotFound`, `LeaseLost`.
+    async fn report(
+        &self,
+        id: JobId,
+        token: &str,
+        progress: Option<Progress>,
+        lease: Duration,
+        now: i64,
+    ) -> Result<bool>;
+
+    /// Ends a job successfully: result, outputs and key become visible at once. The attempt that did so may say the same
+    /// again, in case the answer was lost: it gets the job as it is, and nothing changes.
+    ///
+    /// # Errors
+    /// `NotFound`, `LeaseLost`; `NotAnOutput` for an artifact that this attempt didn't finish writing, or that is
+    /// secret where it must not be, or the other way round.
+    async fn complete(&self, id: JobId, token: &str, completion: Completion, now: i64) -> Result<JobRow>;
+
+    /// Ends an attempt that failed. A retryable failure queues the job again after a pause while attempts are left
+    /// (or ends it as cancelled, if that was asked for); any other fails the job. With `cancelled` the job ends as
+    /// cancelled, and `failure` is not looked at.
+    ///
+    /// # Errors
+    /// `NotFound`, `LeaseLost`; `CancelNotRequested` for `cancelled` when nobody asked.
+    async fn fail(
+        &self,
+        id: JobId,
+        token: &str,
+        failure: Option<Failure>,
+        retryable: bool,
+        cancelled: bool,
+        now: i64,
+    ) -> Result<JobRow>;
+
+    /// Takes a job back without charging the attempt; it gets its old place in the queue, or ends if that was asked
+    /// for.
+    ///
+    /// # Errors
+    /// `NotFound`, `LeaseLost`.
+    async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow>;
+
+    /// Has no lease end before `now + lease`: for a server that begins, or can write again, as no worker could report
+    /// while none could write. Where several servers share the ledger and another of them has looked after leases
+    /// meanwhile, nothing is extended: workers could report to that one, and a server that begins again and again must
+    /// not keep alive what is dead.
+    async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()>;
+
+    /// Ends the attempts whose lease has expired, and returns their jobs.
+    async fn reap(&self, now: i64) -> Result<Vec<JobId>>;
 
     /// The queue in its order, as things stand.
     async fn queue(&self) -> Result<Vec<JobId>>;
-}
 
-/// Microseconds after which a worker that was not seen is forgotten.
-pub(super) const FORGOTTEN: i64 = 24 * 60 * 60 * 1_000_000;
+    /// How many jobs are queued.
+    async fn queue_depth(&self) -> Result<i64>;
+}

@@ -1,10 +1,16 @@
-//! What the registry keeps: owners, assets, the states of keys, and the sealed signing key, without any wire format.
-use guardsplat_codeword::Layout;
-use guardsplat_commitment::Hash;
+//! The registry: owners, assets, and the states of keys.
+use std::sync::Arc;
+
+use guardsplat_codeword::{Code, Layout};
+use guardsplat_commitment::{Hash, SigningKey};
 use uuid::Uuid;
 
+use super::Result;
 use super::types::{ArtifactId, KeyId};
-use crate::marks::CODE;
+
+/// The code of all marks: 2 bits of version, 10 of the key and 24 of the payload number in 64. It says how many payload
+/// numbers a key has.
+pub const MARK_CODE: Code = Code::Bch36;
 
 /// Name of an owner.
 pub type OwnerId = Uuid;
@@ -140,18 +146,55 @@ pub struct Candidate {
     pub sealed_nonce: Vec<u8>,
 }
 
-/// The key that commitments are signed with, sealed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SealedSigningKey {
-    /// The half that signatures are checked with.
-    pub public_key: [u8; 32],
-    /// The seed of the other half, sealed.
-    pub sealed: Vec<u8>,
+/// Owners and assets of all projects.
+#[tonic::async_trait]
+pub trait Registry: Send + Sync + 'static {
+    /// Registers an owner. The same request id with the same display name gives the one that the first call made.
+    ///
+    /// # Errors
+    /// `RequestIdReused` for the same request id with another name, or of another project.
+    async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow>;
+
+    /// One owner.
+    async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>>;
+
+    /// Owners of a project, newest first; those after `before`, as with `list_jobs`.
+    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>>;
+
+    /// Registers an asset: gives it the next payload number of its key, and appends a commitment to the chain, signed by
+    /// `signer`, at once. The same request id with the same owner, key, hash and display name gives the asset that the
+    /// first call made, with the nonce of then.
+    ///
+    /// # Errors
+    /// `RequestIdReused` for the same request id with another asset, or of another project; `NotFound` for an owner or a
+    /// key that isn't there or is another project's; `KeyNotActive`, `PayloadsUsedUp`.
+    async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow>;
+
+    /// The asset that was registered under a request id.
+    async fn find_asset_request(&self, request: Uuid) -> Result<Option<AssetRow>>;
+
+    /// One asset.
+    async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>>;
+
+    /// Assets of a project, newest first; those after `before`, as with `list_jobs`.
+    async fn list_assets(
+        &self,
+        project: &str,
+        filter: AssetFilter,
+        before: Option<(i64, AssetId)>,
+        limit: u32,
+    ) -> Result<Vec<AssetRow>>;
+
+    /// Assets of a key by payload number, those with higher ones than `after`. [`super::candidates::of_key`] reads all.
+    async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>>;
+
+    /// One asset as a search has it.
+    async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>>;
 }
 
 /// How many numbers the messages of a key can hold: all but zero, and no more than the codeword of a mark has room for.
 pub fn payloads(bits: u32) -> i64 {
-    let room = i64::from(Layout::of(CODE).largest_number());
+    let room = i64::from(Layout::of(MARK_CODE).largest_number());
     room.min((1_i64 << bits.min(62)) - 1)
 }
 

@@ -1,14 +1,15 @@
 //! What becomes of a job that leaves the queue or its worker: decided here, written by each database in one place.
 use std::time::Duration;
 
-use super::types::{Failure, JobId, JobRow, JobState, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST};
+use super::types::{Failure, FailureReason, JobId, JobRow, JobState};
+use super::work::JobResult;
 use super::{LedgerError, Result, retry};
 
 /// Where a job goes.
 #[derive(Debug)]
 pub(super) enum Next {
     /// Done, with its result.
-    Succeeded(Vec<u8>),
+    Succeeded(Box<JobResult>),
     /// Given up.
     Failed(Failure),
     /// Ended as asked.
@@ -22,7 +23,7 @@ pub(super) enum Next {
 /// What a job's row is to hold from then on.
 pub(super) struct Left {
     pub(super) state: JobState,
-    pub(super) result: Option<Vec<u8>>,
+    pub(super) result: Option<JobResult>,
     pub(super) failure: Option<Failure>,
     pub(super) run_after: Option<i64>,
     /// Attempts that do not count after all.
@@ -33,7 +34,7 @@ pub(super) struct Left {
 impl Next {
     pub(super) fn row(self, now: i64) -> Left {
         let (state, result, failure, run_after, uncounted) = match self {
-            Self::Succeeded(result) => (JobState::Succeeded, Some(result), None, None, 0),
+            Self::Succeeded(result) => (JobState::Succeeded, Some(*result), None, None, 0),
             Self::Failed(failure) => (JobState::Failed, None, Some(failure), None, 0),
             Self::Cancelled => (JobState::Cancelled, None, None, None, 0),
             Self::Retry(failure, run_after) => (JobState::Queued, None, Some(failure), Some(run_after), 0),
@@ -62,7 +63,7 @@ pub(super) fn after_attempt(
     now: i64,
 ) -> Result<Next> {
     let failure = failure.unwrap_or_else(|| Failure {
-        reason: 0,
+        reason: FailureReason::Unspecified,
         message: "the worker gave no reason".into(),
     });
     match (cancelled, retryable) {
@@ -80,7 +81,7 @@ pub(super) fn after_loss(job: &JobRow, worker: Option<String>, now: i64) -> Next
         worker.unwrap_or_default()
     );
     let failure = Failure {
-        reason: REASON_WORKER_LOST,
+        reason: FailureReason::WorkerLost,
         message,
     };
     after_failure(job, failure, now)
@@ -105,7 +106,7 @@ fn after_failure(job: &JobRow, failure: Failure, now: i64) -> Next {
     } else {
         let message = format!("all {} attempts failed; the last one: {}", job.attempt, failure.message);
         Next::Failed(Failure {
-            reason: REASON_ATTEMPTS_EXHAUSTED,
+            reason: FailureReason::AttemptsExhausted,
             message,
         })
     }

@@ -1,10 +1,12 @@
-//! What the ledger keeps: jobs, artifacts and keys, as rows without any wire format.
+//! What the ledger keeps: jobs, artifacts and keys, as rows. What a job does and what came of it are messages of the
+//! API, decoded and of the job's kind ([`JobSpec`], [`JobResult`]); all else is without any wire format.
 use std::fmt;
 
 use uuid::Uuid;
 
-use super::queue::Needs;
 use super::registry::KeyState;
+use super::work::{JobResult, JobSpec, Progress};
+use super::workers::ResourceRequirements;
 
 /// Name of a job; a version 7 UUID.
 pub type JobId = Uuid;
@@ -13,10 +15,40 @@ pub type ArtifactId = Uuid;
 /// Name of a key.
 pub type KeyId = Uuid;
 
-/// [`Failure::reason`] of an attempt whose worker was lost, as in `guardsplat.v1.Failure.Reason`.
-pub const REASON_WORKER_LOST: i32 = 3;
-/// [`Failure::reason`] of a job whose attempts are used up, as in `guardsplat.v1.Failure.Reason`.
-pub const REASON_ATTEMPTS_EXHAUSTED: i32 = 5;
+/// Why a job or an attempt failed, for programs. Numbers are kept in the database, and are those of
+/// `guardsplat.v1.Failure.Reason`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum FailureReason {
+    /// Nobody said, or it is not known to this version.
+    #[default]
+    Unspecified = 0,
+    /// The input is not what it must be.
+    InvalidInput = 1,
+    /// The mark can't be read well enough, or is seen too well.
+    TargetMissed = 2,
+    /// The worker was lost, or lost its device.
+    WorkerLost = 3,
+    /// Something else went wrong inside the worker.
+    Internal = 4,
+    /// Every attempt failed.
+    AttemptsExhausted = 5,
+}
+
+impl FailureReason {
+    /// The reason of a number; `Unspecified` for one that this version does not know.
+    pub fn from_number(number: i32) -> Self {
+        [
+            Self::InvalidInput,
+            Self::TargetMissed,
+            Self::WorkerLost,
+            Self::Internal,
+            Self::AttemptsExhausted,
+        ]
+        .into_iter()
+        .find(|&reason| reason as i32 == number)
+        .unwrap_or_default()
+    }
+}
 
 /// What a job does. Numbers are kept in the database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -54,8 +86,8 @@ impl JobState {
 /// Why a job or an attempt failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// For programs: a number of `guardsplat.v1.Failure.Reason`.
-    pub reason: i32,
+    /// For programs.
+    pub reason: FailureReason,
     /// For people.
     pub message: String,
 }
@@ -70,13 +102,11 @@ pub struct JobRow {
     /// What people call it.
     pub display_name: String,
     /// What it does.
-    pub kind: JobKind,
-    /// The encoded `guardsplat.v1` message of its kind.
-    pub spec: Vec<u8>,
+    pub spec: JobSpec,
     /// How urgent it is.
     pub priority: i32,
     /// What its worker must have.
-    pub needs: Needs,
+    pub requirements: ResourceRequirements,
     /// What became of it.
     pub state: JobState,
     /// Somebody asked for the end of it while it was running.
@@ -85,10 +115,10 @@ pub struct JobRow {
     pub attempt: i32,
     /// How many there may be.
     pub max_attempts: i32,
-    /// Encoded `guardsplat.v1.Progress` of the last attempt.
-    pub progress: Option<Vec<u8>>,
-    /// Encoded result of its kind.
-    pub result: Option<Vec<u8>>,
+    /// How far the last attempt was.
+    pub progress: Option<Progress>,
+    /// What came out of it.
+    pub result: Option<JobResult>,
     /// Why it failed, or why its last attempt did.
     pub failure: Option<Failure>,
     /// When it was accepted.
@@ -109,6 +139,13 @@ pub struct JobRow {
     pub queue_position: Option<i64>,
 }
 
+impl JobRow {
+    /// Which kind of job it is.
+    pub fn kind(&self) -> JobKind {
+        self.spec.kind()
+    }
+}
+
 /// A job to queue.
 #[derive(Clone, Debug)]
 pub struct NewJob {
@@ -119,12 +156,10 @@ pub struct NewJob {
     /// What people call it.
     pub display_name: String,
     /// What it does.
-    pub kind: JobKind,
-    /// The encoded message of its kind.
-    pub spec: Vec<u8>,
+    pub spec: JobSpec,
     /// Artifacts it reads; kept while it is queued or running.
     pub inputs: Vec<ArtifactId>,
-    /// The key it needs.
+    /// The key it requirements.
     pub key: Option<KeyId>,
     /// Names the request, so that it can be repeated.
     pub request_id: Option<Uuid>,
@@ -137,7 +172,7 @@ pub struct NewJob {
     /// How urgent it is: one of [`PRIORITIES`](super::queue::PRIORITIES).
     pub priority: i32,
     /// What its worker must have.
-    pub needs: Needs,
+    pub requirements: ResourceRequirements,
     /// What the request is a part of, as W3C Trace Context has it.
     pub trace_parent: Option<String>,
 }
@@ -264,8 +299,8 @@ pub struct NewKey {
 /// What an attempt says came out of its job.
 #[derive(Clone, Debug)]
 pub struct Completion {
-    /// Encoded result of the job's kind.
-    pub result: Vec<u8>,
+    /// What came out, of the job's kind.
+    pub result: JobResult,
     /// Outputs that become visible.
     pub outputs: Vec<ArtifactId>,
     /// The key that was made.

@@ -8,7 +8,7 @@ use tonic::Code;
 
 use super::labels::{self, AtStage, AttemptEnded, Bytes, Call, Mark, OfKind, OfMethod, Part, Refused, kind, stage};
 use super::{Metrics, code, seconds};
-use crate::ledger::{JobKind, JobRow, JobState, Outcome, REASON_WORKER_LOST};
+use crate::ledger::{FailureReason, JobKind, JobRow, JobState, Outcome};
 
 impl Metrics {
     /// A job was accepted.
@@ -23,7 +23,7 @@ impl Metrics {
 
     /// A worker was given a job.
     pub fn given(&self, job: &JobRow) {
-        let of = OfKind { kind: kind(job.kind) };
+        let of = OfKind { kind: kind(job.kind()) };
         self.attempts.get_or_create(&of).inc();
         // After an attempt it waited for other reasons too.
         if is_first(job)
@@ -43,7 +43,7 @@ impl Metrics {
             JobState::Queued if job.failure.is_none() => labels::outcome(Outcome::Released),
             JobState::Queued | JobState::Running | JobState::Failed => labels::outcome(Outcome::Failed),
         };
-        let kind = kind(job.kind);
+        let kind = kind(job.kind());
         self.attempts_ended.get_or_create(&AttemptEnded { kind, outcome }).inc();
         if job.state == JobState::Queued && job.failure.is_some() {
             self.retries.get_or_create(&OfKind { kind }).inc();
@@ -51,7 +51,7 @@ impl Metrics {
         self.job_ended(job);
         if let Some((start, end)) = job.start_time.zip(job.end_time) {
             self.run
-                .get_or_create(&labels::over(job.kind, job.state))
+                .get_or_create(&labels::over(job.kind(), job.state))
                 .observe(seconds(end.saturating_sub(start)));
         }
         outcome
@@ -60,7 +60,7 @@ impl Metrics {
     /// A job is over, if it is.
     pub fn job_ended(&self, job: &JobRow) {
         if job.state.is_over() {
-            self.ended.get_or_create(&labels::over(job.kind, job.state)).inc();
+            self.ended.get_or_create(&labels::over(job.kind(), job.state)).inc();
         }
     }
 
@@ -157,5 +157,5 @@ pub fn is_first(job: &JobRow) -> bool {
 /// Whether an attempt ended because its worker was lost.
 pub fn was_lost(job: &JobRow) -> bool {
     let failure = job.failure.as_ref();
-    failure.is_some_and(|failure| failure.reason == REASON_WORKER_LOST)
+    failure.is_some_and(|failure| failure.reason == FailureReason::WorkerLost)
 }

@@ -313,7 +313,7 @@ impl Metrics {
             }
         }
         for (job, reason, count) in tally.failed {
-            let (kind, reason) = (kind(job), labels::reason(reason));
+            let (kind, reason) = (kind(job), labels::reason(reason as i32));
             self.dead_letters
                 .get_or_create(&GivenUp { kind, reason })
                 .set(number(count));

@@ -2,15 +2,18 @@
 use guardsplat_proto::v1::EmbedResult;
 
 use super::*;
-use crate::ledger::{Failure, JobKind, JobRow, JobState, Needs, REASON_WORKER_LOST, Running, Waiting};
+use guardsplat_proto::v1::EmbedSpec;
+
+use crate::ledger::{
+    Failure, FailureReason, JobKind, JobRow, JobSpec, JobState, ResourceRequirements, Running, Waiting,
+};
 
 fn job(state: JobState, attempt: i32) -> JobRow {
     JobRow {
         id: uuid::Uuid::now_v7(),
         project: "default".into(),
         display_name: String::new(),
-        kind: JobKind::Embed,
-        spec: Vec::new(),
+        spec: JobSpec::Embed(EmbedSpec::default()),
         state,
         cancel_requested: false,
         attempt,
@@ -26,7 +29,7 @@ fn job(state: JobState, attempt: i32) -> JobRow {
         revision: 2,
         trace_parent: None,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
         queue_position: None,
     }
 }
@@ -53,11 +56,11 @@ fn attempts_end_in_each_of_their_ways() {
         }),
         ..job(state, 1)
     };
-    let lost = failed(JobState::Queued, REASON_WORKER_LOST);
-    assert!(was_lost(&lost) && !was_lost(&failed(JobState::Failed, 4)));
+    let lost = failed(JobState::Queued, FailureReason::WorkerLost);
+    assert!(was_lost(&lost) && !was_lost(&failed(JobState::Failed, FailureReason::Internal)));
     metrics.attempt_ended(&lost, true);
-    metrics.attempt_ended(&failed(JobState::Queued, 4), false);
-    metrics.attempt_ended(&failed(JobState::Failed, 5), false);
+    metrics.attempt_ended(&failed(JobState::Queued, FailureReason::Internal), false);
+    metrics.attempt_ended(&failed(JobState::Failed, FailureReason::AttemptsExhausted), false);
     metrics.attempt_ended(&job(JobState::Queued, 0), false);
     metrics.attempt_ended(&job(JobState::Succeeded, 1), false);
     has(
@@ -94,7 +97,10 @@ fn the_queue_is_as_the_ledger_has_it_or_not_told() {
             count: 2,
             memory: 3_000_000,
         }],
-        failed: vec![(JobKind::Embed, 5, 3), (JobKind::Embed, 99, 1)],
+        failed: vec![
+            (JobKind::Embed, FailureReason::AttemptsExhausted, 3),
+            (JobKind::Embed, FailureReason::Unspecified, 1),
+        ],
     };
     metrics.tally(Some(tally), 2_500_000);
     has(

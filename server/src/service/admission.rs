@@ -6,7 +6,7 @@ use guardsplat_scene::{HEAD, Summary};
 
 use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, JobKind, Needs};
+use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
 use crate::service::Service;
 use crate::service::names::Kind;
 use crate::service::ownership;
@@ -18,7 +18,7 @@ const QUEUE_RETRY: Duration = Duration::from_secs(10);
 impl Service {
     /// Refuses a job for which there is no room. One that its request made before is there already, and takes no more.
     /// Says what the worker of one that there is room for must have, as far as its scene tells.
-    pub(crate) async fn admit(&self, project: &str, submission: &Submission) -> Result<Needs> {
+    pub(crate) async fn admit(&self, project: &str, submission: &Submission) -> Result<ResourceRequirements> {
         let limits = self.limits();
         let limit = limits.max_queued;
         let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
@@ -26,9 +26,9 @@ impl Service {
         let unlimited = !full && limits.max_job_memory.is_none() && quotas == [None, None];
         if !unlimited {
             if self.is_known(project, submission).await? {
-                return Ok(Needs::default());
+                return Ok(ResourceRequirements::default());
             }
-            self.room_for_job(project, submission.kind).await?;
+            self.room_for_job(project, submission.spec.kind()).await?;
         }
         if full {
             return Err(Error::QueueFull {
@@ -37,7 +37,7 @@ impl Service {
             });
         }
         let Some(scene) = scene_of(submission) else {
-            return Ok(Needs::default());
+            return Ok(ResourceRequirements::default());
         };
         let summary = match (self.summary(project, scene).await, limits.max_job_memory) {
             // A job that nothing is held against does not hang on it either.
@@ -48,14 +48,14 @@ impl Service {
             (summary, _) => summary?,
         };
         let Some(summary) = summary else {
-            return Ok(Needs::default());
+            return Ok(ResourceRequirements::default());
         };
         if let Some(limit) = limits.max_job_memory {
-            check(&Kind::Artifact.name(scene), submission.kind, &summary, limit)?;
+            check(&Kind::Artifact.name(scene), submission.spec.kind(), &summary, limit)?;
         }
-        let (least, likely) = taken(submission.kind, &summary);
+        let (least, likely) = taken(submission.spec.kind(), &summary);
         let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
-        Ok(Needs {
+        Ok(ResourceRequirements {
             memory: bytes(least),
             likely_memory: bytes(likely),
             clip: None,
@@ -108,7 +108,7 @@ impl Service {
 
 /// The artifact that is a scene, or may be one: a worker takes several suspects for pictures.
 fn scene_of(submission: &Submission) -> Option<ArtifactId> {
-    match (submission.kind, &submission.inputs[..]) {
+    match (submission.spec.kind(), &submission.inputs[..]) {
         (JobKind::Embed | JobKind::Verify, [scene]) => Some(*scene),
         _ => None,
     }

@@ -2,15 +2,14 @@
 use std::time::Instant;
 
 use guardsplat_proto::v1::progress::Stage;
-use guardsplat_proto::v1::{EmbedResult, Failure, Progress, ReportJobRequest, failure};
-use prost::Message as _;
+use guardsplat_proto::v1::{Failure, Progress, ReportJobRequest, failure};
 
 use crate::error::{Error, Result};
-use crate::ledger::{self, JobKind, JobRow};
+use crate::ledger::{self, FailureReason, JobResult, JobRow};
 use crate::metrics;
 use crate::service::names::Kind;
 use crate::service::violations::Violations;
-use crate::service::{Service, clock, text, to_proto};
+use crate::service::{Service, clock, text};
 
 /// Most bytes of a failure's message; the rest is cut off.
 const MAX_FAILURE_BYTES: usize = 4 << 10;
@@ -25,7 +24,7 @@ impl Service {
         } = request;
         let id = Kind::Job.parse("name", &name)?;
         let stage = progress.as_ref().map(Progress::stage);
-        let progress = progress.map(encoded_progress).transpose()?;
+        let progress = progress.map(checked_progress).transpose()?;
         let (lease, now) = (self.limits().lease, Instant::now());
         let Some(progress) = self.reports().due(id, &token, progress, lease, now) else {
             let job = self.ledger().leased_job(id, &token).await?;
@@ -71,16 +70,13 @@ impl Service {
 
     /// Counts a marked scene that is handed out.
     pub(crate) fn count_mark(&self, job: &JobRow) {
-        if job.kind == JobKind::Embed
-            && let Some(result) = &job.result
-            && let Ok(result) = to_proto::decode::<EmbedResult>(result)
-        {
-            self.metrics().marked(&result);
+        if let Some(JobResult::Embed(result)) = &job.result {
+            self.metrics().marked(result);
         }
     }
 }
 
-fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
+fn checked_progress(progress: Progress) -> Result<Progress> {
     let mut problems = Violations::default();
     let stage = Stage::try_from(progress.stage).ok();
     let known = stage.is_some_and(|stage| stage != Stage::Unspecified);
@@ -88,7 +84,7 @@ fn encoded_progress(progress: Progress) -> Result<Vec<u8>> {
     problems.check(progress.done >= 0, "progress.done", "is negative");
     problems.check(progress.total >= 0, "progress.total", "is negative");
     problems.finish()?;
-    Ok(progress.encode_to_vec())
+    Ok(progress)
 }
 
 pub(crate) fn checked_failure(failure: Option<Failure>) -> Result<ledger::Failure> {
@@ -107,7 +103,7 @@ pub(crate) fn checked_failure(failure: Option<Failure>) -> Result<ledger::Failur
         }
     }
     Ok(ledger::Failure {
-        reason: failure.reason,
+        reason: FailureReason::from_number(failure.reason),
         message: text::shortened(failure.message, MAX_FAILURE_BYTES),
     })
 }

@@ -6,10 +6,9 @@ use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, Completion, JobKind, JobRow, NewKey};
+use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, NewKey};
 use crate::service::names::Kind;
 use crate::service::text;
-use crate::service::to_proto::decode;
 use crate::service::upload;
 use crate::service::violations::Violations;
 
@@ -18,7 +17,7 @@ const MAX_RESULT_BYTES: usize = 64 << 10;
 
 /// What becomes of the job.
 struct Outcome {
-    result: Vec<u8>,
+    result: JobResult,
     outputs: Vec<ArtifactId>,
     key: Option<NewKey>,
 }
@@ -26,13 +25,13 @@ struct Outcome {
 /// Checks what came out of `job`, as far as that can be said without the ledger.
 pub fn check(job: &JobRow, told: CompleteJobRequest) -> Result<Completion> {
     let fingerprint = fingerprint(&told);
-    let Outcome { result, outputs, key } = match (job.kind, told.result) {
-        (JobKind::Embed, Some(Output::EmbedResult(result))) => embed(&result)?,
-        (JobKind::Verify, Some(Output::VerifyResult(result))) => verify(&result)?,
-        (JobKind::CreateKey, Some(Output::KeyOutput(output))) => key(job, output)?,
+    let Outcome { result, outputs, key } = match (&job.spec, told.result) {
+        (JobSpec::Embed(_), Some(Output::EmbedResult(result))) => embed(result)?,
+        (JobSpec::Verify(_), Some(Output::VerifyResult(result))) => verify(result)?,
+        (JobSpec::CreateKey(spec), Some(Output::KeyOutput(output))) => key(job, spec, output)?,
         (_, None) => return Err(Error::invalid("result", "is missing")),
-        (kind, Some(_)) => {
-            let wanted = match kind {
+        (spec, Some(_)) => {
+            let wanted = match spec.kind() {
                 JobKind::Embed => "embed_result",
                 JobKind::Verify => "verify_result",
                 JobKind::CreateKey => "key_output",
@@ -43,8 +42,13 @@ pub fn check(job: &JobRow, told: CompleteJobRequest) -> Result<Completion> {
             ));
         }
     };
-    if result.len() > MAX_RESULT_BYTES {
-        let reason = format!("has {} bytes, at most {MAX_RESULT_BYTES} are taken", result.len());
+    let length = match &result {
+        JobResult::Embed(result) => result.encoded_len(),
+        JobResult::Verify(result) => result.encoded_len(),
+        JobResult::CreateKey(result) => result.encoded_len(),
+    };
+    if length > MAX_RESULT_BYTES {
+        let reason = format!("has {length} bytes, at most {MAX_RESULT_BYTES} are taken");
         return Err(Error::invalid("result", reason));
     }
     Ok(Completion {
@@ -65,7 +69,7 @@ fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
     Sha256::digest(told.encode_to_vec()).into()
 }
 
-fn embed(result: &EmbedResult) -> Result<Outcome> {
+fn embed(result: EmbedResult) -> Result<Outcome> {
     let mut problems = Violations::default();
     let scene = problems.take(Kind::Artifact.parse("embed_result.scene", &result.scene))?;
     let comparison = problems.take(Kind::Artifact.parse("embed_result.comparison", &result.comparison))?;
@@ -77,13 +81,13 @@ fn embed(result: &EmbedResult) -> Result<Outcome> {
     problems.finish()?;
     let outputs = scene.into_iter().chain(comparison).collect();
     Ok(Outcome {
-        result: result.encode_to_vec(),
+        result: JobResult::Embed(result),
         outputs,
         key: None,
     })
 }
 
-fn verify(result: &VerifyResult) -> Result<Outcome> {
+fn verify(result: VerifyResult) -> Result<Outcome> {
     use guardsplat_proto::v1::verify_result::Verdict;
     let verdict = Verdict::try_from(result.verdict)
         .ok()
@@ -92,14 +96,13 @@ fn verify(result: &VerifyResult) -> Result<Outcome> {
         return Err(Error::invalid("verify_result.verdict", "is missing or not known"));
     }
     Ok(Outcome {
-        result: result.encode_to_vec(),
+        result: JobResult::Verify(result),
         outputs: Vec::new(),
         key: None,
     })
 }
 
-fn key(job: &JobRow, output: KeyOutput) -> Result<Outcome> {
-    let spec: KeySpec = decode(&job.spec)?;
+fn key(job: &JobRow, spec: &KeySpec, output: KeyOutput) -> Result<Outcome> {
     let mut problems = Violations::default();
     let artifact = problems.take(Kind::Artifact.parse("key_output.key_file", &output.key_file))?;
     let told = output.key.unwrap_or_default();
@@ -139,7 +142,7 @@ fn key(job: &JobRow, output: KeyOutput) -> Result<Outcome> {
         artifact,
     };
     Ok(Outcome {
-        result: result.encode_to_vec(),
+        result: JobResult::CreateKey(result),
         outputs: Vec::new(),
         key: Some(key),
     })

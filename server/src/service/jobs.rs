@@ -31,7 +31,7 @@ fn urgency(submission: &Submission, highest: i32) -> Result<i32> {
             format!("is {priority}, the highest that this server takes is {highest}"),
         )),
         Some(priority) => Ok(priority),
-        None if submission.kind == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
+        None if submission.spec.kind() == JobKind::Verify => Ok(PRIORITY_OF_VERIFY.min(highest)),
         None => Ok(highest.min(0)),
     }
 }
@@ -44,7 +44,7 @@ impl Service {
         caller: &Caller,
     ) -> Result<Job> {
         let submission = submission::check(request)?;
-        caller.must(ownership::scope_of(submission.kind))?;
+        caller.must(ownership::scope_of(submission.spec.kind()))?;
         let project = caller.project.as_str();
         let mut clip = None;
         if let Some(id) = submission.key {
@@ -52,7 +52,7 @@ impl Service {
             if let Some((field, text)) = &submission.message {
                 message::check(field, text, key.bits)?;
             }
-            if let Err(error) = keys::usable(&key, submission.kind)
+            if let Err(error) = keys::usable(&key, submission.spec.kind())
                 && !self.is_known(project, &submission).await?
             {
                 return Err(error);
@@ -62,18 +62,17 @@ impl Service {
             }
             clip = Some(key.clip_sha256).filter(|hash| !hash.is_empty());
         }
-        if submission.kind == JobKind::Verify {
+        if submission.spec.kind() == JobKind::Verify {
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
         let priority = urgency(&submission, self.limits().max_priority)?;
-        let mut needs = self.admit(project, &submission).await?;
-        needs.clip = clip;
+        let mut requirements = self.admit(project, &submission).await?;
+        requirements.clip = clip;
         let fingerprint = self.fingerprint(project, &submission).await?;
         let new = NewJob {
             id: Uuid::now_v7(),
             project: project.to_owned(),
             display_name: submission.display_name,
-            kind: submission.kind,
             spec: submission.spec,
             inputs: submission.inputs,
             key: submission.key,
@@ -82,7 +81,7 @@ impl Service {
             fingerprint,
             max_attempts: self.limits().max_attempts,
             priority,
-            needs,
+            requirements,
             trace_parent,
         };
         let id = new.id;
@@ -90,7 +89,7 @@ impl Service {
         let row = row.map_err(|error| ownership::as_asked(error, submission.request_id))?;
         // A request that was sent again has made its job before.
         if row.id == id {
-            self.metrics().created(row.kind);
+            self.metrics().created(row.kind());
         }
         self.changes().queue_grew();
         self.told(row).await

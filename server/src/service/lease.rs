@@ -2,7 +2,7 @@
 use std::time::Duration;
 
 use guardsplat_proto::v1::job::Spec;
-use guardsplat_proto::v1::{EmbedSpec, Job, LeaseJobRequest, LeaseJobResponse, VerifySpec, failure};
+use guardsplat_proto::v1::{Job, LeaseJobRequest, LeaseJobResponse};
 use secrecy::SecretSlice;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
@@ -10,7 +10,7 @@ use tokio::time::Instant;
 use crate::artifacts::ArtifactPath;
 use crate::error::chain;
 use crate::error::{Error, Result};
-use crate::ledger::{Failure, JobKind, JobRow, KeyId, KeyRow, KeyState, Lease, Taker};
+use crate::ledger::{Failure, FailureReason, JobRow, JobSpec, KeyId, KeyRow, KeyState, Lease, WorkerCapabilities};
 use crate::service::Service;
 use crate::service::changes::For;
 use crate::service::clock;
@@ -43,8 +43,8 @@ impl Service {
         loop {
             listener.check_running()?;
             self.worker_is_there(&worker).await?;
-            let taker = self.taker(&worker).await?;
-            if let Some(lease) = self.claim(taker).await? {
+            let capabilities = self.capabilities(&worker).await?;
+            if let Some(lease) = self.claim(capabilities).await? {
                 let job = match self.for_worker(&lease).await {
                     Ok(job) => job,
                     Err(error) => {
@@ -70,7 +70,7 @@ impl Service {
 
     /// A job as its worker is told it: with the word to embed, where that is an asset's.
     async fn for_worker(&self, lease: &Lease) -> Result<Job> {
-        let mut job = to_proto::job(lease.job.clone())?;
+        let mut job = to_proto::job(lease.job.clone());
         if let Some(Spec::Embed(spec)) = &mut job.spec
             && let Some(word) = self.word_of(spec).await?
         {
@@ -84,7 +84,7 @@ impl Service {
         let id = lease.job.id;
         tracing::error!(job = %id, error = %chain(error), "could not be given to a worker");
         let failure = Failure {
-            reason: failure::Reason::Internal.into(),
+            reason: FailureReason::Internal,
             message: error.to_string(),
         };
         let failed = self
@@ -96,20 +96,23 @@ impl Service {
 
     /// Claims a job. Should the caller be gone by the time it is claimed, it is handed back at once: otherwise an
     /// attempt would be lost, and the time of a lease with it.
-    async fn claim(&self, taker: Taker) -> Result<Option<Lease>> {
+    async fn claim(&self, capabilities: WorkerCapabilities) -> Result<Option<Lease>> {
         let (send, receive) = oneshot::channel();
         let api = self.clone();
         tokio::spawn(async move {
-            let mut claimed = api.ledger().claim_for(&taker, api.limits().lease, clock::now()).await;
+            let mut claimed = api
+                .ledger()
+                .claim_for(&capabilities, api.limits().lease, clock::now())
+                .await;
             if let Ok(Some(lease)) = &mut claimed {
-                tracing::info!(job = %lease.job.id, worker = taker.worker, attempt = lease.job.attempt, "job given to a worker");
+                tracing::info!(job = %lease.job.id, worker = capabilities.worker, attempt = lease.job.attempt, "job given to a worker");
                 api.metrics().given(&lease.job);
                 let span = api.traces().attempt(&lease.job);
                 // The worker's spans go below the attempt's.
                 if let Some(span) = &span {
                     lease.job.trace_parent = Some(traces::text(traces::context(span)));
                 }
-                let (id, kind, now) = (lease.job.id, lease.job.kind, Instant::now().into_std());
+                let (id, kind, now) = (lease.job.id, lease.job.kind(), Instant::now().into_std());
                 api.stages().begin(id, kind, span, now);
                 api.changes().job(lease.job.id);
                 api.changes().queue_moved();
@@ -162,7 +165,7 @@ impl Service {
             name: Kind::Key.name(key.id),
         };
         let failure = Failure {
-            reason: failure::Reason::InvalidInput.into(),
+            reason: FailureReason::InvalidInput,
             message: format!("{refusal}; the reason that was given: {}", key.state_reason),
         };
         let failed = self
@@ -180,10 +183,10 @@ impl Service {
 }
 
 pub(crate) fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
-    let name = match job.kind {
-        JobKind::Embed => to_proto::decode::<EmbedSpec>(&job.spec)?.key,
-        JobKind::Verify => to_proto::decode::<VerifySpec>(&job.spec)?.key,
-        JobKind::CreateKey => return Ok(None),
+    let name = match &job.spec {
+        JobSpec::Embed(spec) => &spec.key,
+        JobSpec::Verify(spec) => &spec.key,
+        JobSpec::CreateKey(_) => return Ok(None),
     };
-    Kind::Key.parse("job.key", &name).map(Some)
+    Kind::Key.parse("job.key", name).map(Some)
 }

@@ -65,9 +65,11 @@ impl From<LedgerError> for Error {
                 what: "the ledger",
                 source: Box::new(error),
             },
-            LedgerError::Migrate(_) | LedgerError::Corrupt { .. } | LedgerError::BadCommitment { .. } => {
-                Self::internal("the ledger", error)
-            }
+            LedgerError::Migrate(_)
+            | LedgerError::Corrupt { .. }
+            | LedgerError::Undecodable { .. }
+            | LedgerError::ResultOfAnotherKind(_)
+            | LedgerError::BadCommitment { .. } => Self::internal("the ledger", error),
         }
     }
 }

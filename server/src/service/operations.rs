@@ -1,9 +1,9 @@
 //! For those who look after jobs: which failed, what their attempts came to, and another try.
 use guardsplat_proto::v1::failure::Reason;
-use guardsplat_proto::v1::{self, EmbedSpec, Job, JobAttempt, VerifySpec};
+use guardsplat_proto::v1::{Job, JobAttempt};
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, AttemptRow, JobKind, JobRow, JobState};
+use crate::ledger::{ArtifactId, AttemptRow, FailureReason, JobRow, JobSpec, JobState};
 use crate::service::Service;
 use crate::service::clock;
 use crate::service::clock::timestamp;
@@ -21,16 +21,16 @@ impl Service {
             return Err(Error::NotFailed { name: name.to_owned() });
         }
         if let Some(key) = lease::needed_key(&job)? {
-            keys::usable(&self.own_key(project, key).await?, job.kind)?;
+            keys::usable(&self.own_key(project, key).await?, job.kind())?;
         }
         self.room_in_queue().await?;
-        self.room_for_job(project, job.kind).await?;
+        self.room_for_job(project, job.kind()).await?;
         let row = self.ledger().requeue(id, &inputs(&job)?, clock::now()).await?;
         tracing::info!(job = %id, "queued once more");
-        self.metrics().requeued(job.kind);
+        self.metrics().requeued(job.kind());
         self.changes().job(id);
         self.changes().queue_grew();
-        to_proto::job(row)
+        Ok(to_proto::job(row))
     }
 
     /// The attempts of a job, newest first.
@@ -44,16 +44,16 @@ impl Service {
 
 /// What a job reads.
 fn inputs(job: &JobRow) -> Result<Vec<ArtifactId>> {
-    let names = match job.kind {
-        JobKind::Embed => vec![to_proto::decode::<EmbedSpec>(&job.spec)?.scene],
-        JobKind::Verify => to_proto::decode::<VerifySpec>(&job.spec)?.suspects,
-        JobKind::CreateKey => Vec::new(),
+    let names = match &job.spec {
+        JobSpec::Embed(spec) => std::slice::from_ref(&spec.scene),
+        JobSpec::Verify(spec) => &spec.suspects,
+        JobSpec::CreateKey(_) => &[],
     };
     names.iter().map(|name| Kind::Artifact.parse("name", name)).collect()
 }
 
 /// Reasons that a list is asked for, each once and in order.
-pub(crate) fn reasons(given: &[i32], states: &[JobState]) -> Result<Vec<i32>> {
+pub(crate) fn reasons(given: &[i32], states: &[JobState]) -> Result<Vec<FailureReason>> {
     let mut wanted = Vec::new();
     for (i, &number) in given.iter().enumerate() {
         let known = Reason::try_from(number).is_ok_and(|reason| reason != Reason::Unspecified);
@@ -61,8 +61,9 @@ pub(crate) fn reasons(given: &[i32], states: &[JobState]) -> Result<Vec<i32>> {
             let problem = format!("{number} is no reason of a failure");
             return Err(Error::invalid(format!("reasons[{i}]"), problem));
         }
-        if !wanted.contains(&number) {
-            wanted.push(number);
+        let reason = FailureReason::from_number(number);
+        if !wanted.contains(&reason) {
+            wanted.push(reason);
         }
     }
     if !wanted.is_empty() && states.iter().any(|&state| state != JobState::Failed) {
@@ -83,10 +84,7 @@ fn attempt(row: AttemptRow) -> JobAttempt {
         end_time: row.end_time.map(timestamp),
         // Numbers are those of the API.
         outcome: row.outcome as i32,
-        failure: row.failure.map(|failure| v1::Failure {
-            reason: failure.reason,
-            message: failure.message,
-        }),
+        failure: row.failure.map(to_proto::failure),
     }
 }
 
@@ -112,7 +110,10 @@ mod tests {
 
     #[test]
     fn reasons_are_known_and_of_failed_jobs() {
-        assert_eq!(reasons(&[5, 1, 5], &[JobState::Failed]).unwrap(), [1, 5]);
+        assert_eq!(
+            reasons(&[5, 1, 5], &[JobState::Failed]).unwrap(),
+            [FailureReason::InvalidInput, FailureReason::AttemptsExhausted]
+        );
         assert!(reasons(&[], &[JobState::Queued]).unwrap().is_empty());
         for (given, states, field) in [
             (&[0][..], &[][..], "reasons[0]"),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use guardsplat_proto::v1::Job;
 
 use crate::error::{Error, Result};
-use crate::ledger::{JobRow, JobState, Needs, SeenWorker, Taker};
+use crate::ledger::{JobRow, JobState, ResourceRequirements, SeenWorker, WorkerCapabilities};
 use crate::service::Service;
 use crate::service::clock;
 use crate::service::text;
@@ -85,23 +85,23 @@ impl Service {
     }
 
     /// Which jobs a worker may be given.
-    pub(crate) async fn taker(&self, worker: &SeenWorker) -> Result<Taker> {
+    pub(crate) async fn capabilities(&self, worker: &SeenWorker) -> Result<WorkerCapabilities> {
         let seen = match worker.memory {
             Some(_) => self.workers_lately().await?,
             None => Arc::default(),
         };
-        Ok(taker(worker, &seen))
+        Ok(capabilities(worker, &seen))
     }
 
     /// A job for the API; of one that is queued it is told if nobody can have it.
     pub(crate) async fn told(&self, row: JobRow) -> Result<Job> {
         let waiting_reason = match row.state {
-            JobState::Queued => waiting_reason(&row.needs, &self.workers_lately().await?),
+            JobState::Queued => waiting_reason(&row.requirements, &self.workers_lately().await?),
             _ => None,
         };
         Ok(Job {
             waiting_reason: waiting_reason.unwrap_or_default(),
-            ..to_proto::job(row)?
+            ..to_proto::job(row)
         })
     }
 }
@@ -146,7 +146,7 @@ pub(crate) fn described(
 
 /// A worker is not given what it can't hold for certain. What it can probably not hold goes to one that has more memory,
 /// as long as there is one with the same CLIPs.
-fn taker(worker: &SeenWorker, seen: &[SeenWorker]) -> Taker {
+fn capabilities(worker: &SeenWorker, seen: &[SeenWorker]) -> WorkerCapabilities {
     let has_more = |other: &SeenWorker| match (other.memory, worker.memory) {
         (_, None) => false,
         (None, Some(_)) => true,
@@ -157,7 +157,7 @@ fn taker(worker: &SeenWorker, seen: &[SeenWorker]) -> Taker {
         other.clips.is_empty() || !worker.clips.is_empty() && worker.clips.iter().all(can)
     };
     let larger = seen.iter().any(|other| has_more(other) && has_the_same(other));
-    Taker {
+    WorkerCapabilities {
         worker: worker.name.clone(),
         memory: worker.memory,
         likely_memory: worker.memory.filter(|_| larger),
@@ -166,12 +166,12 @@ fn taker(worker: &SeenWorker, seen: &[SeenWorker]) -> Taker {
 }
 
 /// Why none of the workers could be given a job, if that is so.
-fn waiting_reason(needs: &Needs, seen: &[SeenWorker]) -> Option<String> {
+fn waiting_reason(requirements: &ResourceRequirements, seen: &[SeenWorker]) -> Option<String> {
     let loads = |worker: &&SeenWorker| {
-        let needed = needs.clip.as_ref();
+        let needed = requirements.clip.as_ref();
         worker.clips.is_empty() || needed.is_none_or(|clip| worker.clips.contains(clip))
     };
-    let holds = |worker: &&SeenWorker| match (needs.memory, worker.memory) {
+    let holds = |worker: &&SeenWorker| match (requirements.memory, worker.memory) {
         (Some(needed), Some(there)) => needed <= there,
         _ => true,
     };
@@ -181,7 +181,7 @@ fn waiting_reason(needs: &Needs, seen: &[SeenWorker]) -> Option<String> {
     if seen.iter().any(|worker| loads(&worker) && holds(&worker)) {
         return None;
     }
-    if let Some(clip) = &needs.clip
+    if let Some(clip) = &requirements.clip
         && !seen.iter().any(|worker| loads(&worker))
     {
         return Some(format!(
@@ -193,7 +193,7 @@ fn waiting_reason(needs: &Needs, seen: &[SeenWorker]) -> Option<String> {
     Some(format!(
         "it needs at least {:.1} GiB of memory, and none of the workers that are there, {} of them, gives a job more \
          than {:.1} GiB",
-        needs.memory.unwrap_or(0) as f64 / GIB,
+        requirements.memory.unwrap_or(0) as f64 / GIB,
         seen.len(),
         most.unwrap_or(0) as f64 / GIB
     ))
@@ -215,8 +215,8 @@ mod tests {
     #[test]
     fn what_may_be_too_large_is_left_to_a_larger_worker() {
         let small = worker(Some(2), &[]);
-        let likely = |seen: &[SeenWorker]| taker(&small, seen).likely_memory;
-        assert_eq!(taker(&small, &[]).memory, Some(2 << 30));
+        let likely = |seen: &[SeenWorker]| capabilities(&small, seen).likely_memory;
+        assert_eq!(capabilities(&small, &[]).memory, Some(2 << 30));
         for no_larger in [
             &[][..],
             std::slice::from_ref(&small),
@@ -229,30 +229,40 @@ mod tests {
             assert_eq!(likely(&[small.clone(), larger]), Some(2 << 30));
         }
         let small = worker(Some(2), &["a", "b"]);
-        assert_eq!(taker(&small, &[worker(Some(9), &["b"])]).likely_memory, None);
-        let likely = taker(&small, &[worker(Some(9), &["c", "b", "a"])]).likely_memory;
+        assert_eq!(capabilities(&small, &[worker(Some(9), &["b"])]).likely_memory, None);
+        let likely = capabilities(&small, &[worker(Some(9), &["c", "b", "a"])]).likely_memory;
         assert_eq!(likely, Some(2 << 30));
-        assert_eq!(taker(&worker(None, &[]), &[worker(None, &[])]).likely_memory, None);
+        assert_eq!(
+            capabilities(&worker(None, &[]), &[worker(None, &[])]).likely_memory,
+            None
+        );
     }
 
     #[test]
     fn a_job_that_nobody_can_have_is_told_why() {
-        let needs = |gib: i64, clip: &str| Needs {
+        let requirements = |gib: i64, clip: &str| ResourceRequirements {
             memory: Some(gib << 30),
             likely_memory: None,
             clip: (!clip.is_empty()).then(|| clip.into()),
         };
-        let said = |needs: &Needs, seen: &[SeenWorker]| waiting_reason(needs, seen).unwrap_or_default();
-        assert!(said(&Needs::default(), &[]).contains("120 s"));
+        let said = |requirements: &ResourceRequirements, seen: &[SeenWorker]| {
+            waiting_reason(requirements, seen).unwrap_or_default()
+        };
+        assert!(said(&ResourceRequirements::default(), &[]).contains("120 s"));
         let seen = [worker(Some(4), &["a"]), worker(Some(8), &["b"])];
-        for fine in [needs(4, "a"), needs(8, "b"), needs(8, ""), Needs::default()] {
+        for fine in [
+            requirements(4, "a"),
+            requirements(8, "b"),
+            requirements(8, ""),
+            ResourceRequirements::default(),
+        ] {
             assert_eq!(said(&fine, &seen), "");
         }
-        let told = said(&needs(5, "a"), &seen);
+        let told = said(&requirements(5, "a"), &seen);
         assert!(told.contains("5.0 GiB") && told.contains("more than 4.0 GiB"), "{told}");
-        assert!(said(&needs(9, ""), &seen).contains("more than 8.0 GiB"));
-        assert!(said(&needs(1, "c"), &seen).contains("SHA-256 is c"));
-        assert_eq!(said(&needs(99, "c"), &[worker(None, &[])]), "");
+        assert!(said(&requirements(9, ""), &seen).contains("more than 8.0 GiB"));
+        assert!(said(&requirements(1, "c"), &seen).contains("SHA-256 is c"));
+        assert_eq!(said(&requirements(99, "c"), &[worker(None, &[])]), "");
     }
 
     #[test]

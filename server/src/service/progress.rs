@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use sha2::{Digest, Sha256};
 
-use crate::ledger::JobId;
+use crate::ledger::{JobId, Progress};
 
 /// Least time between two writes.
 const EVERY: Duration = Duration::from_secs(1);
@@ -20,8 +20,8 @@ struct Reported {
     /// SHA-256 of the lease token, for tokens are kept nowhere.
     lease: [u8; 32],
     written: Instant,
-    /// Encoded, newer than what was written.
-    progress: Option<Vec<u8>>,
+    /// Newer than what was written.
+    progress: Option<Progress>,
 }
 
 impl ProgressThrottle {
@@ -31,10 +31,10 @@ impl ProgressThrottle {
         &self,
         id: JobId,
         token: &str,
-        progress: Option<Vec<u8>>,
+        progress: Option<Progress>,
         lease: Duration,
         now: Instant,
-    ) -> Option<Option<Vec<u8>>> {
+    ) -> Option<Option<Progress>> {
         let mut all = self.lock();
         let Some(reported) = all.get_mut(&id).filter(|reported| reported.lease == hash(token)) else {
             return Some(progress);
@@ -82,24 +82,31 @@ mod tests {
 
     const LEASE: Duration = Duration::from_secs(30);
 
+    fn done(done: i64) -> Progress {
+        Progress {
+            done,
+            ..Progress::default()
+        }
+    }
+
     #[test]
     fn one_write_a_second_with_the_newest_progress() {
         let (reports, id, start) = (ProgressThrottle::default(), Uuid::now_v7(), Instant::now());
-        let due = |progress: Option<&[u8]>, ms| {
+        let due = |progress: Option<i64>, ms| {
             reports.due(
                 id,
                 "token",
-                progress.map(<[u8]>::to_vec),
+                progress.map(done),
                 LEASE,
                 start + Duration::from_millis(ms),
             )
         };
-        assert_eq!(due(Some(&[1]), 0), Some(Some(vec![1])));
+        assert_eq!(due(Some(1), 0), Some(Some(done(1))));
         reports.written(id, "token", start);
-        assert_eq!(due(Some(&[2]), 300), None);
-        assert_eq!(due(Some(&[3]), 600), None);
+        assert_eq!(due(Some(2), 300), None);
+        assert_eq!(due(Some(3), 600), None);
         assert_eq!(due(None, 900), None);
-        assert_eq!(due(None, 1000), Some(Some(vec![3])));
+        assert_eq!(due(None, 1000), Some(Some(done(3))));
         reports.written(id, "token", start + Duration::from_secs(1));
         assert_eq!(due(None, 2000), Some(None));
     }
@@ -108,7 +115,7 @@ mod tests {
     fn attempts_are_kept_apart() {
         let (reports, id, now) = (ProgressThrottle::default(), Uuid::now_v7(), Instant::now());
         reports.written(id, "old", now);
-        assert_eq!(reports.due(id, "old", Some(vec![1]), LEASE, now), None);
+        assert_eq!(reports.due(id, "old", Some(done(1)), LEASE, now), None);
         assert_eq!(reports.due(id, "new", None, LEASE, now), Some(None));
         reports.forget(id);
         assert_eq!(reports.due(id, "old", None, LEASE, now), Some(None));

@@ -5,12 +5,11 @@ use guardsplat_codeword::MessageLength;
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
-use prost::Message as _;
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
 use crate::ledger::queue::PRIORITIES;
-use crate::ledger::{ArtifactId, JobKind, KeyId};
+use crate::ledger::{ArtifactId, JobSpec, KeyId};
 use crate::service::claims::{self, Claim};
 use crate::service::fingerprint;
 use crate::service::names::Kind;
@@ -28,9 +27,7 @@ pub struct Submission {
     /// What people call the job.
     pub display_name: String,
     /// What it does.
-    pub kind: JobKind,
-    /// The encoded spec.
-    pub spec: Vec<u8>,
+    pub spec: JobSpec,
     /// Artifacts it reads.
     pub inputs: Vec<ArtifactId>,
     /// The key it needs, and the field that named it.
@@ -64,11 +61,11 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     );
     let asked = fingerprint::asked(&job);
     let checked = match job.spec {
-        Some(Spec::Embed(spec)) => embed(&spec, &mut problems)?.map(|w| (JobKind::Embed, spec.encode_to_vec(), w)),
-        Some(Spec::Verify(spec)) => verify(&spec, &mut problems)?.map(|w| (JobKind::Verify, spec.encode_to_vec(), w)),
+        Some(Spec::Embed(spec)) => embed(&spec, &mut problems)?.map(|w| (JobSpec::Embed(spec), w)),
+        Some(Spec::Verify(spec)) => verify(&spec, &mut problems)?.map(|w| (JobSpec::Verify(spec), w)),
         Some(Spec::CreateKey(spec)) => {
             create_key(&spec, &mut problems);
-            Some((JobKind::CreateKey, spec.encode_to_vec(), Wanted::default()))
+            Some((JobSpec::CreateKey(spec), Wanted::default()))
         }
         None => {
             problems.add(
@@ -79,7 +76,7 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
         }
     };
     problems.finish()?;
-    let (kind, spec, wanted) = checked.ok_or_else(|| Error::invalid("job.spec", "names something that is invalid"))?;
+    let (spec, wanted) = checked.ok_or_else(|| Error::invalid("job.spec", "names something that is invalid"))?;
     let Wanted {
         inputs,
         key,
@@ -88,7 +85,6 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
     } = wanted;
     Ok(Submission {
         display_name: job.display_name,
-        kind,
         spec,
         inputs,
         key,

@@ -1,47 +1,27 @@
 //! From rows of the ledger to messages of the API.
 use guardsplat_proto::v1;
-use guardsplat_proto::v1::job::{Result as JobResult, Spec};
-use prost::Message;
+use guardsplat_proto::v1::job::Spec;
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactRow, JobKind, JobRow, JobState, KeyRow, KeyState};
+use crate::ledger::{ArtifactRow, Failure, JobResult, JobRow, JobSpec, JobState, KeyRow, KeyState};
 use crate::service::clock::timestamp;
 use crate::service::names::Kind;
 
 /// A job for the API.
-pub fn job(row: JobRow) -> Result<v1::Job> {
+pub fn job(row: JobRow) -> v1::Job {
     let queued = row.state == JobState::Queued;
-    let spec = row.spec.as_slice();
-    let result = row.result.as_deref();
-    let (spec, result) = match row.kind {
-        JobKind::Embed => (
-            Spec::Embed(decode(spec)?),
-            result.map(decode).transpose()?.map(JobResult::EmbedResult),
-        ),
-        JobKind::Verify => (
-            Spec::Verify(decode(spec)?),
-            result.map(decode).transpose()?.map(JobResult::VerifyResult),
-        ),
-        JobKind::CreateKey => (
-            Spec::CreateKey(decode(spec)?),
-            result.map(decode).transpose()?.map(JobResult::KeyResult),
-        ),
-    };
-    Ok(v1::Job {
+    v1::Job {
         name: Kind::Job.name(row.id),
         display_name: row.display_name,
-        spec: Some(spec),
+        spec: Some(spec(row.spec)),
         state: state(row.state).into(),
         cancel_requested: row.cancel_requested,
         attempt: row.attempt,
         max_attempts: row.max_attempts,
         queue_position: row.queue_position.filter(|_| queued),
-        progress: row.progress.as_deref().map(decode).transpose()?,
-        result,
-        failure: row.failure.map(|failure| v1::Failure {
-            reason: failure.reason,
-            message: failure.message,
-        }),
+        progress: row.progress,
+        result: row.result.map(result),
+        failure: row.failure.map(failure),
         create_time: Some(timestamp(row.create_time)),
         update_time: Some(timestamp(row.update_time)),
         start_time: row.start_time.map(timestamp),
@@ -50,7 +30,31 @@ pub fn job(row: JobRow) -> Result<v1::Job> {
         priority: Some(row.priority),
         // Whoever knows the workers adds it.
         waiting_reason: String::new(),
-    })
+    }
+}
+
+fn spec(spec: JobSpec) -> Spec {
+    match spec {
+        JobSpec::Embed(spec) => Spec::Embed(spec),
+        JobSpec::Verify(spec) => Spec::Verify(spec),
+        JobSpec::CreateKey(spec) => Spec::CreateKey(spec),
+    }
+}
+
+fn result(result: JobResult) -> v1::job::Result {
+    match result {
+        JobResult::Embed(result) => v1::job::Result::EmbedResult(result),
+        JobResult::Verify(result) => v1::job::Result::VerifyResult(result),
+        JobResult::CreateKey(result) => v1::job::Result::KeyResult(result),
+    }
+}
+
+/// Why a job or an attempt failed, for the API. Numbers are the same.
+pub fn failure(failure: Failure) -> v1::Failure {
+    v1::Failure {
+        reason: failure.reason as i32,
+        message: failure.message,
+    }
 }
 
 /// An artifact for the API.
@@ -88,11 +92,6 @@ fn key_state(state: KeyState) -> v1::key::State {
         KeyState::Retired => v1::key::State::Retired,
         KeyState::Revoked => v1::key::State::Revoked,
     }
-}
-
-/// A message that the ledger keeps encoded.
-pub fn decode<M: Message + Default>(bytes: &[u8]) -> Result<M> {
-    M::decode(bytes).map_err(|error| Error::internal("reading a message kept in the ledger", error))
 }
 
 fn state(state: JobState) -> v1::job::State {

@@ -138,15 +138,14 @@ impl Service {
     async fn attempt(&self, poster: &Poster, sending: &Sending, now: i64) -> Result<(), Failed> {
         let Sending { delivery, hook, .. } = sending;
         let job = sending.job.as_ref().ok_or(Failed::JobGone)?;
-        let unreadable = |error| Error::internal("reading a result kept in the ledger", error);
         let mut artifacts = Vec::new();
-        for (role, artifact) in event::outputs(job).map_err(unreadable)? {
+        for (role, artifact) in event::outputs(job) {
             // One that was deleted meanwhile is not told of.
             if let Some(row) = self.find_artifact(&job.project, artifact).await? {
                 artifacts.push((role, row));
             }
         }
-        let body = event::body(delivery, job, sending.asked_id, artifacts).map_err(unreadable)?;
+        let body = event::body(delivery, job, sending.asked_id, artifacts);
         let secret = self
             .master()
             .open(&crate::hooks::secret_context(hook.id), &hook.sealed_secret);

@@ -1,23 +1,23 @@
 //! Passes on what other servers changed, to those who wait here.
 use tokio::sync::broadcast::error::RecvError;
 
-use crate::ledger::Elsewhere;
+use crate::ledger::RemoteChange;
 use crate::service::Service;
 
 /// Passes on until the API is stopped. Returns at once where no other server can change anything.
 pub async fn relay(api: Service) {
-    let Some(mut elsewhere) = api.ledger().elsewhere() else {
+    let Some(mut remote) = api.ledger().remote_changes() else {
         return;
     };
     let mut stopping = api.changes().listen();
     loop {
         let heard = tokio::select! {
             () = stopping.stopped() => return,
-            heard = elsewhere.recv() => heard,
+            heard = remote.recv() => heard,
         };
         let changes = api.changes();
         match heard {
-            Ok(Elsewhere::Job {
+            Ok(RemoteChange::Job {
                 id,
                 queue_grew,
                 queue_moved,
@@ -30,7 +30,7 @@ pub async fn relay(api: Service) {
                     changes.queue_moved();
                 }
             }
-            Ok(Elsewhere::Anything) | Err(RecvError::Lagged(_)) => changes.everything(),
+            Ok(RemoteChange::Anything) | Err(RecvError::Lagged(_)) => changes.everything(),
             Err(RecvError::Closed) => return,
         }
     }

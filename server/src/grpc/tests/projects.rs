@@ -515,10 +515,13 @@ impl Server {
             self.worker.clone().release_job(release).await.unwrap();
         }
         let id = crate::service::names::Kind::Job.parse("name", job).unwrap();
-        let row = crate::ledger::Ledger::get_job(&*self.ledger(), id)
+        let row = crate::ledger::JobStore::get_job(&*self.ledger(), id)
             .await
             .unwrap()
             .unwrap();
-        KeyResult::decode(row.result.unwrap().as_slice()).unwrap().key
+        match row.result {
+            Some(crate::ledger::JobResult::CreateKey(result)) => result.key,
+            other => panic!("{other:?}"),
+        }
     }
 }

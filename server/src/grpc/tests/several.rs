@@ -17,7 +17,7 @@ use super::harness::{Server, key_spec, not_found, refused};
 use crate::access::Scope;
 use crate::ledger::postgres::tests::Place;
 use crate::ledger::postgres::tests::cluster::Cluster;
-use crate::ledger::{Elsewhere, JobId, PostgresLedger};
+use crate::ledger::{JobId, PostgresLedger, RemoteChange};
 use crate::service::Limits;
 use crate::service::changes::{For, Heard};
 use crate::service::clock::now;
@@ -39,7 +39,7 @@ async fn two() -> Option<(Place, Server, Server)> {
     .await;
     let two = one.twin(place.ledger().await).await;
     for (here, there) in [(&one, &two), (&two, &one)] {
-        let mut heard = there.ledger().elsewhere().unwrap();
+        let mut heard = there.ledger().remote_changes().unwrap();
         let mut tries = 0..100;
         // The first words may be spoken before anybody listens.
         while !hears_a_cancellation(here, &mut heard).await {
@@ -50,11 +50,11 @@ async fn two() -> Option<(Place, Server, Server)> {
 }
 
 /// Makes a job and ends it, and says whether that was heard, so that nothing of it is heard later.
-async fn hears_a_cancellation(server: &Server, heard: &mut Receiver<Elsewhere>) -> bool {
+async fn hears_a_cancellation(server: &Server, heard: &mut Receiver<RemoteChange>) -> bool {
     let job = server.create(key_spec(8)).await;
     let name = job.name.clone();
     server.jobs.clone().cancel_job(CancelJobRequest { name }).await.unwrap();
-    let ended = Elsewhere::Job {
+    let ended = RemoteChange::Job {
         id: id(&job),
         queue_grew: false,
         queue_moved: true,

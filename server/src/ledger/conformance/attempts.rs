@@ -1,5 +1,5 @@
 //! Attempts: counted, bounded, repeated after a pause, or handed back.
-use super::super::{JobState, LedgerError, NewJob, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, retry::backoff};
+use super::super::{FailureReason, JobState, LedgerError, NewJob, retry::backoff};
 use super::Factory;
 use super::fixture::*;
 
@@ -15,7 +15,7 @@ pub(crate) async fn the_fourth_claim_gets_nothing(factory: &dyn Factory) {
     assert_eq!((given_up.state, given_up.attempt), (JobState::Failed, 3));
     assert_eq!(given_up.end_time, Some(at(3030)));
     let failure = given_up.failure.unwrap();
-    assert_eq!(failure.reason, REASON_ATTEMPTS_EXHAUSTED);
+    assert_eq!(failure.reason, FailureReason::AttemptsExhausted);
     assert!(failure.message.contains("did not report"), "{}", failure.message);
     assert!(claim(&*ledger, at(9000)).await.is_none());
     let next = queue(&*ledger, at(9001)).await;
@@ -53,7 +53,7 @@ pub(crate) async fn a_job_without_attempts_is_never_given_out(factory: &dyn Fact
     let dead = job(&*ledger, dead).await;
     assert_eq!((dead.state, dead.attempt, dead.revision), (JobState::Failed, 0, 2));
     assert_eq!((dead.start_time, dead.end_time), (None, Some(at(2))));
-    assert_eq!(dead.failure.unwrap().reason, REASON_ATTEMPTS_EXHAUSTED);
+    assert_eq!(dead.failure.unwrap().reason, FailureReason::AttemptsExhausted);
 }
 
 pub(crate) async fn a_failed_attempt_waits_before_the_next(factory: &dyn Factory) {
@@ -89,7 +89,7 @@ pub(crate) async fn a_failed_attempt_waits_before_the_next(factory: &dyn Factory
         (JobState::Failed, Some(now), None)
     );
     let last = failed.failure.unwrap();
-    assert_eq!(last.reason, REASON_ATTEMPTS_EXHAUSTED);
+    assert_eq!(last.reason, FailureReason::AttemptsExhausted);
     assert!(last.message.contains("again"), "{}", last.message);
 }
 
@@ -164,13 +164,13 @@ pub(crate) async fn reports_extend_the_lease_and_carry_progress(factory: &dyn Fa
     );
     for _ in 0..2 {
         ledger
-            .report(id, &lease.token, Some(vec![5]), LEASE, at(90))
+            .report(id, &lease.token, Some(progress(5)), LEASE, at(90))
             .await
             .unwrap();
         let row = job(&*ledger, id).await;
         assert_eq!(
             (row.progress, row.revision, row.update_time),
-            (Some(vec![5]), given + 1, at(90))
+            (Some(progress(5)), given + 1, at(90))
         );
     }
     // Progress stays after the end, and begins anew with an attempt.
@@ -178,7 +178,7 @@ pub(crate) async fn reports_extend_the_lease_and_carry_progress(factory: &dyn Fa
         .fail(id, &lease.token, failure("x"), true, false, at(95))
         .await
         .unwrap();
-    assert_eq!(job(&*ledger, id).await.progress, Some(vec![5]));
+    assert_eq!(job(&*ledger, id).await.progress, Some(progress(5)));
     assert_eq!(claim_of(&*ledger, id, at(200)).await.job.progress, None);
 }
 
@@ -245,7 +245,7 @@ pub(crate) async fn a_lost_worker_is_noticed(factory: &dyn Factory) {
     let row = job(&*ledger, id).await;
     assert_eq!((row.state, row.run_after), (JobState::Queued, Some(at(42))));
     let failure = row.failure.unwrap();
-    assert_eq!(failure.reason, REASON_WORKER_LOST);
+    assert_eq!(failure.reason, FailureReason::WorkerLost);
     assert!(failure.message.contains("worker-1"), "{}", failure.message);
     // Late, but nobody has missed it yet.
     refused!(

@@ -1,7 +1,7 @@
 //! Nobody writes but the attempt that has the job.
 use uuid::Uuid;
 
-use super::super::{JobState, Lease, Ledger, LedgerError, Origin};
+use super::super::{JobKind, JobState, Lease, Ledger, LedgerError, Origin};
 use super::Factory;
 use super::fixture::*;
 
@@ -10,7 +10,7 @@ async fn all_refused(ledger: &dyn Ledger, zombie: &Lease, written: &[Uuid], now:
     let (id, token) = (zombie.job.id, zombie.token.as_str());
     let before = job(ledger, id).await;
     assert!(is_lost(&ledger.leased_job(id, token).await));
-    assert!(is_lost(&ledger.report(id, token, Some(vec![66]), LEASE, now).await));
+    assert!(is_lost(&ledger.report(id, token, Some(progress(66)), LEASE, now).await));
     assert!(is_lost(&ledger.complete(id, token, completion(66, &[]), now).await));
     assert!(is_lost(&ledger.complete(id, token, completion(66, written), now).await));
     for (retryable, cancelled) in [(true, false), (false, false), (false, true)] {
@@ -87,7 +87,10 @@ pub(crate) async fn a_zombie_can_not_disturb_its_successor(factory: &dyn Factory
     }
     let good = output(&*ledger, &successor, false, at(43)).await;
     let done = complete(&*ledger, &successor, &[good], at(44)).await;
-    assert_eq!((done.state, done.result), (JobState::Succeeded, Some(vec![9])));
+    assert_eq!(
+        (done.state, done.result),
+        (JobState::Succeeded, Some(result_of(JobKind::Embed, 9)))
+    );
     all_refused(&*ledger, &zombie, &[stale, pending], at(45)).await;
     // Not even what its successor said.
     let echo = ledger.complete(id, &zombie.token, completion(9, &[good]), at(46)).await;

@@ -1,11 +1,12 @@
 //! Short words for what the tests do all the time.
 use std::time::Duration;
 
+use guardsplat_proto::v1::{EmbedResult, EmbedSpec, KeyResult, KeySpec, VerifyResult, VerifySpec};
 use uuid::Uuid;
 
 use super::super::{
-    ArtifactId, ArtifactState, Completion, Failure, JobId, JobKind, JobRow, Lease, Ledger, LedgerError, Needs,
-    NewArtifact, NewJob, Origin,
+    ArtifactId, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobResult, JobRow, JobSpec, Lease,
+    Ledger, LedgerError, NewArtifact, NewJob, Origin, Progress, ResourceRequirements,
 };
 
 /// How long the leases of the tests are.
@@ -24,13 +25,55 @@ pub fn by_us() -> Origin {
     Origin::Upload { project: OURS.into() }
 }
 
+/// A spec of which there are several, all of one kind.
+pub fn spec(message: u64) -> JobSpec {
+    JobSpec::Embed(EmbedSpec {
+        message: message.to_string(),
+        ..EmbedSpec::default()
+    })
+}
+
+/// A spec of a kind.
+pub fn spec_of(kind: JobKind) -> JobSpec {
+    match kind {
+        JobKind::Embed => spec(123),
+        JobKind::Verify => JobSpec::Verify(VerifySpec::default()),
+        JobKind::CreateKey => JobSpec::CreateKey(KeySpec::default()),
+    }
+}
+
+/// Progress of which there are several.
+pub fn progress(done: u8) -> Progress {
+    Progress {
+        done: done.into(),
+        ..Progress::default()
+    }
+}
+
+/// A result of which there are several, for jobs of this kind.
+pub fn result_of(kind: JobKind, said: u8) -> JobResult {
+    match kind {
+        JobKind::Embed => JobResult::Embed(EmbedResult {
+            steps: said.into(),
+            ..EmbedResult::default()
+        }),
+        JobKind::Verify => JobResult::Verify(VerifyResult {
+            bits: said.into(),
+            ..VerifyResult::default()
+        }),
+        JobKind::CreateKey => JobResult::CreateKey(KeyResult {
+            key: said.to_string(),
+            ..KeyResult::default()
+        }),
+    }
+}
+
 pub fn new_job() -> NewJob {
     NewJob {
         id: Uuid::now_v7(),
         project: OURS.into(),
         display_name: "a scene".into(),
-        kind: JobKind::Embed,
-        spec: vec![1, 2, 3],
+        spec: spec(123),
         inputs: Vec::new(),
         key: None,
         request_id: None,
@@ -38,7 +81,7 @@ pub fn new_job() -> NewJob {
         fingerprint: [7; 32],
         max_attempts: 3,
         priority: 0,
-        needs: Needs::default(),
+        requirements: ResourceRequirements::default(),
         trace_parent: None,
     }
 }
@@ -81,7 +124,7 @@ pub async fn claim_of(ledger: &dyn Ledger, id: JobId, now: i64) -> Lease {
 
 pub fn failure(message: &str) -> Option<Failure> {
     Some(Failure {
-        reason: 4,
+        reason: FailureReason::Internal,
         message: message.into(),
     })
 }
@@ -139,14 +182,18 @@ pub async fn output(ledger: &dyn Ledger, lease: &Lease, secret: bool, now: i64) 
 }
 
 pub async fn complete(ledger: &dyn Ledger, lease: &Lease, outputs: &[ArtifactId], now: i64) -> JobRow {
-    let done = ledger.complete(lease.job.id, &lease.token, completion(9, outputs), now);
+    let said = Completion {
+        result: result_of(lease.job.kind(), 9),
+        ..completion(9, outputs)
+    };
+    let done = ledger.complete(lease.job.id, &lease.token, said, now);
     done.await.expect("a leased job can be completed")
 }
 
-/// That `result` came out, with these outputs.
+/// That `result` came out of marking, with these outputs.
 pub fn completion(result: u8, outputs: &[ArtifactId]) -> Completion {
     Completion {
-        result: vec![result],
+        result: result_of(JobKind::Embed, result),
         outputs: outputs.to_vec(),
         key: None,
         fingerprint: [result; 32],

@@ -2,7 +2,6 @@
 //!
 //! `conformance_suite!(factory)` makes a test of each; a function here that the macro doesn't name is dead code, which
 //! the compiler reports.
-mod access;
 mod artifacts;
 mod attempts;
 mod cancelling;
@@ -17,12 +16,12 @@ mod registry;
 mod retention;
 pub mod speed;
 mod submission;
+mod tokens;
 
 use std::sync::Arc;
 
 use super::Ledger;
 
-pub(crate) use access::*;
 pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
@@ -34,6 +33,7 @@ pub(crate) use queue::*;
 pub(crate) use registry::*;
 pub(crate) use retention::*;
 pub(crate) use submission::*;
+pub(crate) use tokens::*;
 
 /// A place for one ledger, empty at first.
 #[tonic::async_trait]

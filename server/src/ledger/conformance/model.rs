@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use uuid::Uuid;
 
 use super::super::queue::PATIENCE;
-use super::super::{JobId, JobState, Ledger, Needs, NewJob, Result, Taker, retry::backoff};
+use super::super::{JobId, JobState, Ledger, NewJob, ResourceRequirements, Result, WorkerCapabilities, retry::backoff};
 use super::fixture::*;
 
 /// One thing that somebody does. Numbers choose among the jobs, requests and leases that there are.
@@ -140,7 +140,7 @@ impl Pair {
                 let Some((lease, id, token)) = self.lease(choice) else {
                     return;
                 };
-                let done = self.ledger.report(id, &token, news.map(|n| vec![n]), LEASE, now).await;
+                let done = self.ledger.report(id, &token, news.map(progress), LEASE, now).await;
                 let cancel = done.as_ref().ok().copied();
                 self.fenced(lease, &done, |job| {
                     assert_eq!(cancel, Some(job.cancel));
@@ -228,11 +228,11 @@ impl Pair {
             project: project.into(),
             priority,
             request_id,
-            spec: vec![u8::from(body)],
+            spec: spec(body.into()),
             fingerprint: [u8::from(body) + 2 * (priority + 1) as u8; 32],
-            needs: Needs {
+            requirements: ResourceRequirements {
                 memory,
-                ..Needs::default()
+                ..ResourceRequirements::default()
             },
             ..new_job()
         };
@@ -269,11 +269,11 @@ impl Pair {
 
     async fn claim(&mut self, memory: Option<i64>) {
         let (now, holder) = (self.now, self.leases.len());
-        let taker = Taker {
+        let capabilities = WorkerCapabilities {
             memory,
-            ..Taker::of_anything("worker-1")
+            ..WorkerCapabilities::of_anything("worker-1")
         };
-        let given = self.ledger.claim_for(&taker, LEASE, now).await.unwrap();
+        let given = self.ledger.claim_for(&capabilities, LEASE, now).await.unwrap();
         let next = self.next(memory);
         assert_eq!(
             given.as_ref().map(|lease| lease.job.id),
@@ -388,7 +388,7 @@ impl Pair {
                     row.state,
                     row.cancel_requested,
                     row.attempt,
-                    row.progress.clone(),
+                    row.progress,
                     row.run_after,
                     row.revision
                 ),
@@ -397,7 +397,7 @@ impl Pair {
                     job.state,
                     job.cancel,
                     job.attempt,
-                    job.progress.map(|p| vec![p]),
+                    job.progress.map(progress),
                     job.run_after,
                     job.revision
                 ),

@@ -1,13 +1,13 @@
 //! What operators ask: counts, attempts and their ends, and another try for a job that failed.
 use super::super::{
-    Failure, JobKind, JobState, LedgerError, Needs, NewJob, Outcome, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST,
-    Running, Tally, Waiting,
+    Failure, FailureReason, JobKind, JobState, LedgerError, NewJob, Outcome, ResourceRequirements, Running, Tally,
+    Waiting,
 };
 use super::Factory;
 use super::fixture::*;
 
 /// Number, outcome, and the reason of each attempt, newest first.
-async fn outcomes(ledger: &dyn super::Ledger, id: super::super::JobId) -> Vec<(i32, Outcome, Option<i32>)> {
+async fn outcomes(ledger: &dyn super::Ledger, id: super::super::JobId) -> Vec<(i32, Outcome, Option<FailureReason>)> {
     let attempts = ledger.attempts(id).await.unwrap();
     let each = attempts
         .into_iter()
@@ -36,7 +36,7 @@ pub(crate) async fn every_attempt_is_kept_with_its_end(factory: &dyn Factory) {
     // A report is no end.
     let lease = claim_of(&*ledger, id, at(3)).await;
     ledger
-        .report(id, &lease.token, Some(vec![1]), LEASE, at(4))
+        .report(id, &lease.token, Some(progress(1)), LEASE, at(4))
         .await
         .unwrap();
     let failed = ledger.fail(id, &lease.token, failure("out of memory"), true, false, at(5));
@@ -50,15 +50,15 @@ pub(crate) async fn every_attempt_is_kept_with_its_end(factory: &dyn Factory) {
         outcomes(&*ledger, id).await,
         [
             (4, Outcome::Succeeded, None),
-            (3, Outcome::Failed, Some(REASON_WORKER_LOST)),
-            (2, Outcome::Failed, Some(4)),
+            (3, Outcome::Failed, Some(FailureReason::WorkerLost)),
+            (2, Outcome::Failed, Some(FailureReason::Internal)),
             (1, Outcome::Released, None),
         ]
     );
     let attempts = ledger.attempts(id).await.unwrap();
     assert_eq!(attempts[2].end_time, Some(at(5)));
     let told = Failure {
-        reason: 4,
+        reason: FailureReason::Internal,
         message: "out of memory".into(),
     };
     assert_eq!(attempts[2].failure, Some(told));
@@ -98,7 +98,7 @@ async fn given_up(ledger: &dyn super::Ledger) -> (super::super::JobId, uuid::Uui
     let failed = ledger.fail(id, &lease.token, failure("out of memory"), true, false, at(3));
     let job = failed.await.unwrap();
     assert_eq!(job.state, JobState::Failed);
-    assert_eq!(job.failure.unwrap().reason, REASON_ATTEMPTS_EXHAUSTED);
+    assert_eq!(job.failure.unwrap().reason, FailureReason::AttemptsExhausted);
     (id, input)
 }
 
@@ -127,7 +127,7 @@ pub(crate) async fn a_failed_job_is_queued_once_more(factory: &dyn Factory) {
         outcomes(&*ledger, id).await,
         [
             (2, Outcome::Succeeded, None),
-            (1, Outcome::Failed, Some(REASON_ATTEMPTS_EXHAUSTED))
+            (1, Outcome::Failed, Some(FailureReason::AttemptsExhausted))
         ]
     );
     refused!(ledger.requeue(id, &[input], at(9)).await, LedgerError::NotFailed(_));
@@ -160,7 +160,7 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
     let (failed, _) = given_up(&*ledger).await;
     let verify = |id| NewJob {
         id,
-        kind: JobKind::Verify,
+        spec: spec_of(JobKind::Verify),
         ..new_job()
     };
     let refused_one = uuid::Uuid::now_v7();
@@ -178,7 +178,7 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
     let mut memory = Vec::new();
     for (least, likely) in sizes {
         let running = NewJob {
-            needs: Needs {
+            requirements: ResourceRequirements {
                 memory: least,
                 likely_memory: likely,
                 clip: None,
@@ -209,25 +209,53 @@ pub(crate) async fn jobs_are_counted_by_kind_state_and_reason(factory: &dyn Fact
                 count: 4,
                 memory: memory[3],
             }],
-            failed: vec![(JobKind::Embed, REASON_ATTEMPTS_EXHAUSTED, 1), (JobKind::Verify, 4, 1)],
+            failed: vec![
+                (JobKind::Embed, FailureReason::AttemptsExhausted, 1),
+                (JobKind::Verify, FailureReason::Internal, 1)
+            ],
         }
     );
 
-    let list = async |reasons: &'static [i32], before, limit| {
+    let list = async |reasons: &'static [FailureReason], before, limit| {
         let jobs = ledger.list_failed(OURS, reasons, before, limit).await.unwrap();
         jobs.into_iter().map(|job| job.id).collect::<Vec<_>>()
     };
     assert_eq!(
-        list(&[REASON_ATTEMPTS_EXHAUSTED, 4], None, 9).await,
+        list(&[FailureReason::AttemptsExhausted, FailureReason::Internal], None, 9).await,
         [refused_one, failed]
     );
-    assert_eq!(list(&[REASON_ATTEMPTS_EXHAUSTED], None, 9).await, [failed]);
-    assert_eq!(list(&[4], None, 9).await, [refused_one]);
-    assert_eq!(list(&[1, 2], None, 9).await, NONE);
-    assert_eq!(list(&[4, 5], None, 1).await, [refused_one]);
+    assert_eq!(list(&[FailureReason::AttemptsExhausted], None, 9).await, [failed]);
+    assert_eq!(list(&[FailureReason::Internal], None, 9).await, [refused_one]);
+    assert_eq!(
+        list(&[FailureReason::InvalidInput, FailureReason::TargetMissed], None, 9).await,
+        NONE
+    );
+    assert_eq!(
+        list(&[FailureReason::Internal, FailureReason::AttemptsExhausted], None, 1).await,
+        [refused_one]
+    );
     let first = job(&*ledger, refused_one).await;
-    assert_eq!(list(&[4, 5], Some((first.create_time, first.id)), 9).await, [failed]);
-    assert_eq!(ledger.list_failed("other", &[4, 5], None, 9).await.unwrap(), Vec::new());
+    assert_eq!(
+        list(
+            &[FailureReason::Internal, FailureReason::AttemptsExhausted],
+            Some((first.create_time, first.id)),
+            9
+        )
+        .await,
+        [failed]
+    );
+    assert_eq!(
+        ledger
+            .list_failed(
+                "other",
+                &[FailureReason::Internal, FailureReason::AttemptsExhausted],
+                None,
+                9
+            )
+            .await
+            .unwrap(),
+        Vec::new()
+    );
 }
 
 pub(crate) async fn a_job_keeps_the_trace_it_is_a_part_of(factory: &dyn Factory) {

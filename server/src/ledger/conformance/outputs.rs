@@ -17,13 +17,13 @@ pub(crate) async fn outputs_are_published_by_completion_only(factory: &dyn Facto
     let row = complete(&*ledger, &lease, &[named], at(3)).await;
     assert_eq!(
         (row.state, row.result, row.end_time),
-        (JobState::Succeeded, Some(vec![9]), Some(at(3)))
+        (JobState::Succeeded, Some(result_of(JobKind::Embed, 9)), Some(at(3)))
     );
     assert_eq!(ledger.get_artifact(named).await.unwrap().unwrap().job, Some(id));
     assert!(!visible(&*ledger, unnamed).await);
     // A published output can be the input of another job.
     let next = NewJob {
-        kind: JobKind::Verify,
+        spec: spec_of(JobKind::Verify),
         inputs: vec![named],
         ..new_job()
     };
@@ -68,6 +68,7 @@ fn new_key(artifact: Uuid) -> NewKey {
 fn with_key(key: &NewKey) -> Completion {
     Completion {
         key: Some(key.clone()),
+        result: result_of(JobKind::CreateKey, 9),
         ..completion(9, &[])
     }
 }
@@ -82,7 +83,7 @@ pub(super) async fn make_key_of(ledger: &dyn Ledger, bits: u32, now: i64) -> (Jo
     let id = ledger
         .create_job(
             NewJob {
-                kind: JobKind::CreateKey,
+                spec: spec_of(JobKind::CreateKey),
                 ..new_job()
             },
             now,
@@ -109,8 +110,15 @@ pub(super) async fn make_key_of(ledger: &dyn Ledger, bits: u32, now: i64) -> (Jo
 
 pub(crate) async fn keys_are_published_and_their_files_never(factory: &dyn Factory) {
     let ledger = factory.open().await;
-    let id = queue(&*ledger, at(0)).await;
+    let making = NewJob {
+        spec: spec_of(JobKind::CreateKey),
+        ..new_job()
+    };
+    let id = ledger.create_job(making, at(0)).await.unwrap().id;
     let lease = claim_of(&*ledger, id, at(0)).await;
+    // And nothing else than a key comes out of making one.
+    let mixed_up = ledger.complete(id, &lease.token, completion(9, &[]), at(0)).await;
+    refused!(mixed_up, LedgerError::ResultOfAnotherKind(job) if job == id);
     let open = new_key(output(&*ledger, &lease, false, at(0)).await);
     let done = ledger.complete(id, &lease.token, with_key(&open), at(1)).await;
     refused!(done, LedgerError::NotAnOutput(artifact) if artifact == open.artifact);

@@ -3,7 +3,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::super::queue::PATIENCE;
-use super::super::{JobId, JobRow, Ledger, Needs, NewJob, SeenWorker, Taker};
+use super::super::{JobId, JobRow, Ledger, NewJob, ResourceRequirements, SeenWorker, WorkerCapabilities};
 use super::Factory;
 use super::fixture::*;
 
@@ -190,59 +190,65 @@ pub(crate) async fn a_repeated_job_keeps_its_priority(factory: &dyn Factory) {
 pub(crate) async fn a_job_goes_to_a_worker_that_can_hold_it(factory: &dyn Factory) {
     const GIB: i64 = 1 << 30;
     let ledger = factory.open().await;
-    let queue_with = async |needs: Needs| {
-        let new = NewJob { needs, ..new_job() };
+    let queue_with = async |requirements: ResourceRequirements| {
+        let new = NewJob {
+            requirements,
+            ..new_job()
+        };
         ledger.create_job(new, at(0)).await.unwrap().id
     };
     let clip = |name: &str| name.repeat(32);
-    let large = Needs {
+    let large = ResourceRequirements {
         memory: Some(4 * GIB),
         likely_memory: Some(9 * GIB),
         clip: Some(clip("ab")),
     };
     let large_id = queue_with(large.clone()).await;
-    let small_id = queue_with(Needs {
+    let small_id = queue_with(ResourceRequirements {
         memory: Some(GIB),
         likely_memory: Some(2 * GIB),
         clip: Some(clip("cd")),
     })
     .await;
-    assert_eq!(job(&*ledger, large_id).await.needs, large);
-    let taker = |memory: i64, likely_memory: Option<i64>, clips: &[&str]| Taker {
+    assert_eq!(job(&*ledger, large_id).await.requirements, large);
+    let capabilities = |memory: i64, likely_memory: Option<i64>, clips: &[&str]| WorkerCapabilities {
         worker: "worker-1".into(),
         memory: Some(memory * GIB),
         likely_memory: likely_memory.map(|bytes| bytes * GIB),
         clips: clips.iter().map(|name| clip(name)).collect(),
     };
-    let given = async |taker: Taker| {
-        let lease = ledger.claim_for(&taker, LEASE, at(1)).await.unwrap();
+    let given = async |capabilities: WorkerCapabilities| {
+        let lease = ledger.claim_for(&capabilities, LEASE, at(1)).await.unwrap();
         lease.map(|lease| (lease.job.id, lease.token))
     };
     // Too small for both, or without what their keys need.
-    for taker in [
-        taker(0, None, &[]),
-        taker(1, Some(1), &[]),
-        taker(8, None, &["ef", "01"]),
+    for capabilities in [
+        capabilities(0, None, &[]),
+        capabilities(1, Some(1), &[]),
+        capabilities(8, None, &["ef", "01"]),
     ] {
-        assert_eq!(given(taker).await, None);
+        assert_eq!(given(capabilities).await, None);
     }
     // The first in line is passed over by those that can't have it, and nothing is counted.
-    for taker in [
-        taker(3, None, &[]),
-        taker(8, Some(8), &[]),
-        taker(99, None, &["ef", "cd"]),
+    for capabilities in [
+        capabilities(3, None, &[]),
+        capabilities(8, Some(8), &[]),
+        capabilities(99, None, &["ef", "cd"]),
     ] {
-        let (id, token) = given(taker).await.unwrap();
+        let (id, token) = given(capabilities).await.unwrap();
         assert_eq!(id, small_id);
         ledger.release(id, &token, at(1)).await.unwrap();
     }
     assert_eq!(job(&*ledger, large_id).await.revision, 1);
     // To the byte.
-    assert_eq!(given(taker(4, Some(9), &["ab", "ef"])).await.unwrap().0, large_id);
+    assert_eq!(
+        given(capabilities(4, Some(9), &["ab", "ef"])).await.unwrap().0,
+        large_id
+    );
     // Nothing is known of some jobs, nor of some workers.
-    let unknown = queue_with(Needs::default()).await;
+    let unknown = queue_with(ResourceRequirements::default()).await;
     claim_of(&*ledger, small_id, at(1)).await;
-    assert_eq!(given(taker(0, Some(0), &["ef"])).await.unwrap().0, unknown);
+    assert_eq!(given(capabilities(0, Some(0), &["ef"])).await.unwrap().0, unknown);
 }
 
 pub(crate) async fn workers_are_seen_for_a_while(factory: &dyn Factory) {

@@ -23,7 +23,7 @@ pub(crate) async fn claims_of_a_long_queue(name: &str, factory: &dyn Factory, pr
             let new = NewJob {
                 project: format!("project-{}", i % projects),
                 priority: (i / projects % 2) as i32,
-                spec: vec![0; 200],
+                spec: spec(7),
                 ..new_job()
             };
             ledger.create_job(new, at(i as i64 / 1000)).await.unwrap();

@@ -3,7 +3,7 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use super::super::{JobKind, JobRow, JobState, LedgerError, Needs, NewJob};
+use super::super::{JobKind, JobRow, JobState, LedgerError, NewJob, ResourceRequirements};
 use super::Factory;
 use super::fixture::*;
 
@@ -12,11 +12,10 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
     let input = upload(&*ledger, at(0)).await;
     let new = NewJob {
         display_name: "räumlich, \u{1f600}".into(),
-        kind: JobKind::Verify,
-        spec: vec![0, 255, 128],
+        spec: spec_of(JobKind::Verify),
         inputs: vec![input, input],
         priority: -10,
-        needs: Needs {
+        requirements: ResourceRequirements {
             memory: Some(1),
             likely_memory: Some(i64::MAX),
             clip: Some("ab".repeat(32)),
@@ -28,10 +27,9 @@ pub(crate) async fn a_job_is_kept_as_it_was_given(factory: &dyn Factory) {
         project: OURS.into(),
         id: new.id,
         display_name: new.display_name,
-        kind: JobKind::Verify,
         spec: new.spec,
         priority: -10,
-        needs: new.needs,
+        requirements: new.requirements,
         state: JobState::Queued,
         cancel_requested: false,
         attempt: 0,
@@ -69,7 +67,7 @@ pub(crate) async fn the_same_request_is_the_same_job(factory: &dyn Factory) {
     assert_eq!(ledger.create_job(again.clone(), at(5)).await.unwrap(), made);
 
     let other = NewJob {
-        spec: vec![3, 2, 1],
+        spec: spec(321),
         fingerprint: [8; 32],
         ..again.clone()
     };
@@ -110,13 +108,13 @@ pub(crate) async fn a_request_is_the_same_if_its_artifacts_hold_the_same(factory
         ledger.create_job(new, at(1))
     };
     // Other names for the same content; the same names, but nobody knows any more what they stood for.
-    let renamed = again(|new| new.spec = vec![4]).await.unwrap();
+    let renamed = again(|new| new.spec = spec(4)).await.unwrap();
     let gone = again(|new| new.fingerprint = [8; 32]).await.unwrap();
     assert_eq!([renamed.id, gone.id], [made.id; 2]);
     assert_eq!(renamed.spec, first.spec);
     for other in [
-        again(|new| (new.spec, new.fingerprint) = (vec![4], [8; 32])),
-        again(|new| (new.kind, new.fingerprint) = (JobKind::Verify, [8; 32])),
+        again(|new| (new.spec, new.fingerprint) = (spec(4), [8; 32])),
+        again(|new| (new.spec, new.fingerprint) = (spec_of(JobKind::Verify), [8; 32])),
         again(|new| (new.display_name, new.fingerprint) = ("another".into(), [8; 32])),
     ] {
         refused!(other.await, LedgerError::RequestIdReused(id) if Some(id) == first.request_id);

@@ -7,7 +7,7 @@ use sqlx::{Connection, PgConnection, PgPool, Postgres};
 use tokio::time::{sleep, timeout};
 
 use super::super::{LedgerError, Result};
-use super::trouble::{self, Trouble};
+use super::errors::{self, ErrorClass};
 
 /// How often a call is tried.
 const TRIES: u32 = 4;
@@ -50,11 +50,11 @@ impl Failed {
 
     /// Whether another try may do better.
     fn passes(&self) -> bool {
-        let trouble = match &self.error {
-            LedgerError::Database(error) => trouble::of(error),
-            _ => Trouble::Other,
+        let class = match &self.error {
+            LedgerError::Database(error) => errors::classify(error),
+            _ => ErrorClass::Other,
         };
-        self.undone && matches!(trouble, Trouble::Broken | Trouble::Conflict)
+        self.undone && matches!(class, ErrorClass::Broken | ErrorClass::Conflict)
     }
 }
 
@@ -102,7 +102,7 @@ impl Database {
                 Err(failed) => failed,
             };
             if tried == TRIES || !failed.passes() {
-                return Err(trouble::told(failed.error));
+                return Err(errors::to_ledger_error(failed.error));
             }
             sleep(PAUSE * 2_u32.pow(tried - 1)).await;
             tried += 1;
@@ -123,7 +123,7 @@ impl Database {
         let said = timeout(SILENCE, converse(&mut held.connection, kind, work)).await;
         let Ok(outcome) = said else {
             return Err(Failed {
-                error: trouble::no_answer(SILENCE),
+                error: errors::no_answer(SILENCE),
                 undone: false,
             });
         };
@@ -146,7 +146,7 @@ where
             Ok(()) => Ok(value),
             Err(error) => Err(Failed {
                 // The database says so itself, if the change was refused at the end; nothing else is known.
-                undone: matches!(trouble::of(&error), Trouble::Conflict),
+                undone: matches!(errors::classify(&error), ErrorClass::Conflict),
                 error: error.into(),
             }),
         },

@@ -2,46 +2,126 @@
 //!
 //! Every change is one transaction, which locks the rows that it decides by: the job whose lease it checks, the inputs
 //! of a new job, the chain of commitments. What a server changes the others hear of from the database.
-mod access;
-mod artifacts;
-mod commitments;
+//!
+//! What SQLite does just so is in [`shared`](super::shared).
+#![allow(
+    clippy::duplicate_mod,
+    reason = "files of `shared` are a part of each database's module"
+)]
+
+/// Ends a selection that locks its rows, for whoever is going to change them.
+macro_rules! for_update {
+    () => {
+        " FOR UPDATE"
+    };
+}
+/// Ends a selection whose rows nobody changes until the transaction ends.
+macro_rules! for_share {
+    () => {
+        " FOR SHARE"
+    };
+}
+/// Ends a selection whose rows nobody removes until the transaction ends.
+macro_rules! for_key_share {
+    () => {
+        " FOR KEY SHARE"
+    };
+}
+/// Ends a selection that locks the rows of one table, and leaves out those that somebody else has locked.
+macro_rules! skip_locked {
+    () => {
+        " FOR UPDATE SKIP LOCKED"
+    };
+    ($table:literal) => {
+        concat!(" FOR UPDATE OF ", $table, " SKIP LOCKED")
+    };
+}
+/// Names an index to a planner that would choose another; this one chooses well.
+macro_rules! indexed_by {
+    ($index:literal) => {
+        ""
+    };
+}
+/// The larger of two values.
+macro_rules! greatest {
+    ($a:literal, $b:literal) => {
+        concat!("greatest(", $a, ", ", $b, ")")
+    };
+}
+/// The sum of bytes of a selection, of which there may be none. It is one without limits.
+macro_rules! total {
+    ($value:literal) => {
+        concat!("least(coalesce(sum(", $value, "), 0), 9223372036854775807)::bigint")
+    };
+}
+/// A join that reads its left side in order; this planner finds the order by itself.
+macro_rules! in_order_join {
+    () => {
+        " JOIN "
+    };
+}
+
 mod database;
-mod hooks;
-mod jobs;
-mod keys;
-mod leases;
+mod deliveries;
+mod errors;
+mod inputs;
 mod notices;
 mod open;
-mod operations;
 mod presence;
 mod queue;
-mod registry;
 mod retention;
-mod rows;
 #[cfg(test)]
 pub(crate) mod tests;
+
+#[path = "../shared/artifacts.rs"]
+mod artifacts;
+#[path = "../shared/commitments.rs"]
+mod commitments;
+#[path = "../shared/hooks.rs"]
+mod hooks;
+#[path = "../shared/jobs.rs"]
+mod jobs;
+#[path = "../shared/keys.rs"]
+mod keys;
+#[path = "../shared/leases.rs"]
+mod leases;
+#[path = "../shared/registry.rs"]
+mod registry;
+#[path = "../shared/retries.rs"]
+mod retries;
+#[path = "../shared/rows.rs"]
+mod rows;
+#[path = "../shared/statistics.rs"]
+mod statistics;
+#[path = "../shared/tokens.rs"]
+mod tokens;
+#[path = "../shared/transition.rs"]
 mod transition;
-mod trouble;
+#[path = "../shared/workers.rs"]
+mod workers;
 
-use std::sync::Arc;
-use std::time::Duration;
-
-use guardsplat_commitment::{Signed, SigningKey};
+use futures::future::BoxFuture;
 use secrecy::SecretString;
 use sqlx::postgres::PgConnectOptions;
 use tokio::sync::broadcast;
 use uuid::Uuid;
 
-use super::registry::{
-    AssetFilter, AssetId, AssetRow, Candidate, CommitmentId, KeyState, NewAsset, NewOwner, OwnerId, OwnerRow,
-    SealedSigningKey,
-};
-use super::types::{
-    ArtifactId, ArtifactRow, Completion, Failure, JobId, JobRow, JobState, KeyId, KeyRow, NewArtifact, NewJob,
-};
-use super::{Elsewhere, Ledger, Result, token};
+use super::{Ledger, RemoteChange, Result};
 use database::Database;
 use notices::Notices;
+
+/// What [`shared`](super::shared) means by these.
+type DbConnection = sqlx::PgConnection;
+type DbLedger = PostgresLedger;
+type DbRow = sqlx::postgres::PgRow;
+
+/// Begins a transaction that sees one moment.
+const SNAPSHOT: &str = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
+
+/// A text as the database can keep it, which is without one character.
+fn storable(text: &str) -> String {
+    text.replace('\0', "\u{fffd}")
+}
 
 /// A ledger in a PostgreSQL database.
 pub struct PostgresLedger {
@@ -69,6 +149,24 @@ impl PostgresLedger {
             notices: Notices::start(options, server),
         })
     }
+
+    /// Reads; `work` may be carried out several times.
+    async fn read<T, F>(&self, work: F) -> Result<T>
+    where
+        T: Send,
+        F: for<'c> Fn(&'c mut DbConnection) -> BoxFuture<'c, Result<T>> + Send + Sync,
+    {
+        self.database.read(work).await
+    }
+
+    /// Makes a change, durable when this returns; `work` may be carried out several times, and counts once.
+    async fn change<T, F>(&self, work: F) -> Result<T>
+    where
+        T: Send,
+        F: for<'c> Fn(&'c mut DbConnection) -> BoxFuture<'c, Result<T>> + Send + Sync,
+    {
+        self.database.change(work).await
+    }
 }
 
 /// Whether something is the URL of a database that a ledger may be in; if not, why. The answer names no part of it but
@@ -80,266 +178,17 @@ pub fn check_url(url: &SecretString) -> std::result::Result<(), String> {
     open::check_url(url)
 }
 
-/// What a call does with a connection, with values of its own each time that it is tried.
-macro_rules! with {
-    ([$($value:ident),*] $db:ident => $call:expr) => {
-        move |$db| {
-            $(let $value = $value.clone();)*
-            Box::pin(async move { $call.await })
-        }
-    };
-}
-
-use with;
-
 #[tonic::async_trait]
 impl Ledger for PostgresLedger {
-    async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow> {
-        let made = self.database.change(with!([new] db => jobs::create(db, &new, now)));
-        let job = made.await?;
-        // The position is counted afterwards: the rows are locked no longer than need be.
-        Ok(self.get_job(job.id).await?.unwrap_or(job))
-    }
-
-    async fn find_request(&self, request: Uuid) -> Result<Option<JobRow>> {
-        self.database
-            .read(with!([] db => jobs::find_request(db, request)))
-            .await
-    }
-
-    async fn get_job(&self, id: JobId) -> Result<Option<JobRow>> {
-        self.database.read(with!([] db => jobs::get(db, id))).await
-    }
-
-    async fn list_jobs(
-        &self,
-        project: &str,
-        states: &[JobState],
-        before: Option<(i64, JobId)>,
-        limit: u32,
-    ) -> Result<Vec<JobRow>> {
-        let (project, states) = (project.to_owned(), states.to_vec());
-        self.database
-            .read(with!([project, states] db => jobs::list(db, &project, &states, before, limit)))
-            .await
-    }
-
-    async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow> {
-        self.database.change(with!([] db => jobs::cancel(db, id, now))).await
-    }
-
-    async fn leased_job(&self, id: JobId, token: &str) -> Result<JobRow> {
-        let token = token::hash(token);
-        self.database
-            .read(with!([token] db => leases::leased(db, id, &token)))
-            .await
-    }
-
-    async fn report(
-        &self,
-        id: JobId,
-        token: &str,
-        progress: Option<Vec<u8>>,
-        lease: Duration,
-        now: i64,
-    ) -> Result<bool> {
-        let token = token::hash(token);
-        self.database
-            .change(with!([token, progress] db => leases::report(db, id, &token, progress.as_deref(), lease, now)))
-            .await
-    }
-
-    async fn complete(&self, id: JobId, token: &str, completion: Completion, now: i64) -> Result<JobRow> {
-        let token = token::hash(token);
-        self.database
-            .change(with!([token, completion] db => leases::complete(db, id, &token, &completion, now)))
-            .await
-    }
-
-    async fn fail(
-        &self,
-        id: JobId,
-        token: &str,
-        failure: Option<Failure>,
-        retryable: bool,
-        cancelled: bool,
-        now: i64,
-    ) -> Result<JobRow> {
-        let token = token::hash(token);
-        self.database
-            .change(with!([token, failure] db => leases::fail(db, id, &token, failure, retryable, cancelled, now)))
-            .await
-    }
-
-    async fn release(&self, id: JobId, token: &str, now: i64) -> Result<JobRow> {
-        let token = token::hash(token);
-        self.database
-            .change(with!([token] db => leases::release(db, id, &token, now)))
-            .await
-    }
-
-    async fn renew_leases(&self, lease: Duration, now: i64) -> Result<()> {
-        self.database
-            .change(with!([] db => presence::renew(db, lease, now)))
-            .await
-    }
-
-    async fn reap(&self, now: i64) -> Result<Vec<JobId>> {
-        self.database.change(with!([] db => presence::reap(db, now))).await
-    }
-
-    async fn create_artifact(&self, new: NewArtifact, now: i64) -> Result<ArtifactRow> {
-        self.database
-            .change(with!([new] db => artifacts::create(db, &new, now)))
-            .await
-    }
-
-    async fn artifact_ready(&self, id: ArtifactId, token: Option<&str>, now: i64) -> Result<ArtifactRow> {
-        let token = token.map(token::hash);
-        self.database
-            .change(with!([token] db => artifacts::ready(db, id, token.as_deref(), now)))
-            .await
-    }
-
-    async fn get_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
-        self.database.read(with!([] db => artifacts::get_visible(db, id))).await
-    }
-
-    async fn get_any_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
-        self.database.read(with!([] db => artifacts::get(db, id))).await
-    }
-
-    async fn delete_artifact(&self, id: ArtifactId, now: i64) -> Result<()> {
-        self.database
-            .change(with!([] db => artifacts::delete(db, id, now)))
-            .await
-    }
-
-    async fn abandoned_artifacts(&self, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
-        self.database
-            .change(with!([] db => artifacts::abandoned(db, older_than, limit)))
-            .await
-    }
-
-    async fn forget_artifact(&self, id: ArtifactId) -> Result<()> {
-        self.database.change(with!([] db => artifacts::forget(db, id))).await
-    }
-
-    async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>> {
-        self.database.read(with!([] db => keys::get(db, id))).await
-    }
-
-    async fn list_keys(&self, project: &str, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
-        let project = project.to_owned();
-        self.database
-            .read(with!([project] db => keys::list(db, &project, before, limit)))
-            .await
-    }
-
-    async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow> {
-        let reason = reason.to_owned();
-        self.database
-            .change(with!([reason] db => keys::update_state(db, id, next, &reason, now)))
-            .await
-    }
-
-    async fn signing_key(&self) -> Result<Option<SealedSigningKey>> {
-        self.database.read(with!([] db => commitments::signing_key(db))).await
-    }
-
-    async fn keep_signing_key(&self, new: SealedSigningKey, now: i64) -> Result<SealedSigningKey> {
-        self.database
-            .change(with!([new] db => commitments::keep_signing_key(db, &new, now)))
-            .await
-    }
-
-    async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow> {
-        self.database
-            .change(with!([new] db => registry::create_owner(db, &new, now)))
-            .await
-    }
-
-    async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>> {
-        self.database.read(with!([] db => registry::get_owner(db, id))).await
-    }
-
-    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
-        let project = project.to_owned();
-        self.database
-            .read(with!([project] db => registry::list_owners(db, &project, before, limit)))
-            .await
-    }
-
-    async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow> {
-        self.database
-            .change(with!([new, signer] db => registry::create_asset(db, &new, &signer, now)))
-            .await
-    }
-
-    async fn find_asset_request(&self, request: Uuid) -> Result<Option<AssetRow>> {
-        self.database
-            .read(with!([] db => registry::find_asset_request(db, request)))
-            .await
-    }
-
-    async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>> {
-        self.database.read(with!([] db => registry::get_asset(db, id))).await
-    }
-
-    async fn list_assets(
-        &self,
-        project: &str,
-        filter: AssetFilter,
-        before: Option<(i64, AssetId)>,
-        limit: u32,
-    ) -> Result<Vec<AssetRow>> {
-        let project = project.to_owned();
-        self.database
-            .read(with!([project] db => registry::list_assets(db, &project, filter, before, limit)))
-            .await
-    }
-
-    async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
-        self.database
-            .read(with!([] db => registry::candidates(db, key, after, limit)))
-            .await
-    }
-
-    async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>> {
-        self.database.read(with!([] db => registry::candidate(db, asset))).await
-    }
-
-    async fn get_commitment(&self, id: CommitmentId) -> Result<Option<Signed>> {
-        self.database.read(with!([] db => commitments::get(db, id))).await
-    }
-
-    async fn list_commitments(&self, project: &str, after: i64, limit: u32) -> Result<Vec<Signed>> {
-        let project = project.to_owned();
-        self.database
-            .read(with!([project] db => commitments::list(db, &project, after, limit)))
-            .await
-    }
-
-    async fn head(&self, project: &str) -> Result<Option<Signed>> {
-        let project = project.to_owned();
-        self.database
-            .read(with!([project] db => commitments::head_of(db, &project)))
-            .await
-    }
-
-    async fn queue_depth(&self) -> Result<i64> {
-        self.database.read(with!([] db => jobs::queue_depth(db))).await
-    }
-
     async fn check(&self) -> Result<()> {
-        self.database.read(with!([] db => presence::check(db))).await
+        self.read(with!([] db => presence::check(db))).await
     }
 
     fn is_shared(&self) -> bool {
         true
     }
 
-    fn elsewhere(&self) -> Option<broadcast::Receiver<Elsewhere>> {
+    fn remote_changes(&self) -> Option<broadcast::Receiver<RemoteChange>> {
         Some(self.notices.subscribe())
     }
 

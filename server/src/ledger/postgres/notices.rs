@@ -8,8 +8,8 @@ use tokio::task::JoinHandle;
 use tokio::time::{sleep, timeout};
 use uuid::Uuid;
 
-use super::super::{Elsewhere, Result};
-use super::trouble;
+use super::super::{RemoteChange, Result};
+use super::errors;
 
 /// What the trigger on jobs announces on.
 const CHANNEL: &str = "guardsplat_jobs";
@@ -26,7 +26,7 @@ const ANSWER: Duration = Duration::from_secs(10);
 
 /// The task that listens, and those who hear of it. It ends with this.
 pub(super) struct Notices {
-    heard: broadcast::Sender<Elsewhere>,
+    heard: broadcast::Sender<RemoteChange>,
     task: JoinHandle<()>,
 }
 
@@ -40,7 +40,7 @@ impl Notices {
         }
     }
 
-    pub(super) fn subscribe(&self) -> broadcast::Receiver<Elsewhere> {
+    pub(super) fn subscribe(&self) -> broadcast::Receiver<RemoteChange> {
         self.heard.subscribe()
     }
 
@@ -56,7 +56,7 @@ impl Drop for Notices {
 }
 
 /// Listens, again and again: a connection that breaks is made anew, with pauses that grow while that fails.
-async fn listen_on(options: PgConnectOptions, server: Uuid, heard: broadcast::Sender<Elsewhere>) {
+async fn listen_on(options: PgConnectOptions, server: Uuid, heard: broadcast::Sender<RemoteChange>) {
     let mut pause = FIRST_PAUSE;
     loop {
         let mut listened = false;
@@ -75,7 +75,7 @@ async fn listen_on(options: PgConnectOptions, server: Uuid, heard: broadcast::Se
 async fn listen(
     options: &PgConnectOptions,
     server: Uuid,
-    heard: &broadcast::Sender<Elsewhere>,
+    heard: &broadcast::Sender<RemoteChange>,
     listened: &mut bool,
 ) -> Result<std::convert::Infallible> {
     // A pool of its own: the listener would take a connection from the others for good.
@@ -89,7 +89,7 @@ async fn listen(
     answered(listener.listen(CHANNEL)).await?;
     *listened = true;
     // Whatever happened before was not heard.
-    tell(heard, Elsewhere::Anything);
+    tell(heard, RemoteChange::Anything);
     loop {
         match timeout(SILENCE, listener.try_recv()).await {
             Ok(Ok(Some(notice))) => {
@@ -109,17 +109,17 @@ async fn listen(
 async fn answered<T>(call: impl Future<Output = sqlx::Result<T>>) -> Result<T> {
     match timeout(ANSWER, call).await {
         Ok(answer) => Ok(answer?),
-        Err(_) => Err(trouble::no_answer(ANSWER)),
+        Err(_) => Err(errors::no_answer(ANSWER)),
     }
 }
 
-fn tell(heard: &broadcast::Sender<Elsewhere>, news: Elsewhere) {
+fn tell(heard: &broadcast::Sender<RemoteChange>, news: RemoteChange) {
     // An error only says that nobody listens.
     let _ = heard.send(news);
 }
 
 /// What the trigger wrote: the server, the job, and a word on the queue. Nothing is to be told of what `server` did.
-fn read(text: &str, server: Uuid) -> Option<Elsewhere> {
+fn read(text: &str, server: Uuid) -> Option<RemoteChange> {
     let mut words = text.split(' ');
     let by = words.next().and_then(|word| Uuid::try_parse(word).ok());
     if by == Some(server) {
@@ -133,13 +133,13 @@ fn read(text: &str, server: Uuid) -> Option<Elsewhere> {
         Some("back") => Some((true, true)),
         _ => None,
     };
-    let news = id.zip(queue).map(|(id, (queue_grew, queue_moved))| Elsewhere::Job {
+    let news = id.zip(queue).map(|(id, (queue_grew, queue_moved))| RemoteChange::Job {
         id,
         queue_grew,
         queue_moved,
     });
     // Of another version, or by hand.
-    Some(news.unwrap_or(Elsewhere::Anything))
+    Some(news.unwrap_or(RemoteChange::Anything))
 }
 
 #[cfg(test)]
@@ -151,14 +151,14 @@ mod tests {
         let (own, id) = (Uuid::now_v7(), Uuid::now_v7());
         assert_eq!(read(&format!("{own} {id} moved"), own), None);
         for by in ["-".to_owned(), Uuid::now_v7().to_string()] {
-            let wanted = Elsewhere::Job {
+            let wanted = RemoteChange::Job {
                 id,
                 queue_grew: true,
                 queue_moved: false,
             };
             assert_eq!(read(&format!("{by} {id} grew"), own), Some(wanted));
             for other in [format!("{by} {id} sideways"), format!("{by} x same"), String::new()] {
-                assert_eq!(read(&other, own), Some(Elsewhere::Anything), "{other}");
+                assert_eq!(read(&other, own), Some(RemoteChange::Anything), "{other}");
             }
         }
     }

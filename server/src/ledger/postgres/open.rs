@@ -10,7 +10,7 @@ use tokio::time::{Instant, sleep, timeout};
 use uuid::Uuid;
 
 use super::super::{LedgerError, Result};
-use super::trouble::{self, Trouble};
+use super::errors::{self, ErrorClass};
 
 /// Most connections of a server, besides the one that listens.
 const CONNECTIONS: u32 = 16;
@@ -98,12 +98,12 @@ pub(super) async fn migrated(options: &PgConnectOptions) -> Result<()> {
         let tried = timeout(CONNECT, PgConnection::connect_with(options)).await;
         let error = match tried {
             Ok(Ok(db)) => break db,
-            Ok(Err(error)) if trouble::of(&error) == Trouble::Broken => LedgerError::from(error),
+            Ok(Err(error)) if errors::classify(&error) == ErrorClass::Broken => LedgerError::from(error),
             Ok(Err(error)) => return Err(error.into()),
-            Err(_) => trouble::no_answer(CONNECT),
+            Err(_) => errors::no_answer(CONNECT),
         };
         if begun.elapsed() >= START {
-            return Err(trouble::told(error));
+            return Err(errors::to_ledger_error(error));
         }
         let cause = std::error::Error::source(&error).map(ToString::to_string);
         tracing::warn!(cause, "the ledger's database can't be reached; trying again");

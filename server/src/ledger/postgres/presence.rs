@@ -64,3 +64,16 @@ async fn here(db: &mut PgConnection, now: i64) -> Result<()> {
         .await?;
     Ok(())
 }
+
+/// Names the lock under which the chain grows; it means nothing else, and is the database's own.
+const CHAIN_LOCK: i64 = 0x6775_6172_6473_706c;
+
+/// Waits until nobody else makes the chain longer, in any server, and keeps it so until the transaction ends. What is
+/// read from here on is what others committed before.
+pub(super) async fn lock_chain(db: &mut PgConnection) -> Result<()> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1)")
+        .bind(CHAIN_LOCK)
+        .execute(db)
+        .await?;
+    Ok(())
+}

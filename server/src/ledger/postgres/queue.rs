@@ -1,13 +1,14 @@
 //! The order of the queue, and who takes jobs.
 use std::time::Duration;
 
-use sqlx::PgConnection;
+use sqlx::{PgConnection, Row};
 
-use super::super::queue::{FORGOTTEN, PATIENCE, QueueLedger, SeenWorker, Taker};
+use super::super::queue::PATIENCE;
 use super::super::transition::{end_of, micros};
-use super::super::types::{JobId, JobRow, JobState, Lease, REASON_ATTEMPTS_EXHAUSTED};
+use super::super::types::{FailureReason, JobId, JobRow, JobState, Lease};
+use super::super::workers::WorkerCapabilities;
 use super::super::{Result, token};
-use super::{PostgresLedger, hooks, jobs, rows, with};
+use super::{hooks, rows};
 
 /// One statement takes the next job that the worker can hold and that nobody else is taking, and either counts an
 /// attempt and leases it, or fails it because no attempt is left. So a job that kills its worker is bounded even if
@@ -62,7 +63,7 @@ pub(super) const CLAIM: &str = "WITH RECURSIVE \
     run_after = NULL, update_time = $4, revision = revision + 1 \
     FROM next WHERE id = next_id RETURNING *";
 
-/// The whole queue in its order; [`GET`](super::jobs::GET) counts in the same.
+/// The whole queue in its order; [`GET`] counts in the same.
 pub(super) const QUEUE: &str = "WITH \
     running AS MATERIALIZED (SELECT project, count(*) AS jobs FROM jobs WHERE state = 2 GROUP BY project), \
     turns AS (SELECT id, priority, queue_time, coalesce(running.jobs, 0) + \
@@ -70,45 +71,41 @@ pub(super) const QUEUE: &str = "WITH \
         FROM jobs LEFT JOIN running USING (project) WHERE state = 1) \
     SELECT id FROM turns ORDER BY priority DESC, turn, queue_time, id";
 
-#[tonic::async_trait]
-impl QueueLedger for PostgresLedger {
-    async fn claim_for(&self, taker: &Taker, lease: Duration, now: i64) -> Result<Option<Lease>> {
-        let taker = taker.clone();
-        self.database
-            .change(with!([taker] db => claim(db, &taker, lease, now)))
-            .await
-    }
+/// A job and the queued jobs before it. Of each project there are `urgent` jobs in lanes of higher priorities, `same` in
+/// the lane of the job's own, and `older` in front of the job's place among these. A job's `turn` is how many jobs its
+/// project has running, or will have by then: of one priority jobs of lower turns go first, and of one turn the oldest.
+pub(super) const GET: &str = "WITH \
+    job AS (SELECT * FROM jobs WHERE id = $1), \
+    side AS MATERIALIZED (SELECT q.project, count(*) FILTER (WHERE q.priority > j.priority) AS urgent, \
+        count(*) FILTER (WHERE q.priority = j.priority) AS same, \
+        count(*) FILTER (WHERE q.priority = j.priority AND (q.queue_time, q.id) < (j.queue_time, j.id)) AS older \
+        FROM job j CROSS JOIN jobs q WHERE j.state = 1 AND q.state = 1 AND q.priority >= j.priority GROUP BY q.project), \
+    running AS MATERIALIZED (SELECT project, count(*) AS jobs FROM jobs WHERE state = 2 GROUP BY project), \
+    turns AS MATERIALIZED (SELECT side.*, urgent + coalesce(running.jobs, 0) AS first \
+        FROM side LEFT JOIN running USING (project)) \
+    SELECT j.*, (SELECT sum(urgent + greatest(0, least(same, own.turn - first)) \
+        + CASE WHEN own.turn >= first AND own.turn - first < older THEN 1 ELSE 0 END)::bigint \
+        FROM turns, (SELECT first + older AS turn FROM turns WHERE project = (SELECT project FROM job)) AS own \
+        ) AS queue_position FROM job j";
 
-    async fn note_worker(&self, worker: SeenWorker, now: i64) -> Result<()> {
-        self.database.change(with!([worker] db => note(db, &worker, now))).await
-    }
-
-    async fn workers_since(&self, since: i64) -> Result<Vec<SeenWorker>> {
-        self.database.read(with!([] db => workers(db, since))).await
-    }
-
-    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>> {
-        self.database.read(with!([] db => jobs::peek(db, id))).await
-    }
-
-    async fn queue(&self) -> Result<Vec<JobId>> {
-        self.database.read(with!([] db => all(db))).await
-    }
-}
-
-async fn claim(db: &mut PgConnection, taker: &Taker, lease: Duration, now: i64) -> Result<Option<Lease>> {
+pub(super) async fn claim(
+    db: &mut PgConnection,
+    capabilities: &WorkerCapabilities,
+    lease: Duration,
+    now: i64,
+) -> Result<Option<Lease>> {
     let token = token::fresh();
     loop {
         let row = sqlx::query(CLAIM)
-            .bind(&taker.worker)
+            .bind(&capabilities.worker)
             .bind(token::hash(&token))
             .bind(end_of(lease, now))
             .bind(now)
-            .bind(REASON_ATTEMPTS_EXHAUSTED)
+            .bind(FailureReason::AttemptsExhausted as i32)
             .bind(now.saturating_sub(micros(PATIENCE)))
-            .bind(taker.memory)
-            .bind(taker.likely_memory)
-            .bind(taker.clips())
+            .bind(capabilities.memory)
+            .bind(capabilities.likely_memory)
+            .bind(capabilities.clips())
             .fetch_optional(&mut *db)
             .await?;
         let Some(row) = row else { return Ok(None) };
@@ -120,36 +117,18 @@ async fn claim(db: &mut PgConnection, taker: &Taker, lease: Duration, now: i64) 
     }
 }
 
-async fn note(db: &mut PgConnection, worker: &SeenWorker, now: i64) -> Result<()> {
-    let note = sqlx::query(
-        "INSERT INTO seen_workers (name, device, memory, clips, time) VALUES ($1, $2, $3, $4, $5) \
-         ON CONFLICT (name) DO UPDATE SET device = $2, memory = $3, clips = $4, \
-         time = greatest(seen_workers.time, $5)",
-    );
-    note.bind(&worker.name)
-        .bind(&worker.device)
-        .bind(worker.memory)
-        .bind(worker.clips.join(" "))
-        .bind(now)
-        .execute(&mut *db)
-        .await?;
-    // Others may be at the same rows: whoever comes first forgets them.
-    let forget = sqlx::query(
-        "DELETE FROM seen_workers WHERE name IN (SELECT name FROM seen_workers WHERE time < $1 FOR UPDATE SKIP LOCKED)",
-    );
-    forget.bind(now.saturating_sub(FORGOTTEN)).execute(db).await?;
-    Ok(())
-}
-
-async fn workers(db: &mut PgConnection, since: i64) -> Result<Vec<SeenWorker>> {
-    let query = sqlx::query(
-        "SELECT * FROM seen_workers WHERE time >= $1 \
-         OR name IN (SELECT worker FROM jobs WHERE state = 2) ORDER BY name",
-    );
-    let seen = query.bind(since).fetch_all(db).await?;
-    seen.iter().map(rows::worker).collect()
-}
-
 pub(super) async fn all(db: &mut PgConnection) -> Result<Vec<JobId>> {
     Ok(sqlx::query_scalar(QUEUE).fetch_all(db).await?)
+}
+
+/// A job with its position in the queue.
+pub(super) async fn get(db: &mut PgConnection, id: JobId) -> Result<Option<JobRow>> {
+    let row = sqlx::query(GET).bind(id).fetch_optional(db).await?;
+    row.map(|row| {
+        Ok(JobRow {
+            queue_position: row.try_get("queue_position")?,
+            ..rows::job(&row)?
+        })
+    })
+    .transpose()
 }

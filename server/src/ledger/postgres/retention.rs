@@ -7,12 +7,12 @@ use uuid::Uuid;
 
 use super::super::Result;
 use super::super::retention::postgres::{OVER, UNUSED, UPLOAD};
-use super::super::retention::{Before, Expired, LEFT_NOTHING, RetentionLedger, WITHOUT_OUTPUTS};
+use super::super::retention::{Before, Expired, LEFT_NOTHING, Retention, WITHOUT_OUTPUTS};
 use super::super::types::ArtifactId;
-use super::{PostgresLedger, with};
+use super::PostgresLedger;
 
 #[tonic::async_trait]
-impl RetentionLedger for PostgresLedger {
+impl Retention for PostgresLedger {
     async fn expire(&self, before: Before, limit: u32) -> Result<Expired> {
         self.database.change(with!([] db => expire(db, before, limit))).await
     }

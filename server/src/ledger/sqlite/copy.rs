@@ -12,7 +12,7 @@ use super::{artifacts, open, rows};
 /// not held up.
 pub async fn copy(ledger: &Path, to: &Path) -> Result<()> {
     let mut db = connect(ledger).await?;
-    sqlx::query("VACUUM INTO ?1")
+    sqlx::query("VACUUM INTO $1")
         .bind(to.to_string_lossy().into_owned())
         .execute(&mut db)
         .await?;
@@ -41,8 +41,8 @@ pub async fn is_deleted(ledger: &Path, id: ArtifactId) -> Result<bool> {
 pub async fn mark_deleted(copy: &Path, ids: &[ArtifactId]) -> Result<()> {
     let mut db = connect(copy).await?;
     for id in ids {
-        sqlx::query("UPDATE artifacts SET state = 4 WHERE id = ?1")
-            .bind(id.as_bytes().as_slice())
+        sqlx::query("UPDATE artifacts SET state = 4 WHERE id = $1")
+            .bind(id)
             .execute(&mut db)
             .await?;
     }

@@ -5,12 +5,12 @@ use sqlx::SqliteConnection;
 
 use super::super::Result;
 use super::super::retention::sqlite::{OVER, UNUSED, UPLOAD};
-use super::super::retention::{Before, Expired, LEFT_NOTHING, RetentionLedger, WITHOUT_OUTPUTS};
+use super::super::retention::{Before, Expired, LEFT_NOTHING, Retention, WITHOUT_OUTPUTS};
 use super::super::types::ArtifactId;
 use super::SqliteLedger;
 
 #[tonic::async_trait]
-impl RetentionLedger for SqliteLedger {
+impl Retention for SqliteLedger {
     async fn expire(&self, before: Before, limit: u32) -> Result<Expired> {
         self.writer.run(move |db| Box::pin(expire(db, before, limit))).await
     }
@@ -19,7 +19,7 @@ impl RetentionLedger for SqliteLedger {
         let mut reader = self.readers.acquire().await?;
         let mut known = HashSet::new();
         for id in ids {
-            let path = sqlx::query_scalar("SELECT path FROM artifacts WHERE id = ?1").bind(id.as_bytes().as_slice());
+            let path = sqlx::query_scalar("SELECT path FROM artifacts WHERE id = $1").bind(id);
             known.extend(path.fetch_optional(&mut *reader).await?);
         }
         Ok(known)
@@ -29,20 +29,20 @@ impl RetentionLedger for SqliteLedger {
 async fn expire(db: &mut SqliteConnection, before: Before, limit: u32) -> Result<Expired> {
     let mut expired = Expired::default();
     if let Some(time) = before.uploads {
-        let which = format!("SELECT a.id FROM artifacts a WHERE {UPLOAD} AND {UNUSED} LIMIT ?2");
+        let which = format!("SELECT a.id FROM artifacts a WHERE {UPLOAD} AND {UNUSED} LIMIT $2");
         expired.artifacts += delete(db, &which, time, limit).await?;
     }
     if let Some(time) = before.outputs {
         let of_jobs = format!("FROM artifacts a JOIN jobs j ON j.id = a.job_id WHERE {OVER} AND {UNUSED}");
-        expired.artifacts += delete(db, &format!("SELECT a.id {of_jobs} LIMIT ?2"), time, limit).await?;
+        expired.artifacts += delete(db, &format!("SELECT a.id {of_jobs} LIMIT $2"), time, limit).await?;
     }
     if let Some(time) = before.jobs {
         let of_jobs =
             format!("FROM artifacts a JOIN jobs j ON j.id = a.job_id WHERE {OVER} AND {LEFT_NOTHING} AND {UNUSED}");
-        expired.artifacts += delete(db, &format!("SELECT a.id {of_jobs} LIMIT ?2"), time, limit).await?;
+        expired.artifacts += delete(db, &format!("SELECT a.id {of_jobs} LIMIT $2"), time, limit).await?;
         let gone = format!(
             "DELETE FROM jobs WHERE id IN (\
-             SELECT j.id FROM jobs j WHERE {OVER} AND {LEFT_NOTHING} AND {WITHOUT_OUTPUTS} LIMIT ?2)"
+             SELECT j.id FROM jobs j WHERE {OVER} AND {LEFT_NOTHING} AND {WITHOUT_OUTPUTS} LIMIT $2)"
         );
         let gone = sqlx::query(sqlx::AssertSqlSafe(gone)).bind(time).bind(limit);
         expired.jobs = gone.execute(db).await?.rows_affected();

@@ -3,18 +3,16 @@ use guardsplat_codeword::{Answer, HypothesisReading, ReadPayload, Verdict};
 use guardsplat_evidence::{Evidence, View};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
-use prost::Message as _;
 
 use super::decision::Decided;
 use super::{Claim, framing, of_job};
 use crate::error::{Error, Result};
-use crate::ledger::{Completion, JobKind, JobRow, KeyRow};
+use crate::ledger::{Completion, JobResult, JobRow, KeyRow};
 use crate::service::Service;
 use crate::service::evidence;
 use crate::service::evidence::{Facts, Files, Read};
 use crate::service::lease::needed_key;
 use crate::service::names::Kind;
-use crate::service::to_proto::decode;
 
 /// What a worker told besides the result.
 pub(crate) struct WorkerReadings {
@@ -49,9 +47,10 @@ impl Service {
             readings: framing::checked(&told.readings, key.bits)?,
             views: evidence::checked_views(&told.views)?,
         };
-        let report = match job.kind {
-            JobKind::Verify => self.verified(job, &key, &claim, told, completion).await?,
-            _ => self.marked(job, &key, &claim, told, completion).await?,
+        let report = match &mut completion.result {
+            JobResult::Embed(result) => self.marked(job, &key, &claim, told, result).await?,
+            JobResult::Verify(result) => self.verified(job, &key, &claim, told, result).await?,
+            JobResult::CreateKey(_) => return Ok(()),
         };
         let signed = guardsplat_evidence::sign(&report, self.notary().report_key())
             .map_err(|error| Error::internal("writing evidence", error))?;
@@ -61,20 +60,15 @@ impl Service {
         let json = json.await?;
         completion.outputs.extend([html, json]);
         let [evidence_html, evidence_json] = [html, json].map(|id| Kind::Artifact.name(id));
-        completion.result = match job.kind {
-            JobKind::Verify => VerifyResult {
-                evidence_html,
-                evidence_json,
-                ..decode(&completion.result)?
+        match &mut completion.result {
+            JobResult::Embed(result) => {
+                (result.evidence_html, result.evidence_json) = (evidence_html, evidence_json);
             }
-            .encode_to_vec(),
-            _ => EmbedResult {
-                evidence_html,
-                evidence_json,
-                ..decode(&completion.result)?
+            JobResult::Verify(result) => {
+                (result.evidence_html, result.evidence_json) = (evidence_html, evidence_json);
             }
-            .encode_to_vec(),
-        };
+            JobResult::CreateKey(_) => {}
+        }
         Ok(())
     }
 
@@ -90,7 +84,7 @@ impl Service {
         key: &KeyRow,
         claim: &Claim,
         told: Checked<'_>,
-        completion: &mut Completion,
+        result: &mut VerifyResult,
     ) -> Result<Evidence> {
         let Checked { told, readings, views } = told;
         if readings.is_empty() {
@@ -98,7 +92,7 @@ impl Service {
             return Err(Error::invalid("readings", reason));
         }
         let decided = self.decide(claim, key, &readings).await?;
-        let result = answered(decode(&completion.result)?, &decided, readings.len());
+        *result = answered(std::mem::take(result), &decided, readings.len());
         let facts = Facts {
             job,
             key,
@@ -112,7 +106,6 @@ impl Service {
             framings: framing::kinds(&told.readings),
             named: matches!(claim, Claim::Asset(_)),
         };
-        completion.result = result.encode_to_vec();
         evidence::of_verification(&facts, files, &read)
     }
 
@@ -122,10 +115,9 @@ impl Service {
         key: &KeyRow,
         claim: &Claim,
         told: Checked<'_>,
-        completion: &mut Completion,
+        result: &mut EmbedResult,
     ) -> Result<Evidence> {
         let Checked { told, readings, views } = told;
-        let mut result: EmbedResult = decode(&completion.result)?;
         // The word that was embedded is as secret as its pad.
         result.message.clear();
         let decided = match readings.is_empty() {
@@ -144,9 +136,8 @@ impl Service {
             device: &result.device,
             views,
         };
-        let files = Files::of_marking(self, job, &result).await?;
-        completion.result = result.encode_to_vec();
-        evidence::of_marking(&facts, files, &result, read.as_ref())
+        let files = Files::of_marking(self, job, result).await?;
+        evidence::of_marking(&facts, files, result, read.as_ref())
     }
 }
 

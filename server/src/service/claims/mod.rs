@@ -6,12 +6,11 @@ mod framing;
 use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 
 use crate::error::{Error, Result};
-use crate::ledger::{AssetId, JobKind, JobRow, KeyRow, OwnerId};
+use crate::ledger::{AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
 use crate::marks;
 use crate::service::Service;
 use crate::service::names::Kind;
 use crate::service::submission::Submission;
-use crate::service::to_proto::decode;
 use crate::service::upload;
 use crate::service::violations::Violations;
 
@@ -66,10 +65,10 @@ pub fn of_verify(spec: &VerifySpec) -> Result<Option<Claim>> {
 
 /// The claim of a job that is kept.
 pub(crate) fn of_job(job: &JobRow) -> Result<Option<Claim>> {
-    match job.kind {
-        JobKind::Embed => of_embed(&decode(&job.spec)?),
-        JobKind::Verify => of_verify(&decode(&job.spec)?),
-        JobKind::CreateKey => Ok(None),
+    match &job.spec {
+        JobSpec::Embed(spec) => of_embed(spec),
+        JobSpec::Verify(spec) => of_verify(spec),
+        JobSpec::CreateKey(_) => Ok(None),
     }
 }
 
@@ -82,7 +81,7 @@ impl Service {
         key: &KeyRow,
         submission: &Submission,
     ) -> Result<()> {
-        let (field, key_field) = match submission.kind {
+        let (field, key_field) = match submission.spec.kind() {
             JobKind::Embed => ("job.embed.asset", "job.embed.key"),
             _ => ("job.verify.asset", "job.verify.key"),
         };
@@ -98,7 +97,7 @@ impl Service {
             let reason = format!("was registered for {}, not for this key", Kind::Key.name(asset.key));
             return Err(Error::invalid(field, reason));
         }
-        if submission.kind != JobKind::Embed {
+        if submission.spec.kind() != JobKind::Embed {
             return Ok(());
         }
         if key.bits != marks::bits() {

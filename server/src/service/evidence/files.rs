@@ -1,17 +1,16 @@
 //! The files that a report is about, and the files that it becomes.
 use guardsplat_evidence::{Input, Role};
-use guardsplat_proto::v1::{EmbedResult, EmbedSpec, VerifySpec};
+use guardsplat_proto::v1::EmbedResult;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use super::hash;
 use crate::artifacts::{Announced, ArtifactPath, CHUNK_BYTES};
-use crate::error::Result;
-use crate::ledger::{ArtifactId, JobId, JobRow, NewArtifact, Origin};
+use crate::error::{Error, Result};
+use crate::ledger::{ArtifactId, JobId, JobRow, JobSpec, NewArtifact, Origin};
 use crate::service::Service;
 use crate::service::clock;
 use crate::service::names::Kind;
-use crate::service::to_proto::decode;
 
 /// Files with what they are for.
 pub struct Files {
@@ -22,7 +21,9 @@ pub struct Files {
 impl Files {
     /// What a `verify` job read.
     pub async fn of_suspects(api: &Service, job: &JobRow) -> Result<Self> {
-        let spec: VerifySpec = decode(&job.spec)?;
+        let JobSpec::Verify(spec) = &job.spec else {
+            return Err(Error::internal("listing what was read", "the job is no verification"));
+        };
         let mut inputs = Vec::with_capacity(spec.suspects.len());
         for name in &spec.suspects {
             inputs.push(input(api, "job.verify.suspects", name, Role::Suspect).await?);
@@ -32,7 +33,9 @@ impl Files {
 
     /// What an `embed` job read and made.
     pub async fn of_marking(api: &Service, job: &JobRow, result: &EmbedResult) -> Result<Self> {
-        let spec: EmbedSpec = decode(&job.spec)?;
+        let JobSpec::Embed(spec) = &job.spec else {
+            return Err(Error::internal("listing what was marked", "the job marks nothing"));
+        };
         let original = input(api, "job.embed.scene", &spec.scene, Role::Original).await?;
         let marked = input(api, "embed_result.scene", &result.scene, Role::Marked).await?;
         Ok(Self {

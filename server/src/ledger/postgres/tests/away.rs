@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Elsewhere, Ledger, LedgerError, PostgresLedger};
+use super::super::super::{JobQueue, JobStore, Ledger, LedgerError, PostgresLedger, RemoteChange};
 use super::several::{listening, next};
 use super::{Cluster, Place};
 
@@ -46,14 +46,14 @@ async fn a_server_that_stops_and_starts_is_waited_for() {
     // The other one hears again: first, that it may have missed something.
     loop {
         match next(&mut heard).await {
-            Elsewhere::Anything => break,
-            Elsewhere::Job { .. } => {}
+            RemoteChange::Anything => break,
+            RemoteChange::Job { .. } => {}
         }
     }
     let id = queue(&one, at(4)).await;
     loop {
         match next(&mut heard).await {
-            Elsewhere::Job { id: changed, .. } if changed == id => break,
+            RemoteChange::Job { id: changed, .. } if changed == id => break,
             _ => {}
         }
     }
@@ -71,7 +71,7 @@ async fn connections_that_are_ended_are_made_again() {
         let id = queue(&*one, at(round)).await;
         assert_eq!(job(&*two, id).await.id, id);
         // What happened meanwhile was missed, and that is told.
-        while next(&mut heard).await != Elsewhere::Anything {}
+        while next(&mut heard).await != RemoteChange::Anything {}
     }
     // Amid calls, too: each of them is tried again, or says that it can be.
     let tasks: Vec<_> = (0..8)

@@ -74,7 +74,7 @@ impl Place {
         PgConnection::connect_with(&options).await.expect("a connection")
     }
 
-    /// Ends all connections to the database but one that this needs.
+    /// Ends all connections to the database but one that this requirements.
     pub(super) async fn end_connections(&self) -> i64 {
         let mut db = self.raw().await;
         let ended = sqlx::query_scalar(

@@ -5,24 +5,24 @@ use tokio::sync::broadcast::Receiver;
 use tokio::time::timeout;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Elsewhere, Ledger, PostgresLedger};
+use super::super::super::{JobQueue, JobStore, Ledger, PostgresLedger, RemoteChange};
 use super::Place;
 
 /// By then whatever is waited for has happened.
 const SOON: Duration = Duration::from_secs(20);
 
-pub(super) async fn next(heard: &mut Receiver<Elsewhere>) -> Elsewhere {
+pub(super) async fn next(heard: &mut Receiver<RemoteChange>) -> RemoteChange {
     timeout(SOON, heard.recv()).await.expect("nothing is heard").unwrap()
 }
 
 /// Waits until a ledger hears of others.
-pub(super) async fn listening(ledger: &PostgresLedger, other: &PostgresLedger) -> Receiver<Elsewhere> {
-    let mut heard = ledger.elsewhere().unwrap();
+pub(super) async fn listening(ledger: &PostgresLedger, other: &PostgresLedger) -> Receiver<RemoteChange> {
+    let mut heard = ledger.remote_changes().unwrap();
     for _ in 0..100 {
         let wanted = queue(other, at(0)).await;
         // That it began to listen says nothing of what was announced just before.
         while let Ok(Ok(news)) = timeout(SOON / 100, heard.recv()).await {
-            if matches!(news, Elsewhere::Job { id, .. } if id == wanted) {
+            if matches!(news, RemoteChange::Job { id, .. } if id == wanted) {
                 return heard;
             }
         }
@@ -35,9 +35,9 @@ async fn what_one_server_changes_the_others_hear() {
     let Some(place) = Place::fresh().await else { return };
     let (one, two) = (place.ledger().await, place.ledger().await);
     let mut heard = listening(&two, &one).await;
-    let mut own = one.elsewhere().unwrap();
+    let mut own = one.remote_changes().unwrap();
     let mut expect = async |id, queue_grew, queue_moved| {
-        let wanted = Elsewhere::Job {
+        let wanted = RemoteChange::Job {
             id,
             queue_grew,
             queue_moved,
@@ -48,12 +48,12 @@ async fn what_one_server_changes_the_others_hear() {
     expect(first.job.id, false, true).await;
     let id = queue(&*one, at(2)).await;
     expect(id, true, false).await;
-    one.report(first.job.id, &first.token, Some(vec![1]), LEASE, at(2))
+    one.report(first.job.id, &first.token, Some(progress(1)), LEASE, at(2))
         .await
         .unwrap();
     expect(first.job.id, false, false).await;
     // The lease is extended, and that is all.
-    one.report(first.job.id, &first.token, Some(vec![1]), LEASE, at(3))
+    one.report(first.job.id, &first.token, Some(progress(1)), LEASE, at(3))
         .await
         .unwrap();
     one.release(first.job.id, &first.token, at(4)).await.unwrap();
@@ -68,8 +68,8 @@ async fn what_one_server_changes_the_others_hear() {
     let theirs = queue(&*two, at(8)).await;
     loop {
         match next(&mut own).await {
-            Elsewhere::Anything => {}
-            Elsewhere::Job { id, .. } => break assert_eq!(id, theirs),
+            RemoteChange::Anything => {}
+            RemoteChange::Job { id, .. } => break assert_eq!(id, theirs),
         }
     }
 }

@@ -3,10 +3,12 @@ use sqlx::Row;
 use sqlx::migrate::Migrator;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{AccessLedger, Ledger, LedgerError, PostgresLedger, Usage};
-use super::super::jobs::{GET, PAGE, PAGE_OF_STATE};
-use super::super::queue::{CLAIM, QUEUE};
-use super::super::{access, commitments, hooks, keys, open, registry};
+use super::super::super::{
+    CommitmentLog, JobStore, LedgerError, PostgresLedger, Registry, Statistics, TokenLedger, Usage,
+};
+use super::super::jobs::{PAGE, PAGE_OF_STATE};
+use super::super::queue::{CLAIM, GET, QUEUE};
+use super::super::{commitments, deliveries, hooks, keys, open, registry, statistics, tokens};
 use super::Place;
 
 #[tokio::test]
@@ -118,12 +120,12 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (PAGE_OF_STATE, "jobs_by_state", "bigint, uuid, bigint, text, int"),
         (keys::PAGE, "keys_by_time", page),
         (registry::OWNERS, "owners_by_time", page),
-        (access::OF_HASH, "tokens_hash_key", "bytea"),
-        (access::OF_PROJECT, "tokens_by_project", page),
-        (access::USAGE, "artifacts_by_project", "text"),
+        (tokens::OF_HASH, "tokens_hash_key", "bytea"),
+        (tokens::OF_PROJECT, "tokens_by_project", page),
+        (statistics::USAGE, "artifacts_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
         (hooks::HOOKS, "hooks_by_project", page),
-        (hooks::CLAIM, "deliveries_due", "bigint, uuid[], bytea, bigint"),
+        (deliveries::CLAIM, "deliveries_due", "bigint, uuid[], bytea, bigint"),
         (
             hooks::OF_PROJECT,
             "deliveries_by_project",

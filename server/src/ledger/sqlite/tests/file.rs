@@ -1,11 +1,12 @@
 //! The file: what is in it, and what becomes of it when things go wrong.
+use guardsplat_proto::v1::EmbedSpec;
 use guardsplat_proto::v1::failure::Reason;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{Connection, Row, SqliteConnection};
 
 use super::super::super::conformance::fixture::*;
 use super::super::super::{
-    JobState, KeyState, Ledger, LedgerError, REASON_ATTEMPTS_EXHAUSTED, REASON_WORKER_LOST, SqliteLedger,
+    CommitmentLog, FailureReason, JobQueue, JobSpec, JobState, JobStore, KeyState, Ledger, LedgerError, SqliteLedger,
 };
 use super::super::open;
 use super::Folder;
@@ -64,7 +65,10 @@ async fn a_full_disk_loses_nothing_and_is_told() {
     let mut kept = Vec::new();
     let error = loop {
         let new = crate::ledger::NewJob {
-            spec: vec![0; 5000],
+            spec: JobSpec::Embed(EmbedSpec {
+                message: "5".repeat(5000),
+                ..EmbedSpec::default()
+            }),
             ..new_job()
         };
         match ledger.create_job(new, at(0)).await {
@@ -238,8 +242,18 @@ async fn a_closed_ledger_says_so() {
 
 #[test]
 fn numbers_are_those_of_the_api() {
-    assert_eq!(REASON_WORKER_LOST, Reason::WorkerLost as i32);
-    assert_eq!(REASON_ATTEMPTS_EXHAUSTED, Reason::AttemptsExhausted as i32);
+    for (ours, theirs) in [
+        (FailureReason::Unspecified, Reason::Unspecified),
+        (FailureReason::InvalidInput, Reason::InvalidInput),
+        (FailureReason::TargetMissed, Reason::TargetMissed),
+        (FailureReason::WorkerLost, Reason::WorkerLost),
+        (FailureReason::Internal, Reason::Internal),
+        (FailureReason::AttemptsExhausted, Reason::AttemptsExhausted),
+    ] {
+        assert_eq!(ours as i32, theirs as i32);
+        assert_eq!(FailureReason::from_number(theirs as i32), ours);
+    }
+    assert_eq!(FailureReason::from_number(99), FailureReason::Unspecified);
     use guardsplat_proto::v1::job::State;
     for (ours, theirs) in [
         (JobState::Queued, State::Queued),

@@ -4,10 +4,10 @@ use std::time::Instant;
 use sqlx::Row;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Ledger, NewJob};
-use super::super::jobs::{PAGE, PAGE_OF_STATE, POSITION};
-use super::super::queue::{CLAIM, QUEUE};
-use super::super::{access, commitments, hooks, keys, registry};
+use super::super::super::{JobStore, Ledger as _, NewJob};
+use super::super::jobs::{PAGE, PAGE_OF_STATE};
+use super::super::queue::{CLAIM, POSITION, QUEUE};
+use super::super::{commitments, deliveries, hooks, keys, registry, statistics, tokens};
 use super::Folder;
 use super::file::raw;
 
@@ -45,17 +45,17 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (registry::OF_BOTH, "=? AND (create_time,id)<"),
         (registry::CANDIDATES, "(key_id=? AND payload>?)"),
         (registry::LAST_PAYLOAD, "(key_id=?)"),
-        (access::OF_HASH, "(hash=?)"),
+        (tokens::OF_HASH, "(hash=?)"),
         (
-            access::OF_PROJECT,
+            tokens::OF_PROJECT,
             "INDEX tokens_by_project (project=? AND (create_time,id)<",
         ),
         (
-            access::USAGE,
+            statistics::USAGE,
             "COVERING INDEX artifacts_by_project (project=? AND state=?)",
         ),
         (hooks::HOOKS, "INDEX hooks_by_project (project=? AND (create_time,id)<"),
-        (hooks::DUE, "INDEX deliveries_due (next_time<?)"),
+        (deliveries::DUE, "INDEX deliveries_due (next_time<?)"),
         (
             hooks::OF_PROJECT,
             "INDEX deliveries_by_project (project=? AND (create_time,id)<",
@@ -125,7 +125,7 @@ async fn a_thousand_submissions() {
                         ledger
                             .create_job(
                                 NewJob {
-                                    spec: vec![0; 200],
+                                    spec: spec(7),
                                     ..new_job()
                                 },
                                 at(i),

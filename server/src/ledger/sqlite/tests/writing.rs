@@ -5,7 +5,7 @@ use futures::future::join_all;
 use uuid::Uuid;
 
 use super::super::super::conformance::fixture::*;
-use super::super::super::{Ledger, LedgerError, NewJob};
+use super::super::super::{JobQueue, JobStore, LedgerError, NewJob};
 use super::Folder;
 use super::file::raw;
 
@@ -65,7 +65,7 @@ async fn a_refused_change_harms_no_other_of_its_group() {
     new[4].request_id = request_id;
     new[5] = NewJob {
         request_id,
-        spec: vec![1],
+        spec: spec(1),
         fingerprint: [1; 32],
         ..new_job()
     };

@@ -1,34 +1,33 @@
 //! Rows of the tables, read into the ledger's types.
 use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
-use uuid::Uuid;
 
-use super::super::queue::{Needs, SeenWorker};
-use super::super::types::{ArtifactRow, Failure, JobRow, KeyRow};
-use super::super::{Result, numbers};
+use super::super::types::{ArtifactRow, Failure, FailureReason, JobRow, KeyRow};
+use super::super::workers::{ResourceRequirements, SeenWorker};
+use super::super::{Result, codec, discriminants};
+use super::DbRow;
 
-pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
-    let reason: Option<i32> = row.try_get("failure_reason")?;
-    let message: Option<String> = row.try_get("failure_message")?;
+pub(super) fn job(row: &DbRow) -> Result<JobRow> {
+    let kind = discriminants::job_kind(number(row, "kind")?)?;
+    let progress: Option<Vec<u8>> = row.try_get("progress")?;
+    let result: Option<Vec<u8>> = row.try_get("result")?;
     Ok(JobRow {
-        id: id(row, "id")?,
+        id: row.try_get("id")?,
         project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
-        kind: numbers::job_kind(row.try_get("kind")?)?,
-        spec: row.try_get("spec")?,
+        spec: codec::decode_spec(kind, row.try_get("spec")?)?,
         priority: row.try_get("priority")?,
-        needs: Needs {
+        requirements: ResourceRequirements {
             memory: row.try_get("memory")?,
             likely_memory: row.try_get("likely_memory")?,
             clip: row.try_get("clip")?,
         },
-        state: numbers::job_state(row.try_get("state")?)?,
+        state: discriminants::job_state(number(row, "state")?)?,
         cancel_requested: row.try_get("cancel_requested")?,
         attempt: row.try_get("attempt")?,
         max_attempts: row.try_get("max_attempts")?,
-        progress: row.try_get("progress")?,
-        result: row.try_get("result")?,
-        failure: reason.zip(message).map(|(reason, message)| Failure { reason, message }),
+        progress: progress.as_deref().map(codec::decode_progress).transpose()?,
+        result: result.map(|bytes| codec::decode_result(kind, &bytes)).transpose()?,
+        failure: failure(row)?,
         create_time: row.try_get("create_time")?,
         update_time: row.try_get("update_time")?,
         start_time: row.try_get("start_time")?,
@@ -40,7 +39,17 @@ pub(super) fn job(row: &SqliteRow) -> Result<JobRow> {
     })
 }
 
-pub(super) fn worker(row: &SqliteRow) -> Result<SeenWorker> {
+/// Why a job or an attempt failed.
+pub(super) fn failure(row: &DbRow) -> Result<Option<Failure>> {
+    let reason: Option<i32> = row.try_get("failure_reason")?;
+    let message: Option<String> = row.try_get("failure_message")?;
+    Ok(reason.zip(message).map(|(reason, message)| Failure {
+        reason: FailureReason::from_number(reason),
+        message,
+    }))
+}
+
+pub(super) fn worker(row: &DbRow) -> Result<SeenWorker> {
     let clips: String = row.try_get("clips")?;
     Ok(SeenWorker {
         name: row.try_get("name")?,
@@ -50,57 +59,49 @@ pub(super) fn worker(row: &SqliteRow) -> Result<SeenWorker> {
     })
 }
 
-pub(super) fn artifact(row: &SqliteRow) -> Result<ArtifactRow> {
+pub(super) fn artifact(row: &DbRow) -> Result<ArtifactRow> {
     Ok(ArtifactRow {
-        id: id(row, "id")?,
+        id: row.try_get("id")?,
         project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
         size: row.try_get("size")?,
         sha256: row.try_get("sha256")?,
-        job: optional_id(row, "job_id")?,
+        job: row.try_get("job_id")?,
         secret: row.try_get("secret")?,
         path: row.try_get("path")?,
-        state: numbers::artifact_state(row.try_get("state")?)?,
+        state: discriminants::artifact_state(number(row, "state")?)?,
         create_time: row.try_get("create_time")?,
     })
 }
 
-pub(super) fn key(row: &SqliteRow) -> Result<KeyRow> {
+pub(super) fn key(row: &DbRow) -> Result<KeyRow> {
+    let bits = number(row, "bits")?;
     Ok(KeyRow {
-        id: id(row, "id")?,
+        id: row.try_get("id")?,
         project: row.try_get("project")?,
         display_name: row.try_get("display_name")?,
-        bits: row.try_get("bits")?,
+        bits: u32::try_from(bits).map_err(|_| super::super::LedgerError::Corrupt {
+            what: "number of bits",
+            value: bits,
+        })?,
         clip: row.try_get("clip")?,
         clip_sha256: row.try_get("clip_sha256")?,
         seeded: row.try_get("seeded")?,
         create_time: row.try_get("create_time")?,
-        job: id(row, "job_id")?,
-        artifact: id(row, "artifact_id")?,
-        state: numbers::key_state(row.try_get("state")?)?,
+        job: row.try_get("job_id")?,
+        artifact: row.try_get("artifact_id")?,
+        state: discriminants::key_state(number(row, "state")?)?,
         state_reason: row.try_get("state_reason")?,
         state_time: row.try_get("state_time")?,
     })
 }
 
-pub(super) fn id(row: &SqliteRow, column: &str) -> Result<Uuid> {
-    optional_id(row, column)?.ok_or_else(|| sqlx::Error::ColumnNotFound(column.to_owned()).into())
-}
-
-pub(super) fn optional_id(row: &SqliteRow, column: &str) -> Result<Option<Uuid>> {
-    let bytes: Option<Vec<u8>> = row.try_get(column)?;
-    let uuid = bytes.as_deref().map(Uuid::from_slice).transpose();
-    uuid.map_err(|e| {
-        sqlx::Error::ColumnDecode {
-            index: column.to_owned(),
-            source: e.into(),
-        }
-        .into()
-    })
+pub(super) fn number(row: &DbRow, column: &str) -> Result<i64> {
+    Ok(i64::from(row.try_get::<i32, _>(column)?))
 }
 
 /// A value that always has so many bytes.
-pub(super) fn bytes<const N: usize>(row: &SqliteRow, column: &str) -> Result<[u8; N]> {
+pub(super) fn bytes<const N: usize>(row: &DbRow, column: &str) -> Result<[u8; N]> {
     let bytes: Vec<u8> = row.try_get(column)?;
     <[u8; N]>::try_from(bytes).map_err(|bytes| {
         sqlx::Error::ColumnDecode {

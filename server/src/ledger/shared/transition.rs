@@ -1,14 +1,13 @@
 //! Moves a job that leaves the queue or its worker: the one place where a row ends or is queued again, but
 //! for jobs that a claim finds without attempts. Hooks that want to know hear of the end in the same transaction.
-use sqlx::PgConnection;
 
-use super::super::Result;
 use super::super::transition::{Left, Next};
 use super::super::types::{JobId, JobRow};
-use super::{hooks, rows};
+use super::super::{Result, codec};
+use super::{DbConnection, hooks, rows, storable};
 
 /// Moves a job, ending its lease. The caller has locked the row and checked that it may.
-pub(super) async fn leave(db: &mut PgConnection, id: JobId, next: Next, now: i64) -> Result<JobRow> {
+pub(super) async fn leave(db: &mut DbConnection, id: JobId, next: Next, now: i64) -> Result<JobRow> {
     let Left {
         state,
         result,
@@ -25,10 +24,10 @@ pub(super) async fn leave(db: &mut PgConnection, id: JobId, next: Next, now: i64
     )
     .bind(id)
     .bind(state as i32)
-    .bind(result)
-    .bind(failure.as_ref().map(|f| f.reason))
-    // The one text that programs write freely, and the one character that PostgreSQL can't keep.
-    .bind(failure.as_ref().map(|f| f.message.replace('\0', "\u{fffd}")))
+    .bind(result.as_ref().map(codec::encode_result))
+    .bind(failure.as_ref().map(|f| f.reason as i32))
+    // The one text that programs write freely.
+    .bind(failure.as_ref().map(|f| storable(&f.message)))
     .bind(run_after)
     .bind(uncounted)
     .bind(end_time)

@@ -1,13 +1,50 @@
 //! Rows of artifacts: announced, stored, published, deleted, collected.
 //!
 //! Whoever locks a job and its artifacts locks the job first.
-use sqlx::{PgConnection, Row};
+use sqlx::Row;
 
 use super::super::types::{ArtifactId, ArtifactRow, ArtifactState, JobId, NewArtifact, Origin};
-use super::super::{LedgerError, Result, token};
-use super::{jobs, leases, rows};
+use super::super::{ArtifactLedger, LedgerError, Result, token};
+use super::{DbConnection, DbLedger, jobs, leases, rows};
 
-pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -> Result<ArtifactRow> {
+#[tonic::async_trait]
+impl ArtifactLedger for DbLedger {
+    async fn create_artifact(&self, new: NewArtifact, now: i64) -> Result<ArtifactRow> {
+        self.change(with!([new] db => create(db, &new, now))).await
+    }
+
+    async fn artifact_ready(&self, id: ArtifactId, token: Option<&str>, now: i64) -> Result<ArtifactRow> {
+        let token = token.map(token::hash);
+        self.change(with!([token] db => ready(db, id, token.as_deref(), now)))
+            .await
+    }
+
+    async fn get_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+        self.read(with!([] db => get_visible(db, id))).await
+    }
+
+    async fn get_any_artifact(&self, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+        self.read(with!([] db => get(db, id))).await
+    }
+
+    async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool> {
+        self.read(with!([] db => is_being_read(db, artifact))).await
+    }
+
+    async fn delete_artifact(&self, id: ArtifactId, now: i64) -> Result<()> {
+        self.change(with!([] db => delete(db, id, now))).await
+    }
+
+    async fn abandoned_artifacts(&self, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
+        self.change(with!([] db => abandoned(db, older_than, limit))).await
+    }
+
+    async fn forget_artifact(&self, id: ArtifactId) -> Result<()> {
+        self.change(with!([] db => forget(db, id))).await
+    }
+}
+
+pub(super) async fn create(db: &mut DbConnection, new: &NewArtifact, now: i64) -> Result<ArtifactRow> {
     let (project, job, token) = match &new.origin {
         Origin::Upload { project } => (project.clone(), None, None),
         Origin::Output { job, token } => {
@@ -37,7 +74,7 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewArtifact, now: i64) -
 }
 
 pub(super) async fn ready(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: ArtifactId,
     token: Option<&[u8]>,
     now: i64,
@@ -49,7 +86,11 @@ pub(super) async fn ready(
         (Some(job), Some(token)) => Some(leases::leased_meanwhile(db, job, token).await),
         _ => None,
     };
-    let query = sqlx::query("SELECT * FROM artifacts WHERE id = $1 AND state <> 4 FOR UPDATE").bind(id);
+    let query = sqlx::query(concat!(
+        "SELECT * FROM artifacts WHERE id = $1 AND state <> 4",
+        for_update!()
+    ))
+    .bind(id);
     let row = query.fetch_optional(&mut *db).await?.ok_or_else(missing)?;
     let artifact = rows::artifact(&row)?;
     let next = match (artifact.job, token) {
@@ -78,7 +119,7 @@ pub(super) async fn ready(
 
 /// Makes a stored output of this attempt what it was made for.
 pub(super) async fn publish(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: ArtifactId,
     job: JobId,
     token: &[u8],
@@ -103,12 +144,12 @@ pub(super) async fn publish(
     }
 }
 
-pub(super) async fn get(db: &mut PgConnection, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+pub(super) async fn get(db: &mut DbConnection, id: ArtifactId) -> Result<Option<ArtifactRow>> {
     let query = sqlx::query("SELECT * FROM artifacts WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(rows::artifact).transpose()
 }
 
-pub(super) async fn get_visible(db: &mut PgConnection, id: ArtifactId) -> Result<Option<ArtifactRow>> {
+pub(super) async fn get_visible(db: &mut DbConnection, id: ArtifactId) -> Result<Option<ArtifactRow>> {
     Ok(get(db, id).await?.filter(is_visible))
 }
 
@@ -117,8 +158,8 @@ fn is_visible(artifact: &ArtifactRow) -> bool {
 }
 
 /// Locks before it looks at who needs it: a job that is being made holds its inputs until it is there.
-pub(super) async fn delete(db: &mut PgConnection, id: ArtifactId, now: i64) -> Result<()> {
-    let query = sqlx::query("SELECT * FROM artifacts WHERE id = $1 FOR UPDATE").bind(id);
+pub(super) async fn delete(db: &mut DbConnection, id: ArtifactId, now: i64) -> Result<()> {
+    let query = sqlx::query(concat!("SELECT * FROM artifacts WHERE id = $1", for_update!())).bind(id);
     let found = query.fetch_optional(&mut *db).await?;
     let found = found.as_ref().map(rows::artifact).transpose()?;
     found.filter(is_visible).ok_or_else(|| LedgerError::no_artifact(id))?;
@@ -128,7 +169,7 @@ pub(super) async fn delete(db: &mut PgConnection, id: ArtifactId, now: i64) -> R
     set_state(db, id, ArtifactState::Deleted, now).await
 }
 
-async fn set_state(db: &mut PgConnection, id: ArtifactId, state: ArtifactState, now: i64) -> Result<()> {
+async fn set_state(db: &mut DbConnection, id: ArtifactId, state: ArtifactState, now: i64) -> Result<()> {
     sqlx::query("UPDATE artifacts SET state = $2, update_time = $3 WHERE id = $1")
         .bind(id)
         .bind(state as i32)
@@ -139,15 +180,15 @@ async fn set_state(db: &mut PgConnection, id: ArtifactId, state: ArtifactState, 
 }
 
 /// Marks before it returns, so that an upload that becomes ready at this moment is either kept or told so.
-pub(super) async fn abandoned(db: &mut PgConnection, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
-    sqlx::query(
+pub(super) async fn abandoned(db: &mut DbConnection, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
+    sqlx::query(concat!(
         "WITH gone AS MATERIALIZED (\
          SELECT a.id AS gone_id FROM artifacts a LEFT JOIN jobs j ON j.id = a.job_id \
          WHERE a.state IN (1, 2) AND a.create_time < $1 \
-         AND (a.job_id IS NULL OR j.lease_token IS DISTINCT FROM a.lease_token) \
-         LIMIT $2 FOR UPDATE OF a SKIP LOCKED) \
-         UPDATE artifacts SET state = 4 FROM gone WHERE id = gone_id",
-    )
+         AND (a.job_id IS NULL OR j.lease_token IS DISTINCT FROM a.lease_token) LIMIT $2",
+        skip_locked!("a"),
+        ") UPDATE artifacts SET state = 4 FROM gone WHERE id = gone_id"
+    ))
     .bind(older_than)
     .bind(i64::from(limit))
     .execute(&mut *db)
@@ -157,8 +198,15 @@ pub(super) async fn abandoned(db: &mut PgConnection, older_than: i64, limit: u32
     deleted.iter().map(rows::artifact).collect()
 }
 
-pub(super) async fn forget(db: &mut PgConnection, id: ArtifactId) -> Result<()> {
+pub(super) async fn forget(db: &mut DbConnection, id: ArtifactId) -> Result<()> {
     let query = sqlx::query("DELETE FROM artifacts WHERE id = $1 AND state = 4").bind(id);
     query.execute(db).await?;
     Ok(())
+}
+
+async fn is_being_read(db: &mut DbConnection, artifact: ArtifactId) -> Result<bool> {
+    let query = sqlx::query(
+        "SELECT 1 FROM job_inputs i JOIN jobs j ON j.id = i.job_id WHERE i.artifact_id = $1 AND j.state = 2 LIMIT 1",
+    );
+    Ok(query.bind(artifact).fetch_optional(db).await?.is_some())
 }

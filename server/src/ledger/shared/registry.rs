@@ -1,13 +1,16 @@
 //! Rows of owners and assets.
+use std::sync::Arc;
+
 use guardsplat_commitment::SigningKey;
-use sqlx::postgres::PgRow;
-use sqlx::{PgConnection, Row};
+use sqlx::Row;
 use uuid::Uuid;
 
-use super::super::registry::{AssetFilter, AssetId, AssetRow, Candidate, NewAsset, NewOwner, OwnerId, OwnerRow};
+use super::super::registry::{
+    AssetFilter, AssetId, AssetRow, Candidate, NewAsset, NewOwner, OwnerId, OwnerRow, Registry,
+};
 use super::super::types::KeyId;
-use super::super::{LedgerError, Result, again, chain};
-use super::{commitments, keys, rows};
+use super::super::{LedgerError, Result, chain, idempotency};
+use super::{DbConnection, DbLedger, DbRow, commitments, keys, presence, rows};
 
 /// Assets with the names of their commitments.
 macro_rules! assets {
@@ -48,13 +51,63 @@ pub(super) const OF_BOTH: &str = assets!(
 pub(super) const OWNERS: &str = "SELECT * FROM owners WHERE project = $4 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-/// A page of what a search among a key's assets needs.
+/// A page of what a search among a key's assets requirements.
 pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE key_id = $1 AND payload > $2 ORDER BY payload LIMIT $3";
 
 /// The highest payload number of a key.
 pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = $1 ORDER BY payload DESC LIMIT 1";
 
-pub(super) async fn create_owner(db: &mut PgConnection, new: &NewOwner, now: i64) -> Result<OwnerRow> {
+#[tonic::async_trait]
+impl Registry for DbLedger {
+    async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow> {
+        self.change(with!([new] db => create_owner(db, &new, now))).await
+    }
+
+    async fn get_owner(&self, id: OwnerId) -> Result<Option<OwnerRow>> {
+        self.read(with!([] db => get_owner(db, id))).await
+    }
+
+    async fn list_owners(&self, project: &str, before: Option<(i64, OwnerId)>, limit: u32) -> Result<Vec<OwnerRow>> {
+        let project = project.to_owned();
+        self.read(with!([project] db => list_owners(db, &project, before, limit)))
+            .await
+    }
+
+    async fn create_asset(&self, new: NewAsset, signer: Arc<SigningKey>, now: i64) -> Result<AssetRow> {
+        self.change(with!([new, signer] db => create_asset(db, &new, &signer, now)))
+            .await
+    }
+
+    async fn find_asset_request(&self, request: Uuid) -> Result<Option<AssetRow>> {
+        self.read(with!([] db => find_asset_request(db, request))).await
+    }
+
+    async fn get_asset(&self, id: AssetId) -> Result<Option<AssetRow>> {
+        self.read(with!([] db => get_asset(db, id))).await
+    }
+
+    async fn list_assets(
+        &self,
+        project: &str,
+        filter: AssetFilter,
+        before: Option<(i64, AssetId)>,
+        limit: u32,
+    ) -> Result<Vec<AssetRow>> {
+        let project = project.to_owned();
+        self.read(with!([project] db => list_assets(db, &project, filter, before, limit)))
+            .await
+    }
+
+    async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
+        self.read(with!([] db => candidates(db, key, after, limit))).await
+    }
+
+    async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>> {
+        self.read(with!([] db => candidate(db, asset))).await
+    }
+}
+
+pub(super) async fn create_owner(db: &mut DbConnection, new: &NewOwner, now: i64) -> Result<OwnerRow> {
     if let Some(there) = owner_made_before(db, new).await? {
         return Ok(there);
     }
@@ -80,20 +133,22 @@ pub(super) async fn create_owner(db: &mut PgConnection, new: &NewOwner, now: i64
     }
 }
 
-async fn owner_made_before(db: &mut PgConnection, new: &NewOwner) -> Result<Option<OwnerRow>> {
+async fn owner_made_before(db: &mut DbConnection, new: &NewOwner) -> Result<Option<OwnerRow>> {
     let Some(request) = new.request_id else { return Ok(None) };
     let query = sqlx::query("SELECT * FROM owners WHERE request_id = $1").bind(request);
     let found = query.fetch_optional(db).await?;
-    found.map(|row| again::owner(request, owner(&row)?, new)).transpose()
+    found
+        .map(|row| idempotency::owner(request, owner(&row)?, new))
+        .transpose()
 }
 
-pub(super) async fn get_owner(db: &mut PgConnection, id: OwnerId) -> Result<Option<OwnerRow>> {
+pub(super) async fn get_owner(db: &mut DbConnection, id: OwnerId) -> Result<Option<OwnerRow>> {
     let query = sqlx::query("SELECT * FROM owners WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(owner).transpose()
 }
 
 pub(super) async fn list_owners(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     project: &str,
     before: Option<(i64, OwnerId)>,
     limit: u32,
@@ -106,16 +161,16 @@ pub(super) async fn list_owners(
 /// Payload number, asset, and commitment in one transaction, and one such transaction at a time: numbers have no gaps,
 /// and the chain has no forks.
 pub(super) async fn create_asset(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     new: &NewAsset,
     signer: &SigningKey,
     now: i64,
 ) -> Result<AssetRow> {
-    commitments::lock(db).await?;
+    presence::lock_chain(db).await?;
     if let Some(request) = new.request_id
         && let Some(there) = find_asset_request(db, request).await?
     {
-        return again::asset(request, there, new);
+        return idempotency::asset(request, there, new);
     }
     let missing = |kind, id| LedgerError::NotFound { kind, id };
     let owner = get_owner(db, new.owner).await?;
@@ -131,7 +186,7 @@ pub(super) async fn create_asset(
         .await?;
     let asset = chain::numbered(new, &key, last.unwrap_or(0), now)?;
     // The original does not go by age before the asset is there to name it; it may be gone all the same.
-    sqlx::query("SELECT 1 FROM artifacts WHERE id = $1 FOR SHARE")
+    sqlx::query(concat!("SELECT 1 FROM artifacts WHERE id = $1", for_share!()))
         .bind(asset.artifact)
         .fetch_optional(&mut *db)
         .await?;
@@ -140,7 +195,7 @@ pub(super) async fn create_asset(
     Ok(asset)
 }
 
-async fn insert(db: &mut PgConnection, asset: &AssetRow, sealed_nonce: &[u8], request: Option<Uuid>) -> Result<()> {
+async fn insert(db: &mut DbConnection, asset: &AssetRow, sealed_nonce: &[u8], request: Option<Uuid>) -> Result<()> {
     sqlx::query(
         "INSERT INTO assets (id, owner_id, display_name, sha256, artifact_id, key_id, payload, sealed_nonce, \
          request_id, create_time, project) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)",
@@ -161,18 +216,18 @@ async fn insert(db: &mut PgConnection, asset: &AssetRow, sealed_nonce: &[u8], re
     Ok(())
 }
 
-pub(super) async fn find_asset_request(db: &mut PgConnection, request: Uuid) -> Result<Option<AssetRow>> {
+pub(super) async fn find_asset_request(db: &mut DbConnection, request: Uuid) -> Result<Option<AssetRow>> {
     let query = sqlx::query(OF_REQUEST).bind(request);
     query.fetch_optional(db).await?.as_ref().map(asset).transpose()
 }
 
-pub(super) async fn get_asset(db: &mut PgConnection, id: AssetId) -> Result<Option<AssetRow>> {
+pub(super) async fn get_asset(db: &mut DbConnection, id: AssetId) -> Result<Option<AssetRow>> {
     let query = sqlx::query(ASSET).bind(id);
     query.fetch_optional(db).await?.as_ref().map(asset).transpose()
 }
 
 pub(super) async fn list_assets(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     project: &str,
     filter: AssetFilter,
     before: Option<(i64, AssetId)>,
@@ -195,19 +250,19 @@ pub(super) async fn list_assets(
     query.fetch_all(db).await?.iter().map(asset).collect()
 }
 
-pub(super) async fn candidates(db: &mut PgConnection, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
+pub(super) async fn candidates(db: &mut DbConnection, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
     let query = sqlx::query(CANDIDATES).bind(key);
     let found = query.bind(after).bind(i64::from(limit)).fetch_all(db).await?;
     found.iter().map(candidate_of).collect()
 }
 
-pub(super) async fn candidate(db: &mut PgConnection, asset: AssetId) -> Result<Option<Candidate>> {
+pub(super) async fn candidate(db: &mut DbConnection, asset: AssetId) -> Result<Option<Candidate>> {
     let query = sqlx::query("SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE id = $1");
     let found = query.bind(asset).fetch_optional(db).await?;
     found.as_ref().map(candidate_of).transpose()
 }
 
-fn candidate_of(row: &PgRow) -> Result<Candidate> {
+fn candidate_of(row: &DbRow) -> Result<Candidate> {
     Ok(Candidate {
         asset: row.try_get("id")?,
         owner: row.try_get("owner_id")?,
@@ -216,7 +271,7 @@ fn candidate_of(row: &PgRow) -> Result<Candidate> {
     })
 }
 
-fn owner(row: &PgRow) -> Result<OwnerRow> {
+fn owner(row: &DbRow) -> Result<OwnerRow> {
     Ok(OwnerRow {
         id: row.try_get("id")?,
         project: row.try_get("project")?,
@@ -225,7 +280,7 @@ fn owner(row: &PgRow) -> Result<OwnerRow> {
     })
 }
 
-fn asset(row: &PgRow) -> Result<AssetRow> {
+fn asset(row: &DbRow) -> Result<AssetRow> {
     Ok(AssetRow {
         id: row.try_get("id")?,
         project: row.try_get("project")?,

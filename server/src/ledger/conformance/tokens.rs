@@ -194,7 +194,7 @@ pub async fn a_job_names_what_is_of_its_project(factory: &dyn Factory) {
 pub async fn what_a_job_makes_is_of_its_project(factory: &dyn Factory) {
     let ledger = factory.open().await;
     let job = NewJob {
-        kind: JobKind::CreateKey,
+        spec: spec_of(JobKind::CreateKey),
         ..their_job()
     };
     let id = ledger.create_job(job, at(0)).await.unwrap().id;
@@ -213,6 +213,7 @@ pub async fn what_a_job_makes_is_of_its_project(factory: &dyn Factory) {
     let name = key.id;
     let completion = Completion {
         key: Some(key),
+        result: result_of(JobKind::CreateKey, 1),
         ..completion(1, &[seen])
     };
     ledger.complete(id, &lease.token, completion, at(3)).await.unwrap();

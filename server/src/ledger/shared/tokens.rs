@@ -1,11 +1,10 @@
 //! Rows of tokens.
-use sqlx::postgres::PgRow;
-use sqlx::{PgConnection, Row};
+use sqlx::Row;
 use uuid::Uuid;
 
-use super::super::access::{AccessLedger, NewToken, TokenId, TokenRow, Usage};
-use super::super::{ArtifactId, LedgerError, Result};
-use super::{PostgresLedger, rows, with};
+use super::super::tokens::{NewToken, TokenId, TokenLedger, TokenRow};
+use super::super::{LedgerError, Result};
+use super::{DbConnection, DbLedger, DbRow, rows};
 use crate::access::Scopes;
 
 /// The token with a hash.
@@ -15,27 +14,22 @@ pub(super) const OF_HASH: &str = "SELECT * FROM tokens WHERE hash = $1";
 pub(super) const OF_PROJECT: &str = "SELECT * FROM tokens WHERE project = $4 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-/// What a project takes; both from indexes alone. A sum of bigints is of another type.
-pub(super) const USAGE: &str = "SELECT \
-    (SELECT count(*) FROM jobs WHERE project = $1 AND state = 1) AS queued_jobs, \
-    (SELECT coalesce(sum(size), 0)::bigint FROM artifacts WHERE project = $1 AND state IN (2, 3)) AS artifact_bytes";
-
 /// A page of all; there are few, and only an operator lists them.
 const ALL: &str = "SELECT * FROM tokens WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3";
 
 #[tonic::async_trait]
-impl AccessLedger for PostgresLedger {
+impl TokenLedger for DbLedger {
     async fn create_token(&self, new: NewToken, now: i64) -> Result<TokenRow> {
-        self.database.change(with!([new] db => create(db, &new, now))).await
+        self.change(with!([new] db => create(db, &new, now))).await
     }
 
     async fn find_token(&self, hash: &[u8; 32]) -> Result<Option<TokenRow>> {
         let hash = *hash;
-        self.database.read(with!([] db => find(db, hash))).await
+        self.read(with!([] db => find(db, hash))).await
     }
 
     async fn get_token(&self, id: TokenId) -> Result<Option<TokenRow>> {
-        self.database.read(with!([] db => get(db, id))).await
+        self.read(with!([] db => get(db, id))).await
     }
 
     async fn list_tokens(
@@ -45,30 +39,20 @@ impl AccessLedger for PostgresLedger {
         limit: u32,
     ) -> Result<Vec<TokenRow>> {
         let project = project.map(str::to_owned);
-        self.database
-            .read(with!([project] db => list(db, project.as_deref(), before, limit)))
+        self.read(with!([project] db => list(db, project.as_deref(), before, limit)))
             .await
     }
 
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow> {
-        self.database.change(with!([] db => revoke(db, id, now))).await
-    }
-
-    async fn usage(&self, project: &str) -> Result<Usage> {
-        let project = project.to_owned();
-        self.database.read(with!([project] db => usage(db, &project))).await
-    }
-
-    async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool> {
-        self.database.read(with!([] db => is_being_read(db, artifact))).await
+        self.change(with!([] db => revoke(db, id, now))).await
     }
 
     async fn touch_token(&self, id: TokenId, now: i64) -> Result<()> {
-        self.database.change(with!([] db => touch(db, id, now))).await
+        self.change(with!([] db => touch(db, id, now))).await
     }
 }
 
-async fn create(db: &mut PgConnection, new: &NewToken, now: i64) -> Result<TokenRow> {
+async fn create(db: &mut DbConnection, new: &NewToken, now: i64) -> Result<TokenRow> {
     let insert = sqlx::query(
         "INSERT INTO tokens (id, hash, display_name, project, scopes, create_time, expire_time) \
          VALUES ($1, $2, $3, $4, $5, $6, $7) RETURNING *",
@@ -86,18 +70,18 @@ async fn create(db: &mut PgConnection, new: &NewToken, now: i64) -> Result<Token
     token(&row)
 }
 
-async fn find(db: &mut PgConnection, hash: [u8; 32]) -> Result<Option<TokenRow>> {
+async fn find(db: &mut DbConnection, hash: [u8; 32]) -> Result<Option<TokenRow>> {
     let found = sqlx::query(OF_HASH).bind(hash.as_slice()).fetch_optional(db).await?;
     found.as_ref().map(token).transpose()
 }
 
-async fn get(db: &mut PgConnection, id: TokenId) -> Result<Option<TokenRow>> {
+async fn get(db: &mut DbConnection, id: TokenId) -> Result<Option<TokenRow>> {
     let query = sqlx::query("SELECT * FROM tokens WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(token).transpose()
 }
 
 async fn list(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     project: Option<&str>,
     before: Option<(i64, TokenId)>,
     limit: u32,
@@ -111,39 +95,26 @@ async fn list(
     query.fetch_all(db).await?.iter().map(token).collect()
 }
 
-async fn revoke(db: &mut PgConnection, id: TokenId, now: i64) -> Result<TokenRow> {
+async fn revoke(db: &mut DbConnection, id: TokenId, now: i64) -> Result<TokenRow> {
     let update = sqlx::query("UPDATE tokens SET revoke_time = coalesce(revoke_time, $2) WHERE id = $1 RETURNING *");
     let row = update.bind(id).bind(now).fetch_optional(db).await?;
     token(&row.ok_or(LedgerError::NotFound { kind: "token", id })?)
 }
 
-async fn usage(db: &mut PgConnection, project: &str) -> Result<Usage> {
-    let row = sqlx::query(USAGE).bind(project).fetch_one(db).await?;
-    let number = |column| Ok::<_, LedgerError>(u64::try_from(row.try_get::<i64, _>(column)?).unwrap_or_default());
-    Ok(Usage {
-        queued_jobs: number("queued_jobs")?,
-        artifact_bytes: number("artifact_bytes")?,
-    })
-}
-
-async fn is_being_read(db: &mut PgConnection, artifact: ArtifactId) -> Result<bool> {
-    let query = sqlx::query(
-        "SELECT 1 FROM job_inputs i JOIN jobs j ON j.id = i.job_id WHERE i.artifact_id = $1 AND j.state = 2 LIMIT 1",
-    );
-    Ok(query.bind(artifact).fetch_optional(db).await?.is_some())
-}
-
-async fn touch(db: &mut PgConnection, id: TokenId, now: i64) -> Result<()> {
-    // Of null and a time the time is the greatest.
-    sqlx::query("UPDATE tokens SET last_use_time = greatest(last_use_time, $2) WHERE id = $1")
-        .bind(id)
-        .bind(now)
-        .execute(db)
-        .await?;
+async fn touch(db: &mut DbConnection, id: TokenId, now: i64) -> Result<()> {
+    sqlx::query(concat!(
+        "UPDATE tokens SET last_use_time = ",
+        greatest!("coalesce(last_use_time, $2)", "$2"),
+        " WHERE id = $1"
+    ))
+    .bind(id)
+    .bind(now)
+    .execute(db)
+    .await?;
     Ok(())
 }
 
-fn token(row: &PgRow) -> Result<TokenRow> {
+fn token(row: &DbRow) -> Result<TokenRow> {
     let bits = rows::number(row, "scopes")?;
     Ok(TokenRow {
         id: row.try_get("id")?,

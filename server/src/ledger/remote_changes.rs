@@ -3,7 +3,7 @@ use super::types::JobId;
 
 /// A change that another server made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Elsewhere {
+pub enum RemoteChange {
     /// A job has changed.
     Job {
         /// Which.

@@ -1,40 +1,8 @@
-//! What operators want of the ledger: how much there is to do, what became of attempts, and another try for a job that
-//! failed. A trait of its own beside [`super::Ledger`], which has it as a supertrait.
-use super::types::{ArtifactId, Failure, JobId, JobKind, JobRow};
+//! Jobs as their owners see them: queued, looked at, listed, cancelled, tried again.
+use uuid::Uuid;
+
+use super::types::{ArtifactId, Failure, FailureReason, JobId, JobRow, JobState, NewJob};
 use super::{LedgerError, Result};
-
-/// How many jobs there are to do, being done, and given up.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Queued jobs by kind; a kind of which none is queued may be missing.
-    pub queued: Vec<Waiting>,
-    /// Running jobs by kind; a kind of which none runs may be missing.
-    pub running: Vec<Running>,
-    /// Failed jobs by kind and reason.
-    pub failed: Vec<(JobKind, i32, u64)>,
-}
-
-/// The queued jobs of a kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Waiting {
-    /// What they do.
-    pub kind: JobKind,
-    /// How many they are.
-    pub count: u64,
-    /// Since when the first of them could have been given to a worker; it may lie ahead, after a failed attempt.
-    pub since: i64,
-}
-
-/// The running jobs of a kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Running {
-    /// What they do.
-    pub kind: JobKind,
-    /// How many they are.
-    pub count: u64,
-    /// Bytes of memory that they probably take together, as far as their scenes told.
-    pub memory: u64,
-}
 
 /// How an attempt ended. Numbers are kept in the database, and are those of `guardsplat.v1.JobAttempt.Outcome`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,23 +53,54 @@ pub struct AttemptRow {
     pub failure: Option<Failure>,
 }
 
-/// What the service keeps for those who look after it.
+/// The jobs of all projects.
 #[tonic::async_trait]
-pub trait OperationsLedger: Send + Sync + 'static {
-    /// How many jobs there are, of all projects.
-    async fn tally(&self) -> Result<Tally>;
+pub trait JobStore: Send + Sync + 'static {
+    /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
+    /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:
+    /// then their artifacts may have other names, but hold the same.
+    ///
+    /// # Errors
+    /// `RequestIdReused` for the same request id with another request, or of another project; `NotFound` for an input or
+    /// a key that isn't there (or isn't visible, or is another project's).
+    async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow>;
+
+    /// The job that was made under a request id, whatever has become of it.
+    async fn find_request(&self, request: Uuid) -> Result<Option<JobRow>>;
+
+    /// One job as it stands, with its position in the queue.
+    async fn get_job(&self, id: JobId) -> Result<Option<JobRow>>;
+
+    /// One job as it stands, without its position in the queue.
+    async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>>;
+
+    /// Jobs of a project in one of `states` (in any, when empty), newest first; those after `before` (the `create_time`
+    /// and id of the last job of the page before).
+    async fn list_jobs(
+        &self,
+        project: &str,
+        states: &[JobState],
+        before: Option<(i64, JobId)>,
+        limit: u32,
+    ) -> Result<Vec<JobRow>>;
 
     /// Jobs of a project that failed for one of these reasons, newest first; those after `before`, as with `list_jobs`.
     async fn list_failed(
         &self,
         project: &str,
-        reasons: &[i32],
+        reasons: &[FailureReason],
         before: Option<(i64, JobId)>,
         limit: u32,
     ) -> Result<Vec<JobRow>>;
 
     /// The newest attempts of a job, newest first, 20 at most; none for a job that is not there.
     async fn attempts(&self, job: JobId) -> Result<Vec<AttemptRow>>;
+
+    /// Ends a queued job; asks for the end of a running one.
+    ///
+    /// # Errors
+    /// `NotFound`; `Finished` when there is nothing left to end.
+    async fn cancel_job(&self, id: JobId, now: i64) -> Result<JobRow>;
 
     /// Queues a job that failed once more, at the end of the queue, its attempts counted anew. `inputs` are the artifacts
     /// that it reads.
@@ -111,13 +110,7 @@ pub trait OperationsLedger: Send + Sync + 'static {
     async fn requeue(&self, job: JobId, inputs: &[ArtifactId], now: i64) -> Result<JobRow>;
 }
 
-/// A number of rows.
-pub(super) fn count(value: i64) -> u64 {
-    u64::try_from(value).unwrap_or_default()
-}
-
-/// Reasons as bits, for a database that takes no lists.
-pub(super) fn bits(reasons: &[i32]) -> i64 {
-    let bit = |&reason: &i32| u32::try_from(reason).ok().and_then(|reason| 1_i64.checked_shl(reason));
-    reasons.iter().filter_map(bit).fold(0, |all, bit| all | bit)
+/// Reasons as bits, as not every database takes lists.
+pub(super) fn bits(reasons: &[FailureReason]) -> i64 {
+    reasons.iter().fold(0, |all, &reason| all | 1 << reason as i32)
 }

@@ -1,17 +1,35 @@
 //! Rows of keys.
-use sqlx::PgConnection;
 use uuid::Uuid;
 
 use super::super::registry::KeyState;
 use super::super::types::{JobId, KeyId, KeyRow, NewKey};
-use super::super::{LedgerError, Result};
-use super::rows;
+use super::super::{KeyLedger, LedgerError, Result};
+use super::{DbConnection, DbLedger, rows};
 
 /// A page of a project's keys.
 pub(super) const PAGE: &str = "SELECT * FROM keys WHERE project = $4 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-pub(super) async fn create(db: &mut PgConnection, new: &NewKey, job: JobId, now: i64) -> Result<()> {
+#[tonic::async_trait]
+impl KeyLedger for DbLedger {
+    async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>> {
+        self.read(with!([] db => get(db, id))).await
+    }
+
+    async fn list_keys(&self, project: &str, before: Option<(i64, KeyId)>, limit: u32) -> Result<Vec<KeyRow>> {
+        let project = project.to_owned();
+        self.read(with!([project] db => list(db, &project, before, limit)))
+            .await
+    }
+
+    async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow> {
+        let reason = reason.to_owned();
+        self.change(with!([reason] db => update_state(db, id, next, &reason, now)))
+            .await
+    }
+}
+
+pub(super) async fn create(db: &mut DbConnection, new: &NewKey, job: JobId, now: i64) -> Result<()> {
     sqlx::query(
         "INSERT INTO keys (id, display_name, bits, clip, clip_sha256, seeded, create_time, job_id, artifact_id, \
          project) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, (SELECT project FROM jobs WHERE id = $8))",
@@ -30,19 +48,19 @@ pub(super) async fn create(db: &mut PgConnection, new: &NewKey, job: JobId, now:
     Ok(())
 }
 
-pub(super) async fn get(db: &mut PgConnection, id: KeyId) -> Result<Option<KeyRow>> {
+pub(super) async fn get(db: &mut DbConnection, id: KeyId) -> Result<Option<KeyRow>> {
     let query = sqlx::query("SELECT * FROM keys WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
 }
 
 /// A key whose state stays what it is until the transaction ends.
-pub(super) async fn get_meanwhile(db: &mut PgConnection, id: KeyId) -> Result<Option<KeyRow>> {
-    let query = sqlx::query("SELECT * FROM keys WHERE id = $1 FOR SHARE").bind(id);
+pub(super) async fn get_meanwhile(db: &mut DbConnection, id: KeyId) -> Result<Option<KeyRow>> {
+    let query = sqlx::query(concat!("SELECT * FROM keys WHERE id = $1", for_share!())).bind(id);
     query.fetch_optional(db).await?.as_ref().map(rows::key).transpose()
 }
 
 pub(super) async fn list(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     project: &str,
     before: Option<(i64, KeyId)>,
     limit: u32,
@@ -54,13 +72,13 @@ pub(super) async fn list(
 }
 
 pub(super) async fn update_state(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     id: KeyId,
     next: KeyState,
     reason: &str,
     now: i64,
 ) -> Result<KeyRow> {
-    let query = sqlx::query("SELECT * FROM keys WHERE id = $1 FOR UPDATE").bind(id);
+    let query = sqlx::query(concat!("SELECT * FROM keys WHERE id = $1", for_update!())).bind(id);
     let row = query.fetch_optional(&mut *db).await?;
     let key = rows::key(&row.ok_or(LedgerError::NotFound { kind: "key", id })?)?;
     if key.state == next {

@@ -1,18 +1,16 @@
 //! Rows of hooks and deliveries.
 use std::time::Duration;
 
-use sqlx::postgres::PgRow;
-use sqlx::{PgConnection, Row};
+use sqlx::Row;
 use uuid::Uuid;
 
 use super::super::hooks::{
     DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
     kind_bit, state_bit,
 };
-use super::super::transition::end_of;
 use super::super::types::JobRow;
-use super::super::{LedgerError, Result, numbers, token};
-use super::{PostgresLedger, rows, with};
+use super::super::{LedgerError, Result, discriminants, token};
+use super::{DbConnection, DbLedger, DbRow, deliveries, rows, storable};
 
 /// A page of a project's hooks.
 pub(super) const HOOKS: &str = "SELECT * FROM hooks WHERE project = $4 AND (create_time, id) < ($1, $2) \
@@ -28,36 +26,28 @@ pub(super) const OF_HOOK: &str = "SELECT * FROM deliveries \
     WHERE hook_id = $4 AND ($5 IS NULL OR state = $5) AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-/// Takes the delivery that has been due for longest and that nobody else is taking.
-pub(super) const CLAIM: &str = "WITH next AS MATERIALIZED (\
-        SELECT id AS next_id FROM deliveries WHERE state = 1 AND next_time <= $1 AND hook_id <> ALL($2) \
-        ORDER BY next_time, id LIMIT 1 FOR UPDATE SKIP LOCKED) \
-    UPDATE deliveries SET attempts = attempts + 1, lease_token = $3, next_time = $4, last_time = $1 \
-    FROM next WHERE id = next_id RETURNING *";
-
 #[tonic::async_trait]
-impl HookLedger for PostgresLedger {
+impl HookLedger for DbLedger {
     async fn create_hook(&self, new: NewHook, now: i64) -> Result<HookRow> {
-        self.database.change(with!([new] db => create(db, &new, now))).await
+        self.change(with!([new] db => create(db, &new, now))).await
     }
 
     async fn get_hook(&self, id: HookId) -> Result<Option<HookRow>> {
-        self.database.read(with!([] db => get(db, id))).await
+        self.read(with!([] db => get(db, id))).await
     }
 
     async fn list_hooks(&self, project: &str, before: Option<(i64, HookId)>, limit: u32) -> Result<Vec<HookRow>> {
         let project = project.to_owned();
-        self.database
-            .read(with!([project] db => list(db, &project, before, limit)))
+        self.read(with!([project] db => list(db, &project, before, limit)))
             .await
     }
 
     async fn delete_hook(&self, id: HookId) -> Result<()> {
-        self.database.change(with!([] db => delete(db, id))).await
+        self.change(with!([] db => delete(db, id))).await
     }
 
     async fn get_delivery(&self, id: DeliveryId) -> Result<Option<DeliveryRow>> {
-        self.database.read(with!([] db => get_delivery(db, id))).await
+        self.read(with!([] db => get_delivery(db, id))).await
     }
 
     async fn list_deliveries(
@@ -68,27 +58,21 @@ impl HookLedger for PostgresLedger {
         limit: u32,
     ) -> Result<Vec<DeliveryRow>> {
         let project = project.to_owned();
-        self.database
-            .read(with!([project] db => list_deliveries(db, &project, filter, before, limit)))
+        self.read(with!([project] db => list_deliveries(db, &project, filter, before, limit)))
             .await
     }
 
     async fn redeliver(&self, id: DeliveryId, now: i64) -> Result<DeliveryRow> {
-        self.database.change(with!([] db => redeliver(db, id, now))).await
+        self.change(with!([] db => redeliver(db, id, now))).await
     }
 
     async fn claim_delivery(&self, except: &[HookId], lease: Duration, now: i64) -> Result<Option<Sending>> {
-        let except = except.to_vec();
-        self.database
-            .change(with!([except] db => claim(db, &except, lease, now)))
-            .await
+        deliveries::claim(self, except, lease, now).await
     }
 
     async fn delivered(&self, id: DeliveryId, token: &str, now: i64) -> Result<bool> {
         let token = token::hash(token);
-        self.database
-            .change(with!([token] db => delivered(db, id, &token, now)))
-            .await
+        self.change(with!([token] db => delivered(db, id, &token, now))).await
     }
 
     async fn not_delivered(
@@ -99,30 +83,26 @@ impl HookLedger for PostgresLedger {
         next: Option<i64>,
         now: i64,
     ) -> Result<bool> {
-        // PostgreSQL can't keep this one character.
-        let (token, error) = (token::hash(token), error.replace('\0', "\u{fffd}"));
-        self.database
-            .change(with!([token, error] db => not_delivered(db, id, &token, &error, next, now)))
+        let (token, error) = (token::hash(token), storable(error));
+        self.change(with!([token, error] db => not_delivered(db, id, &token, &error, next, now)))
             .await
     }
 
     async fn forget_deliveries(&self, older_than: i64, limit: u32) -> Result<u64> {
-        self.database
-            .change(with!([] db => forget(db, older_than, limit)))
-            .await
+        self.change(with!([] db => forget(db, older_than, limit))).await
     }
 }
 
 /// Makes a delivery for every hook that wants to know of a job that is over; in the transaction that ends it. The hooks
 /// stay until it ends: one that was deleted meanwhile would have the job's end refused.
-pub(super) async fn announce(db: &mut PgConnection, job: &JobRow, now: i64) -> Result<()> {
-    let wanting = sqlx::query_scalar(
-        "SELECT id FROM hooks WHERE project = $1 AND (kinds = 0 OR kinds & $2 <> 0) AND (states = 0 OR states & $3 <> 0) \
-         FOR KEY SHARE",
-    );
+pub(super) async fn announce(db: &mut DbConnection, job: &JobRow, now: i64) -> Result<()> {
+    let wanting = sqlx::query_scalar(concat!(
+        "SELECT id FROM hooks WHERE project = $1 AND (kinds = 0 OR kinds & $2 <> 0) AND (states = 0 OR states & $3 <> 0)",
+        for_key_share!()
+    ));
     let wanting: Vec<Uuid> = wanting
         .bind(&job.project)
-        .bind(kind_bit(job.kind))
+        .bind(kind_bit(job.kind()))
         .bind(state_bit(job.state))
         .fetch_all(&mut *db)
         .await?;
@@ -144,7 +124,7 @@ pub(super) async fn announce(db: &mut PgConnection, job: &JobRow, now: i64) -> R
     Ok(())
 }
 
-async fn create(db: &mut PgConnection, new: &NewHook, now: i64) -> Result<HookRow> {
+async fn create(db: &mut DbConnection, new: &NewHook, now: i64) -> Result<HookRow> {
     let (kinds, states) = new.topics.bits();
     let insert = sqlx::query(
         "INSERT INTO hooks (id, project, display_name, url, kinds, states, sealed_secret, create_time) \
@@ -164,12 +144,12 @@ async fn create(db: &mut PgConnection, new: &NewHook, now: i64) -> Result<HookRo
     hook(&row)
 }
 
-async fn get(db: &mut PgConnection, id: HookId) -> Result<Option<HookRow>> {
+async fn get(db: &mut DbConnection, id: HookId) -> Result<Option<HookRow>> {
     let query = sqlx::query("SELECT * FROM hooks WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(hook).transpose()
 }
 
-async fn list(db: &mut PgConnection, project: &str, before: Option<(i64, HookId)>, limit: u32) -> Result<Vec<HookRow>> {
+async fn list(db: &mut DbConnection, project: &str, before: Option<(i64, HookId)>, limit: u32) -> Result<Vec<HookRow>> {
     let (time, id) = before.unwrap_or((i64::MAX, Uuid::max()));
     let query = sqlx::query(HOOKS)
         .bind(time)
@@ -179,7 +159,7 @@ async fn list(db: &mut PgConnection, project: &str, before: Option<(i64, HookId)
     query.fetch_all(db).await?.iter().map(hook).collect()
 }
 
-async fn delete(db: &mut PgConnection, id: HookId) -> Result<()> {
+async fn delete(db: &mut DbConnection, id: HookId) -> Result<()> {
     let query = sqlx::query("DELETE FROM hooks WHERE id = $1").bind(id);
     match query.execute(db).await?.rows_affected() {
         0 => Err(LedgerError::NotFound { kind: "hook", id }),
@@ -187,13 +167,13 @@ async fn delete(db: &mut PgConnection, id: HookId) -> Result<()> {
     }
 }
 
-async fn get_delivery(db: &mut PgConnection, id: DeliveryId) -> Result<Option<DeliveryRow>> {
+async fn get_delivery(db: &mut DbConnection, id: DeliveryId) -> Result<Option<DeliveryRow>> {
     let query = sqlx::query("SELECT * FROM deliveries WHERE id = $1").bind(id);
     query.fetch_optional(db).await?.as_ref().map(delivery).transpose()
 }
 
 async fn list_deliveries(
-    db: &mut PgConnection,
+    db: &mut DbConnection,
     project: &str,
     filter: DeliveryFilter,
     before: Option<(i64, DeliveryId)>,
@@ -210,7 +190,7 @@ async fn list_deliveries(
     query.fetch_all(db).await?.iter().map(delivery).collect()
 }
 
-async fn redeliver(db: &mut PgConnection, id: DeliveryId, now: i64) -> Result<DeliveryRow> {
+async fn redeliver(db: &mut DbConnection, id: DeliveryId, now: i64) -> Result<DeliveryRow> {
     let update = sqlx::query(
         "UPDATE deliveries SET state = 1, attempts = 0, since = $2, next_time = $2, end_time = NULL, lease_token = NULL \
          WHERE id = $1 AND NOT (lease_token IS NOT NULL AND next_time > $2)",
@@ -220,17 +200,76 @@ async fn redeliver(db: &mut PgConnection, id: DeliveryId, now: i64) -> Result<De
     found.ok_or(LedgerError::NotFound { kind: "delivery", id })
 }
 
-async fn claim(db: &mut PgConnection, except: &[HookId], lease: Duration, now: i64) -> Result<Option<Sending>> {
-    let token = token::fresh();
-    let row = sqlx::query(CLAIM)
-        .bind(now)
-        .bind(except)
-        .bind(token::hash(&token))
-        .bind(end_of(lease, now))
-        .fetch_optional(&mut *db)
-        .await?;
-    let Some(row) = row else { return Ok(None) };
-    let delivery = delivery(&row)?;
+async fn delivered(db: &mut DbConnection, id: DeliveryId, token: &[u8], now: i64) -> Result<bool> {
+    let update = sqlx::query(
+        "UPDATE deliveries SET state = 2, last_error = '', lease_token = NULL, end_time = $3 \
+         WHERE id = $1 AND lease_token = $2",
+    );
+    let update = update.bind(id).bind(token).bind(now);
+    Ok(update.execute(db).await?.rows_affected() > 0)
+}
+
+async fn not_delivered(
+    db: &mut DbConnection,
+    id: DeliveryId,
+    token: &[u8],
+    error: &str,
+    next: Option<i64>,
+    now: i64,
+) -> Result<bool> {
+    let update = sqlx::query(
+        "UPDATE deliveries SET state = CASE WHEN CAST($4 AS bigint) IS NULL THEN 3 ELSE 1 END, \
+         next_time = coalesce($4, next_time), \
+         end_time = CASE WHEN CAST($4 AS bigint) IS NULL THEN CAST($5 AS bigint) END, \
+         last_error = $3, lease_token = NULL WHERE id = $1 AND lease_token = $2",
+    );
+    let update = update.bind(id).bind(token).bind(error).bind(next).bind(now);
+    Ok(update.execute(db).await?.rows_affected() > 0)
+}
+
+async fn forget(db: &mut DbConnection, older_than: i64, limit: u32) -> Result<u64> {
+    let delete = sqlx::query(concat!(
+        "DELETE FROM deliveries WHERE id IN (SELECT id FROM deliveries WHERE state > 1 AND end_time < $1 LIMIT $2",
+        skip_locked!(),
+        ")"
+    ));
+    let delete = delete.bind(older_than).bind(i64::from(limit));
+    Ok(delete.execute(db).await?.rows_affected())
+}
+
+fn hook(row: &DbRow) -> Result<HookRow> {
+    Ok(HookRow {
+        id: row.try_get("id")?,
+        project: row.try_get("project")?,
+        display_name: row.try_get("display_name")?,
+        url: row.try_get("url")?,
+        topics: Topics::from_bits(rows::number(row, "kinds")?, rows::number(row, "states")?)?,
+        sealed_secret: row.try_get("sealed_secret")?,
+        create_time: row.try_get("create_time")?,
+    })
+}
+
+fn delivery(row: &DbRow) -> Result<DeliveryRow> {
+    Ok(DeliveryRow {
+        id: row.try_get("id")?,
+        hook: row.try_get("hook_id")?,
+        project: row.try_get("project")?,
+        job: row.try_get("job_id")?,
+        job_state: discriminants::job_state(rows::number(row, "job_state")?)?,
+        state: DeliveryState::of_number(rows::number(row, "state")?)?,
+        attempts: row.try_get("attempts")?,
+        last_error: row.try_get("last_error")?,
+        create_time: row.try_get("create_time")?,
+        since: row.try_get("since")?,
+        next_time: row.try_get("next_time")?,
+        last_time: row.try_get("last_time")?,
+        end_time: row.try_get("end_time")?,
+    })
+}
+
+/// The right to the attempt at a delivery that was just counted.
+pub(super) async fn sending(db: &mut DbConnection, row: &DbRow, token: String) -> Result<Sending> {
+    let delivery = delivery(row)?;
     let hook = get(db, delivery.hook).await?.ok_or(LedgerError::NotFound {
         kind: "hook",
         id: delivery.hook,
@@ -243,76 +282,11 @@ async fn claim(db: &mut PgConnection, except: &[HookId], lease: Duration, now: i
             .or(row.try_get("request_id")?),
         None => None,
     };
-    Ok(Some(Sending {
+    Ok(Sending {
         delivery,
         hook,
         job: job.as_ref().map(rows::job).transpose()?,
         asked_id,
         token,
-    }))
-}
-
-async fn delivered(db: &mut PgConnection, id: DeliveryId, token: &[u8], now: i64) -> Result<bool> {
-    let update = sqlx::query(
-        "UPDATE deliveries SET state = 2, last_error = '', lease_token = NULL, end_time = $3 \
-         WHERE id = $1 AND lease_token = $2",
-    );
-    let update = update.bind(id).bind(token).bind(now);
-    Ok(update.execute(db).await?.rows_affected() > 0)
-}
-
-async fn not_delivered(
-    db: &mut PgConnection,
-    id: DeliveryId,
-    token: &[u8],
-    error: &str,
-    next: Option<i64>,
-    now: i64,
-) -> Result<bool> {
-    let update = sqlx::query(
-        "UPDATE deliveries SET state = CASE WHEN $4::bigint IS NULL THEN 3 ELSE 1 END, \
-         next_time = coalesce($4, next_time), end_time = CASE WHEN $4::bigint IS NULL THEN $5::bigint END, \
-         last_error = $3, lease_token = NULL WHERE id = $1 AND lease_token = $2",
-    );
-    let update = update.bind(id).bind(token).bind(error).bind(next).bind(now);
-    Ok(update.execute(db).await?.rows_affected() > 0)
-}
-
-async fn forget(db: &mut PgConnection, older_than: i64, limit: u32) -> Result<u64> {
-    let delete = sqlx::query(
-        "DELETE FROM deliveries WHERE id IN (\
-         SELECT id FROM deliveries WHERE state > 1 AND end_time < $1 LIMIT $2 FOR UPDATE SKIP LOCKED)",
-    );
-    let delete = delete.bind(older_than).bind(i64::from(limit));
-    Ok(delete.execute(db).await?.rows_affected())
-}
-
-fn hook(row: &PgRow) -> Result<HookRow> {
-    Ok(HookRow {
-        id: row.try_get("id")?,
-        project: row.try_get("project")?,
-        display_name: row.try_get("display_name")?,
-        url: row.try_get("url")?,
-        topics: Topics::from_bits(rows::number(row, "kinds")?, rows::number(row, "states")?)?,
-        sealed_secret: row.try_get("sealed_secret")?,
-        create_time: row.try_get("create_time")?,
-    })
-}
-
-fn delivery(row: &PgRow) -> Result<DeliveryRow> {
-    Ok(DeliveryRow {
-        id: row.try_get("id")?,
-        hook: row.try_get("hook_id")?,
-        project: row.try_get("project")?,
-        job: row.try_get("job_id")?,
-        job_state: numbers::job_state(rows::number(row, "job_state")?)?,
-        state: DeliveryState::of_number(rows::number(row, "state")?)?,
-        attempts: row.try_get("attempts")?,
-        last_error: row.try_get("last_error")?,
-        create_time: row.try_get("create_time")?,
-        since: row.try_get("since")?,
-        next_time: row.try_get("next_time")?,
-        last_time: row.try_get("last_time")?,
-        end_time: row.try_get("end_time")?,
     })
 }

@@ -1,7 +1,7 @@
-//! What the ledger keeps of tokens: a trait of its own beside [`super::Ledger`], which has it as a supertrait.
+//! Tokens of those who may call.
 use uuid::Uuid;
 
-use super::{ArtifactId, Result};
+use super::Result;
 use crate::access::Scopes;
 
 /// Name of a token.
@@ -45,18 +45,9 @@ pub struct TokenRow {
     pub revoke_time: Option<i64>,
 }
 
-/// What a project takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Usage {
-    /// Its queued jobs.
-    pub queued_jobs: u64,
-    /// Bytes of its artifacts that are all there, published or not, secret ones too.
-    pub artifact_bytes: u64,
-}
-
-/// What the service keeps of those who may call.
+/// The tokens of those who may call.
 #[tonic::async_trait]
-pub trait AccessLedger: Send + Sync + 'static {
+pub trait TokenLedger: Send + Sync + 'static {
     /// Keeps a token.
     async fn create_token(&self, new: NewToken, now: i64) -> Result<TokenRow>;
 
@@ -80,12 +71,6 @@ pub trait AccessLedger: Send + Sync + 'static {
     /// # Errors
     /// `NotFound`.
     async fn revoke_token(&self, id: TokenId, now: i64) -> Result<TokenRow>;
-
-    /// What a project takes now.
-    async fn usage(&self, project: &str) -> Result<Usage>;
-
-    /// Whether a running job reads this artifact.
-    async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool>;
 
     /// Notes that a token is in use; nothing where it is gone. The time never goes back.
     async fn touch_token(&self, id: TokenId, now: i64) -> Result<()>;
