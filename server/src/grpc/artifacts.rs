@@ -17,7 +17,7 @@ use crate::grpc::upload_stream::Incoming;
 use crate::ledger::{ArtifactRow, NewArtifact, Origin};
 use crate::service::Service;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::to_proto;
 use crate::service::upload;
 
@@ -61,7 +61,7 @@ impl ArtifactService for Service {
     ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
         let caller = caller(&request)?;
         let DownloadArtifactRequest { name, offset } = request.into_inner();
-        let id = Kind::Artifact.parse("name", &name)?;
+        let id = ResourceKind::Artifact.parse("name", &name)?;
         let row = self.readable_artifact(&caller, id).await?;
         let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
         let path = ArtifactPath::parse(&row.path).map_err(Error::from)?;
@@ -79,20 +79,20 @@ impl ArtifactService for Service {
         &self,
         request: Request<GetDownloadUrlRequest>,
     ) -> Result<Response<GetDownloadUrlResponse>, Status> {
-        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
         // Never a secret one: those are not even there.
         let row = self.readable_artifact(&caller(&request)?, id).await?;
         Ok(Response::new(self.signed(row).await?))
     }
 
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
-        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
         let row = self.own_artifact(&caller(&request)?.project, id).await?;
         Ok(Response::new(to_proto::artifact(row)))
     }
 
     async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
-        let id = Kind::Artifact.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
         let row = self.own_artifact(&caller(&request)?.project, id).await?;
         self.ledger()
             .delete_artifact(row.id, clock::now())

@@ -4,7 +4,7 @@ use prost::Message as _;
 
 use crate::error::{Error, Result};
 use crate::service::message;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::page;
 use crate::service::submission;
 use crate::service::text;
@@ -30,9 +30,9 @@ pub fn page_token(text: &str) -> Result<Option<String>> {
 
 /// Reads a name of whatever has one, and makes it again.
 pub fn name(text: &str) -> Result<String> {
-    let parsed = |kind: Kind| kind.parse("name", text).map(|id| kind.name(id));
-    let found = Kind::ALL.into_iter().find_map(|kind| parsed(kind).ok());
-    found.map_or_else(|| parsed(Kind::Job), Ok)
+    let parsed = |kind: ResourceKind| kind.parse("name", text).map(|id| kind.name(id));
+    let found = ResourceKind::ALL.into_iter().find_map(|kind| parsed(kind).ok());
+    found.map_or_else(|| parsed(ResourceKind::Job), Ok)
 }
 
 /// Checks a name for people.

@@ -18,7 +18,7 @@ use crate::ledger::{DeliveryFilter, DeliveryRow, DeliveryState, HookRow, JobKind
 use crate::secrets::{self, SecretError};
 use crate::service::Service;
 use crate::service::clock::{self, timestamp};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::page;
 use crate::service::text;
 use crate::service::violations::Violations;
@@ -114,10 +114,10 @@ impl HookService for Service {
         request: Request<RedeliverDeliveryRequest>,
     ) -> Result<Response<Delivery>, Status> {
         let project = caller(&request)?.project;
-        let id = Kind::Delivery.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Delivery.parse("name", &request.get_ref().name)?;
         let row = self.ledger().get_delivery(id).await.map_err(Error::from)?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Delivery.not_found(id))?;
+        own.ok_or_else(|| ResourceKind::Delivery.not_found(id))?;
         let row = self.ledger().redeliver(id, clock::now()).await.map_err(Error::from)?;
         Ok(Response::new(delivery(row)))
     }
@@ -125,10 +125,10 @@ impl HookService for Service {
 
 impl Service {
     async fn own_hook(&self, project: &str, field: &str, name: &str) -> Result<HookRow> {
-        let id = Kind::Hook.parse(field, name)?;
+        let id = ResourceKind::Hook.parse(field, name)?;
         let row = self.ledger().get_hook(id).await?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Hook.not_found(id))
+        own.ok_or_else(|| ResourceKind::Hook.not_found(id))
     }
 
     /// Refuses a hook of a project that has as many as it may. What arrives at the same moment may go over by itself.
@@ -219,7 +219,7 @@ fn hook(row: HookRow) -> Hook {
         JobKind::CreateKey => WireKind::CreateKey,
     };
     Hook {
-        name: Kind::Hook.name(row.id),
+        name: ResourceKind::Hook.name(row.id),
         display_name: row.display_name,
         project: row.project,
         url: row.url,
@@ -238,9 +238,9 @@ fn delivery(row: DeliveryRow) -> Delivery {
         DeliveryState::Dead => State::Dead,
     };
     Delivery {
-        name: Kind::Delivery.name(row.id),
-        hook: Kind::Hook.name(row.hook),
-        job: Kind::Job.name(row.job),
+        name: ResourceKind::Delivery.name(row.id),
+        hook: ResourceKind::Hook.name(row.hook),
+        job: ResourceKind::Job.name(row.job),
         r#type: event::event_type(row.job_state),
         state: state.into(),
         attempts: row.attempts,

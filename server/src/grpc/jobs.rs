@@ -13,7 +13,7 @@ use crate::grpc::metrics_layer;
 use crate::grpc::watch;
 use crate::service::Service;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::ownership;
 use crate::service::rate_limit::payer;
 use crate::service::to_proto;
@@ -28,7 +28,7 @@ impl JobService for Service {
     }
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
-        let id = Kind::Job.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Job.parse("name", &request.get_ref().name)?;
         let row = self.own_job(&caller(&request)?.project, id).await?;
         Ok(Response::new(self.told(row).await?))
     }
@@ -40,7 +40,7 @@ impl JobService for Service {
 
     async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<Job>, Status> {
         let caller = caller(&request)?;
-        let id = Kind::Job.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Job.parse("name", &request.get_ref().name)?;
         let job = self.own_job(&caller.project, id).await?;
         caller.must(ownership::scope_of(job.kind()))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;

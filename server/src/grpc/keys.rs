@@ -9,7 +9,7 @@ use crate::grpc::guard::caller;
 use crate::ledger::{KeyId, KeyState};
 use crate::service::Service;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::page;
 use crate::service::text;
 use crate::service::to_proto;
@@ -21,7 +21,7 @@ const QUERY: &[&[u8]] = &[b"keys"];
 #[tonic::async_trait]
 impl KeyService for Service {
     async fn get_key(&self, request: Request<GetKeyRequest>) -> Result<Response<Key>, Status> {
-        let id = Kind::Key.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Key.parse("name", &request.get_ref().name)?;
         let row = self.own_key(&caller(&request)?.project, id).await?;
         Ok(Response::new(to_proto::key(row)))
     }
@@ -54,7 +54,7 @@ impl KeyService for Service {
 
 fn checked(request: UpdateKeyStateRequest) -> Result<(KeyId, KeyState, String)> {
     let mut problems = Violations::default();
-    let id = problems.take(Kind::Key.parse("name", &request.name))?;
+    let id = problems.take(ResourceKind::Key.parse("name", &request.name))?;
     let next = match State::try_from(request.state) {
         // Nothing leads there, which is said with the state that the key has.
         Ok(State::Active) => Some(KeyState::Active),

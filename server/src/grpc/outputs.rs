@@ -11,7 +11,7 @@ use crate::grpc::upload_stream::Incoming;
 use crate::ledger::{ArtifactRow, JobKind, NewArtifact, Origin};
 use crate::service::Service;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::upload;
 
 /// Most bytes of a key file. One of 150 bits has less than 3 MiB.
@@ -24,7 +24,7 @@ impl Service {
         mut incoming: Incoming<UploadOutputRequest>,
     ) -> Result<ArtifactRow, Status> {
         let metadata = incoming.metadata().await?;
-        let job = Kind::Job.parse("metadata.job", &metadata.job)?;
+        let job = ResourceKind::Job.parse("metadata.job", &metadata.job)?;
         let upload = metadata
             .upload
             .ok_or_else(|| Error::invalid("metadata.upload", "is missing"))?;

@@ -14,7 +14,7 @@ use crate::grpc::guard::caller;
 use crate::ledger::{NewToken, TokenRow};
 use crate::service::Service;
 use crate::service::clock::{self, timestamp};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::page;
 use crate::service::text;
 use crate::service::violations::Violations;
@@ -66,10 +66,10 @@ impl TokenService for Service {
 
     async fn revoke_token(&self, request: Request<RevokeTokenRequest>) -> Result<Response<Token>, Status> {
         let caller = caller(&request)?;
-        let id = Kind::Token.parse("name", &request.get_ref().name)?;
+        let id = ResourceKind::Token.parse("name", &request.get_ref().name)?;
         let row = self.ledger().get_token(id).await.map_err(Error::from)?;
         let own = row.filter(|row| row.project == caller.project);
-        own.ok_or_else(|| Kind::Token.not_found(id))?;
+        own.ok_or_else(|| ResourceKind::Token.not_found(id))?;
         let row = self
             .ledger()
             .revoke_token(id, clock::now())
@@ -145,7 +145,7 @@ fn message(row: TokenRow) -> Token {
         Scope::Worker => Wire::Worker,
     };
     v1::Token {
-        name: Kind::Token.name(row.id),
+        name: ResourceKind::Token.name(row.id),
         display_name: row.display_name,
         project: row.project,
         scopes: row.scopes.iter().map(|each| scope(each).into()).collect(),

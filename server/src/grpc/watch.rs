@@ -11,7 +11,7 @@ use crate::ledger::{JobId, JobRow, JobState};
 use crate::metrics::Watching;
 use crate::service::Service;
 use crate::service::changes::{For, Heard, Listener};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::opaque_token;
 use crate::service::queue_positions;
 
@@ -67,7 +67,7 @@ pub async fn watch(
     name: &str,
     cursor: &str,
 ) -> Result<BoxStream<'static, Result<WatchJobResponse, Status>>> {
-    let id = Kind::Job.parse("name", name)?;
+    let id = ResourceKind::Job.parse("name", name)?;
     let seen = Seen::parse(id, cursor)?;
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
@@ -128,7 +128,7 @@ impl Watcher {
         let row = self.api.ledger().peek_job(self.id).await?;
         let mut row = row
             .filter(|row| row.project == self.project)
-            .ok_or_else(|| Kind::Job.not_found(self.id))?;
+            .ok_or_else(|| ResourceKind::Job.not_found(self.id))?;
         if row.state == JobState::Queued {
             row = match self.api.positions().await?.get(&self.id) {
                 Some(&position) => JobRow {

@@ -18,7 +18,7 @@ use crate::service::Service;
 use crate::service::claims::WorkerReadings;
 use crate::service::clock;
 use crate::service::completion;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::to_proto;
 
 #[tonic::async_trait]
@@ -65,12 +65,12 @@ impl WorkerService for Service {
         request: Request<CompleteJobRequest>,
     ) -> Result<Response<CompleteJobResponse>, Status> {
         let mut request = request.into_inner();
-        let id = Kind::Job.parse("name", &request.name)?;
+        let id = ResourceKind::Job.parse("name", &request.name)?;
         let lease_token = request.lease_token.clone();
         let (peak, on_device) = (request.peak_memory_bytes, request.peak_device_memory_bytes);
         // Whether the lease holds is looked at when the result is written: a worker whose answer was lost says it again.
         let job = self.ledger().get_job(id).await.map_err(Error::from)?;
-        let job = job.ok_or_else(|| Kind::Job.not_found(id))?;
+        let job = job.ok_or_else(|| ResourceKind::Job.not_found(id))?;
         let mut completion = completion::check(&job, request.clone())?;
         let told = WorkerReadings {
             readings: std::mem::take(&mut request.readings),
@@ -106,7 +106,7 @@ impl WorkerService for Service {
             peak_memory_bytes,
             peak_device_memory_bytes,
         } = request.into_inner();
-        let id = Kind::Job.parse("name", &name)?;
+        let id = ResourceKind::Job.parse("name", &name)?;
         let failure = if cancelled {
             None
         } else {
@@ -125,7 +125,7 @@ impl WorkerService for Service {
 
     async fn release_job(&self, request: Request<ReleaseJobRequest>) -> Result<Response<ReleaseJobResponse>, Status> {
         let ReleaseJobRequest { name, lease_token } = request.into_inner();
-        let id = Kind::Job.parse("name", &name)?;
+        let id = ResourceKind::Job.parse("name", &name)?;
         let released = self.ledger().release(id, &lease_token, clock::now()).await;
         self.attempt_over(&released.map_err(Error::from)?);
         Ok(Response::new(ReleaseJobResponse {}))

@@ -8,7 +8,7 @@ use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
 use crate::service::Service;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::ownership;
 use crate::service::submission::Submission;
 
@@ -51,7 +51,12 @@ impl Service {
             return Ok(ResourceRequirements::default());
         };
         if let Some(limit) = limits.max_job_memory {
-            check(&Kind::Artifact.name(scene), submission.spec.kind(), &summary, limit)?;
+            check(
+                &ResourceKind::Artifact.name(scene),
+                submission.spec.kind(),
+                &summary,
+                limit,
+            )?;
         }
         let (least, likely) = taken(submission.spec.kind(), &summary);
         let bytes = |number: u64| Some(i64::try_from(number).unwrap_or(i64::MAX));
@@ -96,7 +101,7 @@ impl Service {
             Err(StoreError::Gone { .. }) => return Ok(None),
             head => head?,
         };
-        let name = Kind::Artifact.name(id);
+        let name = ResourceKind::Artifact.name(id);
         Ok(
             guardsplat_scene::summary(Path::new(&name), &head, size).unwrap_or_else(|refusal| {
                 tracing::debug!(%refusal, "not known to be a scene");

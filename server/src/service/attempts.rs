@@ -7,7 +7,7 @@ use guardsplat_proto::v1::{Failure, Progress, ReportJobRequest, failure};
 use crate::error::{Error, Result};
 use crate::ledger::{self, FailureReason, JobResult, JobRow};
 use crate::metrics;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::violations::Violations;
 use crate::service::{Service, clock, text};
 
@@ -22,7 +22,7 @@ impl Service {
             lease_token: token,
             progress,
         } = request;
-        let id = Kind::Job.parse("name", &name)?;
+        let id = ResourceKind::Job.parse("name", &name)?;
         let stage = progress.as_ref().map(Progress::stage);
         let progress = progress.map(checked_progress).transpose()?;
         let (lease, now) = (self.limits().lease, Instant::now());

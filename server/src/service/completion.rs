@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, NewKey};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::text;
 use crate::service::upload;
 use crate::service::violations::Violations;
@@ -71,8 +71,8 @@ fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
 
 fn embed(result: EmbedResult) -> Result<Outcome> {
     let mut problems = Violations::default();
-    let scene = problems.take(Kind::Artifact.parse("embed_result.scene", &result.scene))?;
-    let comparison = problems.take(Kind::Artifact.parse("embed_result.comparison", &result.comparison))?;
+    let scene = problems.take(ResourceKind::Artifact.parse("embed_result.scene", &result.scene))?;
+    let comparison = problems.take(ResourceKind::Artifact.parse("embed_result.comparison", &result.comparison))?;
     problems.check(
         scene.is_none() || scene != comparison,
         "embed_result.comparison",
@@ -104,7 +104,7 @@ fn verify(result: VerifyResult) -> Result<Outcome> {
 
 fn key(job: &JobRow, spec: &KeySpec, output: KeyOutput) -> Result<Outcome> {
     let mut problems = Violations::default();
-    let artifact = problems.take(Kind::Artifact.parse("key_output.key_file", &output.key_file))?;
+    let artifact = problems.take(ResourceKind::Artifact.parse("key_output.key_file", &output.key_file))?;
     let told = output.key.unwrap_or_default();
     problems.check(
         told.bits == spec.bits,
@@ -129,7 +129,7 @@ fn key(job: &JobRow, spec: &KeySpec, output: KeyOutput) -> Result<Outcome> {
     // A key file that is missing was a problem above.
     let artifact = artifact.ok_or_else(|| Error::invalid("key_output.key_file", "is missing"))?;
     let result = KeyResult {
-        key: Kind::Key.name(id),
+        key: ResourceKind::Key.name(id),
         ..output.result.unwrap_or_default()
     };
     let key = NewKey {

@@ -14,7 +14,7 @@ use crate::ledger::{Failure, FailureReason, JobRow, JobSpec, KeyId, KeyRow, KeyS
 use crate::service::Service;
 use crate::service::changes::For;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::placement::described;
 use crate::service::to_proto;
 use crate::traces;
@@ -139,14 +139,14 @@ impl Service {
 
     /// The key file that a leased job needs, for whoever has the lease.
     pub(crate) async fn key_file(&self, job: &str, token: &str) -> Result<SecretSlice<u8>> {
-        let id = Kind::Job.parse("job", job)?;
+        let id = ResourceKind::Job.parse("job", job)?;
         let job = self.ledger().leased_job(id, token).await?;
         let id = needed_key(&job)?.ok_or_else(|| Error::invalid("job", "is the name of a job that needs no key"))?;
         let key = self
             .ledger()
             .get_key(id)
             .await?
-            .ok_or_else(|| Kind::Key.not_found(id))?;
+            .ok_or_else(|| ResourceKind::Key.not_found(id))?;
         if key.state == KeyState::Revoked {
             return Err(self.fail_revoked(&job, token, &key).await);
         }
@@ -162,7 +162,7 @@ impl Service {
     /// worker makes of the refusal.
     async fn fail_revoked(&self, job: &JobRow, token: &str, key: &KeyRow) -> Error {
         let refusal = Error::KeyRevoked {
-            name: Kind::Key.name(key.id),
+            name: ResourceKind::Key.name(key.id),
         };
         let failure = Failure {
             reason: FailureReason::InvalidInput,
@@ -188,5 +188,5 @@ pub(crate) fn needed_key(job: &JobRow) -> Result<Option<KeyId>> {
         JobSpec::Verify(spec) => &spec.key,
         JobSpec::CreateKey(_) => return Ok(None),
     };
-    Kind::Key.parse("job.key", name).map(Some)
+    ResourceKind::Key.parse("job.key", name).map(Some)
 }

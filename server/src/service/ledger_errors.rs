@@ -1,7 +1,7 @@
 //! What the ledger's errors mean to a caller.
 use crate::error::Error;
 use crate::ledger::LedgerError;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// SQLite's results for a database that somebody else holds for the moment, and for a full disk.
 const SQLITE_BUSY: &str = "5";
@@ -13,44 +13,44 @@ impl From<LedgerError> for Error {
     fn from(error: LedgerError) -> Self {
         match error {
             LedgerError::NotFound { kind, id } => {
-                let kind = Kind::ALL
+                let kind = ResourceKind::ALL
                     .into_iter()
                     .find(|k| k.singular() == kind)
-                    .unwrap_or(Kind::Job);
+                    .unwrap_or(ResourceKind::Job);
                 kind.not_found(id)
             }
             LedgerError::RequestIdReused(request_id) => Self::RequestIdReused { request_id },
             LedgerError::Finished { job, .. } => Self::Finished {
-                name: Kind::Job.name(job),
+                name: ResourceKind::Job.name(job),
             },
             LedgerError::NotFailed(job) => Self::NotFailed {
-                name: Kind::Job.name(job),
+                name: ResourceKind::Job.name(job),
             },
             LedgerError::LeaseLost(job) => Self::LeaseLost {
-                name: Kind::Job.name(job),
+                name: ResourceKind::Job.name(job),
             },
             LedgerError::InUse { artifact, job } => Self::InUse {
-                name: Kind::Artifact.name(artifact),
-                job: Kind::Job.name(job),
+                name: ResourceKind::Artifact.name(artifact),
+                job: ResourceKind::Job.name(job),
             },
             LedgerError::NotAnOutput(artifact) => {
-                let name = Kind::Artifact.name(artifact);
+                let name = ResourceKind::Artifact.name(artifact);
                 Self::invalid(
                     "result",
                     format!("{name} is no finished output of this attempt that may be named here"),
                 )
             }
             LedgerError::CancelNotRequested(job) => Self::NotCancelled {
-                name: Kind::Job.name(job),
+                name: ResourceKind::Job.name(job),
             },
-            LedgerError::KeyNotActive { key, state } => Self::key_not_active(Kind::Key.name(key), state),
+            LedgerError::KeyNotActive { key, state } => Self::key_not_active(ResourceKind::Key.name(key), state),
             LedgerError::KeyStateFinal { key, state, wanted } => Self::KeyStateFinal {
-                name: Kind::Key.name(key),
+                name: ResourceKind::Key.name(key),
                 state: state.word(),
                 wanted: wanted.word(),
             },
             LedgerError::PayloadsUsedUp { key, limit } => Self::PayloadsUsedUp {
-                name: Kind::Key.name(key),
+                name: ResourceKind::Key.name(key),
                 limit,
             },
             LedgerError::Database(ref cause) => match transient(cause) {

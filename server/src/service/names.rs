@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 
 /// What has a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ResourceKind {
     /// A job.
     Job,
     /// An artifact.
@@ -26,7 +26,7 @@ pub enum Kind {
     Delivery,
 }
 
-impl Kind {
+impl ResourceKind {
     /// Everything that has a name.
     pub const ALL: [Self; 9] = [
         Self::Job,
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn names_are_read_back() {
         let id = Uuid::now_v7();
-        for kind in Kind::ALL {
+        for kind in ResourceKind::ALL {
             assert_eq!(kind.parse("name", &kind.name(id)).unwrap(), id);
         }
     }
@@ -136,7 +136,7 @@ mod tests {
             "é".to_owned(),
         ];
         for name in wrong {
-            let error = Kind::Job.parse("job.name", &name).unwrap_err();
+            let error = ResourceKind::Job.parse("job.name", &name).unwrap_err();
             assert!(
                 matches!(&error, Error::Invalid(v) if v[0].field == "job.name"),
                 "{name}: {error:?}"

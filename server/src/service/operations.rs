@@ -9,13 +9,13 @@ use crate::service::clock;
 use crate::service::clock::timestamp;
 use crate::service::keys;
 use crate::service::lease;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::to_proto;
 
 impl Service {
     /// Queues a job that failed once more, if it could be carried out.
     pub(crate) async fn requeue(&self, project: &str, name: &str) -> Result<Job> {
-        let id = Kind::Job.parse("name", name)?;
+        let id = ResourceKind::Job.parse("name", name)?;
         let job = self.own_job(project, id).await?;
         if job.state != JobState::Failed {
             return Err(Error::NotFailed { name: name.to_owned() });
@@ -35,7 +35,7 @@ impl Service {
 
     /// The attempts of a job, newest first.
     pub(crate) async fn attempts(&self, project: &str, name: &str) -> Result<Vec<JobAttempt>> {
-        let id = Kind::Job.parse("name", name)?;
+        let id = ResourceKind::Job.parse("name", name)?;
         self.own_job(project, id).await?;
         let rows = self.ledger().attempts(id).await?;
         Ok(rows.into_iter().map(attempt).collect())
@@ -49,7 +49,10 @@ fn inputs(job: &JobRow) -> Result<Vec<ArtifactId>> {
         JobSpec::Verify(spec) => &spec.suspects,
         JobSpec::CreateKey(_) => &[],
     };
-    names.iter().map(|name| Kind::Artifact.parse("name", name)).collect()
+    names
+        .iter()
+        .map(|name| ResourceKind::Artifact.parse("name", name))
+        .collect()
 }
 
 /// Reasons that a list is asked for, each once and in order.

@@ -10,13 +10,13 @@ use crate::ledger::{
     OwnerId, OwnerRow,
 };
 use crate::service::Service;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 impl Service {
     pub(crate) async fn own_job(&self, project: &str, id: JobId) -> Result<JobRow> {
         let row = self.ledger().get_job(id).await?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Job.not_found(id))
+        own.ok_or_else(|| ResourceKind::Job.not_found(id))
     }
 
     /// A visible artifact, if there is one that is this project's.
@@ -27,41 +27,41 @@ impl Service {
 
     pub(crate) async fn own_artifact(&self, project: &str, id: ArtifactId) -> Result<ArtifactRow> {
         let own = self.find_artifact(project, id).await?;
-        own.ok_or_else(|| Kind::Artifact.not_found(id))
+        own.ok_or_else(|| ResourceKind::Artifact.not_found(id))
     }
 
     /// An artifact whose bytes the caller may have: one of their own project; for workers what a running job reads.
     pub(crate) async fn readable_artifact(&self, caller: &Caller, id: ArtifactId) -> Result<ArtifactRow> {
         let row = self.ledger().get_artifact(id).await?;
-        let row = row.ok_or_else(|| Kind::Artifact.not_found(id))?;
+        let row = row.ok_or_else(|| ResourceKind::Artifact.not_found(id))?;
         let works = [Scope::Embed, Scope::Verify].into_iter().any(|s| caller.scopes.has(s));
         let own = works && row.project == caller.project;
         if own || caller.scopes.has(Scope::Worker) && self.ledger().is_being_read(id).await? {
             return Ok(row);
         }
-        Err(Kind::Artifact.not_found(id))
+        Err(ResourceKind::Artifact.not_found(id))
     }
 
     pub(crate) async fn own_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {
         let row = self.ledger().get_key(id).await?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Key.not_found(id))
+        own.ok_or_else(|| ResourceKind::Key.not_found(id))
     }
 
     pub(crate) async fn own_owner(&self, project: &str, id: OwnerId) -> Result<OwnerRow> {
         let row = self.ledger().get_owner(id).await?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Owner.not_found(id))
+        own.ok_or_else(|| ResourceKind::Owner.not_found(id))
     }
 
     pub(crate) async fn own_asset(&self, project: &str, id: AssetId) -> Result<AssetRow> {
         let row = self.ledger().get_asset(id).await?;
         let own = row.filter(|row| row.project == project);
-        own.ok_or_else(|| Kind::Asset.not_found(id))
+        own.ok_or_else(|| ResourceKind::Asset.not_found(id))
     }
 
     pub(crate) async fn own_commitment(&self, project: &str, id: CommitmentId) -> Result<Signed> {
-        let missing = || Kind::Commitment.not_found(id);
+        let missing = || ResourceKind::Commitment.not_found(id);
         let signed = self.ledger().get_commitment(id).await?.ok_or_else(missing)?;
         let asset = self.ledger().get_asset(signed.commitment.asset).await?;
         let own = asset.is_some_and(|asset| asset.project == project);

@@ -12,7 +12,7 @@ use crate::ledger::queue::PRIORITIES;
 use crate::ledger::{ArtifactId, JobSpec, KeyId};
 use crate::service::claims::{self, Claim};
 use crate::service::fingerprint;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::text;
 use crate::service::violations::Violations;
 
@@ -106,8 +106,8 @@ struct Wanted {
 }
 
 fn embed(spec: &EmbedSpec, problems: &mut Violations) -> Result<Option<Wanted>> {
-    let scene = problems.take(Kind::Artifact.parse("job.embed.scene", &spec.scene))?;
-    let key = problems.take(Kind::Key.parse("job.embed.key", &spec.key))?;
+    let scene = problems.take(ResourceKind::Artifact.parse("job.embed.scene", &spec.scene))?;
+    let key = problems.take(ResourceKind::Key.parse("job.embed.key", &spec.key))?;
     let claim = problems.take(claims::of_embed(spec))?.flatten();
     problems.check(
         !spec.message.is_empty() || !spec.asset.is_empty(),
@@ -164,7 +164,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
     let (mut inputs, mut seen) = (Vec::with_capacity(count), HashSet::new());
     for (i, name) in spec.suspects.iter().enumerate() {
         let field = format!("{SUSPECTS}[{i}]");
-        let Some(id) = problems.take(Kind::Artifact.parse(&field, name))? else {
+        let Some(id) = problems.take(ResourceKind::Artifact.parse(&field, name))? else {
             continue;
         };
         if !seen.insert(id) {
@@ -172,7 +172,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
         }
         inputs.push(id);
     }
-    let key = problems.take(Kind::Key.parse("job.verify.key", &spec.key))?;
+    let key = problems.take(ResourceKind::Key.parse("job.verify.key", &spec.key))?;
     problems.check(
         spec.views <= MAX_VIEWS,
         "job.verify.views",

@@ -5,13 +5,13 @@ use guardsplat_proto::v1::job::Spec;
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactRow, Failure, JobResult, JobRow, JobSpec, JobState, KeyRow, KeyState};
 use crate::service::clock::timestamp;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// A job for the API.
 pub fn job(row: JobRow) -> v1::Job {
     let queued = row.state == JobState::Queued;
     v1::Job {
-        name: Kind::Job.name(row.id),
+        name: ResourceKind::Job.name(row.id),
         display_name: row.display_name,
         spec: Some(spec(row.spec)),
         state: state(row.state).into(),
@@ -60,26 +60,26 @@ pub fn failure(failure: Failure) -> v1::Failure {
 /// An artifact for the API.
 pub fn artifact(row: ArtifactRow) -> v1::Artifact {
     v1::Artifact {
-        name: Kind::Artifact.name(row.id),
+        name: ResourceKind::Artifact.name(row.id),
         display_name: row.display_name,
         size_bytes: row.size,
         sha256: row.sha256,
         create_time: Some(timestamp(row.create_time)),
-        job: row.job.map(|id| Kind::Job.name(id)).unwrap_or_default(),
+        job: row.job.map(|id| ResourceKind::Job.name(id)).unwrap_or_default(),
     }
 }
 
 /// A key for the API.
 pub fn key(row: KeyRow) -> v1::Key {
     v1::Key {
-        name: Kind::Key.name(row.id),
+        name: ResourceKind::Key.name(row.id),
         display_name: row.display_name,
         bits: row.bits,
         clip: row.clip,
         clip_sha256: row.clip_sha256,
         seeded: row.seeded,
         create_time: Some(timestamp(row.create_time)),
-        job: Kind::Job.name(row.job),
+        job: ResourceKind::Job.name(row.job),
         state: key_state(row.state).into(),
         state_reason: row.state_reason,
         state_time: row.state_time.map(timestamp),

@@ -140,7 +140,7 @@ fn other_colours(scene: &Scene) {
     }
     let mut kept = sh.clone();
     for (row, coefficients) in kept.coefficients.chunks_exact_mut(sh.per_gaussian()).enumerate() {
-        scene.keep(row, coefficients);
+        scene.quantize_colors(row, coefficients);
     }
     if scene.exact() {
         assert_eq!(kept, sh);

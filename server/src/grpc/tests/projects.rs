@@ -514,7 +514,7 @@ impl Server {
             let release = asking(worker, ReleaseJobRequest { name, lease_token });
             self.worker.clone().release_job(release).await.unwrap();
         }
-        let id = crate::service::names::Kind::Job.parse("name", job).unwrap();
+        let id = crate::service::names::ResourceKind::Job.parse("name", job).unwrap();
         let row = crate::ledger::JobStore::get_job(&*self.ledger(), id)
             .await
             .unwrap()

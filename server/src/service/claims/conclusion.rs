@@ -12,7 +12,7 @@ use crate::service::Service;
 use crate::service::evidence;
 use crate::service::evidence::{Facts, Files, Read};
 use crate::service::lease::needed_key;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// What a worker told besides the result.
 pub(crate) struct WorkerReadings {
@@ -59,7 +59,7 @@ impl Service {
         let json = self.keep_evidence(job.id, token, "evidence.json", signed.json.into_bytes());
         let json = json.await?;
         completion.outputs.extend([html, json]);
-        let [evidence_html, evidence_json] = [html, json].map(|id| Kind::Artifact.name(id));
+        let [evidence_html, evidence_json] = [html, json].map(|id| ResourceKind::Artifact.name(id));
         match &mut completion.result {
             JobResult::Embed(result) => {
                 (result.evidence_html, result.evidence_json) = (evidence_html, evidence_json);
@@ -75,7 +75,7 @@ impl Service {
     async fn key_of(&self, job: &JobRow) -> Result<KeyRow> {
         let id = needed_key(job)?.ok_or_else(|| Error::internal("finding a job's key", "it names none"))?;
         let key = self.ledger().get_key(id).await?;
-        key.ok_or_else(|| Kind::Key.not_found(id))
+        key.ok_or_else(|| ResourceKind::Key.not_found(id))
     }
 
     async fn verified(
@@ -181,8 +181,12 @@ fn answered(read: VerifyResult, decided: &Decided, framings: usize) -> VerifyRes
         framings: framings as u32,
         assets: decided.tried.assets,
         framing: best.as_ref().map(|best| best.hypothesis.clone()).unwrap_or_default(),
-        asset: matched.map(|best| Kind::Asset.name(best.asset.id)).unwrap_or_default(),
-        owner: matched.map(|best| Kind::Owner.name(best.owner.id)).unwrap_or_default(),
+        asset: matched
+            .map(|best| ResourceKind::Asset.name(best.asset.id))
+            .unwrap_or_default(),
+        owner: matched
+            .map(|best| ResourceKind::Owner.name(best.owner.id))
+            .unwrap_or_default(),
         payload_number: payload.map(|(payload, _)| payload.number.into()),
         corrected_bits: payload.map(|(_, corrected)| *corrected),
         ..read

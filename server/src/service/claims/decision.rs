@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{AssetId, AssetRow, Candidate, KeyRow, OwnerRow, candidates};
 use crate::marks::{self, CODE};
 use crate::service::Service;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// A claim that was decided.
 pub struct Decided {
@@ -111,7 +111,7 @@ impl Service {
         };
         if let Claim::Asset(id) = claim {
             let asset = self.ledger().candidate(*id).await?;
-            add(&asset.ok_or_else(|| Kind::Asset.not_found(*id))?)?;
+            add(&asset.ok_or_else(|| ResourceKind::Asset.not_found(*id))?)?;
         } else {
             let mut all = std::pin::pin!(candidates::of_key(self.ledger(), key.id));
             while let Some(asset) = all.try_next().await? {
@@ -131,12 +131,12 @@ impl Service {
     async fn best(&self, key: &KeyRow, id: AssetId) -> Result<Best> {
         let candidate = self.ledger().candidate(id).await?;
         let asset = self.ledger().get_asset(id).await?;
-        let (candidate, asset) = candidate.zip(asset).ok_or_else(|| Kind::Asset.not_found(id))?;
+        let (candidate, asset) = candidate.zip(asset).ok_or_else(|| ResourceKind::Asset.not_found(id))?;
         let owner = self.ledger().get_owner(asset.owner).await?;
-        let owner = owner.ok_or_else(|| Kind::Owner.not_found(asset.owner))?;
+        let owner = owner.ok_or_else(|| ResourceKind::Owner.not_found(asset.owner))?;
         let mark = marks::mark(self.master(), key.id, &candidate)?;
         let target = Target {
-            id: Kind::Asset.name(id),
+            id: ResourceKind::Asset.name(id),
             word: mark.word,
             pad: Some(mark.pad),
         };
@@ -148,7 +148,7 @@ impl Service {
 fn unmarkable(key: &KeyRow, rate: f64) -> Decided {
     let reason = format!(
         "{} has {} bits, and assets are marked with {}: no asset of it can have been marked",
-        Kind::Key.name(key.id),
+        ResourceKind::Key.name(key.id),
         key.bits,
         marks::bits()
     );

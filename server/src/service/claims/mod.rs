@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
 use crate::marks;
 use crate::service::Service;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::submission::Submission;
 use crate::service::upload;
 use crate::service::violations::Violations;
@@ -32,7 +32,7 @@ pub enum Claim {
 pub fn of_embed(spec: &EmbedSpec) -> Result<Option<Claim>> {
     match spec.asset.as_str() {
         "" => Ok(None),
-        name => Kind::Asset
+        name => ResourceKind::Asset
             .parse("job.embed.asset", name)
             .map(|id| Some(Claim::Asset(id))),
     }
@@ -52,11 +52,11 @@ pub fn of_verify(spec: &VerifySpec) -> Result<Option<Claim>> {
     }
     let asset = match spec.asset.as_str() {
         "" => None,
-        name => problems.take(Kind::Asset.parse("job.verify.asset", name))?,
+        name => problems.take(ResourceKind::Asset.parse("job.verify.asset", name))?,
     };
     let owner = match spec.owner.as_str() {
         "" => None,
-        name => problems.take(Kind::Owner.parse("job.verify.owner", name))?,
+        name => problems.take(ResourceKind::Owner.parse("job.verify.owner", name))?,
     };
     problems.finish()?;
     let search = spec.search.then_some(Claim::Search);
@@ -94,7 +94,10 @@ impl Service {
         };
         let asset = self.own_asset(project, id).await?;
         if asset.key != key.id {
-            let reason = format!("was registered for {}, not for this key", Kind::Key.name(asset.key));
+            let reason = format!(
+                "was registered for {}, not for this key",
+                ResourceKind::Key.name(asset.key)
+            );
             return Err(Error::invalid(field, reason));
         }
         if submission.spec.kind() != JobKind::Embed {
@@ -131,9 +134,9 @@ impl Service {
         let Some(Claim::Asset(id)) = of_embed(spec)? else {
             return Ok(None);
         };
-        let key = Kind::Key.parse("job.embed.key", &spec.key)?;
+        let key = ResourceKind::Key.parse("job.embed.key", &spec.key)?;
         let asset = self.ledger().candidate(id).await?;
-        let asset = asset.ok_or_else(|| Kind::Asset.not_found(id))?;
+        let asset = asset.ok_or_else(|| ResourceKind::Asset.not_found(id))?;
         Ok(Some(marks::mark(self.master(), key, &asset)?.word.to_string()))
     }
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobId, JobRow, JobSpec, NewArtifact, Origin};
 use crate::service::Service;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// Files with what they are for.
 pub struct Files {
@@ -45,9 +45,9 @@ impl Files {
 }
 
 async fn input(api: &Service, field: &str, name: &str, role: Role) -> Result<Input> {
-    let id = Kind::Artifact.parse(field, name)?;
+    let id = ResourceKind::Artifact.parse(field, name)?;
     let row = api.ledger().get_any_artifact(id).await?;
-    let row = row.ok_or_else(|| Kind::Artifact.not_found(id))?;
+    let row = row.ok_or_else(|| ResourceKind::Artifact.not_found(id))?;
     Ok(Input {
         role,
         name: Some(row.display_name).filter(|name| !name.is_empty()),

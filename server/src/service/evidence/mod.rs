@@ -13,7 +13,7 @@ use crate::ledger::{JobRow, KeyRow};
 use crate::marks::{self, CODE};
 use crate::service::claims::Decided;
 use crate::service::clock;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::text;
 use crate::service::upload;
 pub(crate) use files::Files;
@@ -82,7 +82,7 @@ impl Facts<'_> {
             version: VERSION,
             audience: Audience::Owner,
             kind,
-            job: Kind::Job.name(self.job.id),
+            job: ResourceKind::Job.name(self.job.id),
             started: timestamp(started)?,
             // A clock that was set back can't make it end before it began.
             finished: timestamp(clock::now().max(started))?,
@@ -93,7 +93,7 @@ impl Facts<'_> {
                 sha256: hash(&self.key.clip_sha256)?,
             },
             key: Key {
-                id: Kind::Key.name(self.key.id),
+                id: ResourceKind::Key.name(self.key.id),
             },
             inputs: files.inputs,
             verification: None,

@@ -6,7 +6,7 @@ use guardsplat_evidence::{Bit, Found, HypothesisGroup, Reason, Tried, Verificati
 use super::{Decided, payload};
 use crate::error::Result;
 use crate::ledger::KeyRow;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 
 /// A claim that was decided, with how it was read.
 pub struct Read<'a> {
@@ -70,8 +70,8 @@ impl Read<'_> {
             display_name => format!("{display_name} ({name})"),
         };
         Ok(Some(Found {
-            owner: named(&best.owner.display_name, Kind::Owner.name(best.owner.id)),
-            asset: named(&best.asset.display_name, Kind::Asset.name(best.asset.id)),
+            owner: named(&best.owner.display_name, ResourceKind::Owner.name(best.owner.id)),
+            asset: named(&best.asset.display_name, ResourceKind::Asset.name(best.asset.id)),
             payload: Some(payload(key, best.asset.payload)?),
         }))
     }

@@ -9,7 +9,7 @@ use crate::ledger::{ArtifactId, AssetFilter, AssetRow, KeyId, NewAsset, OwnerId}
 use crate::notary;
 use crate::service::Service;
 use crate::service::clock::{self, timestamp};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::ownership;
 use crate::service::page;
 use crate::service::submission;
@@ -75,11 +75,12 @@ impl Service {
             None => None,
         };
         let same = before.filter(|row| row.artifact == Some(id) && row.project == project);
-        same.map(|row| row.sha256).ok_or_else(|| Kind::Artifact.not_found(id))
+        same.map(|row| row.sha256)
+            .ok_or_else(|| ResourceKind::Artifact.not_found(id))
     }
 
     pub(crate) async fn asset(&self, project: &str, name: &str) -> Result<Asset> {
-        let id = Kind::Asset.parse("name", name)?;
+        let id = ResourceKind::Asset.parse("name", name)?;
         Ok(message(self.own_asset(project, id).await?))
     }
 
@@ -89,13 +90,13 @@ impl Service {
         request: &ListAssetsRequest,
     ) -> Result<ListAssetsResponse> {
         let size = page::size(request.page_size)?;
-        let given = |kind: Kind, field, name: &str| match name {
+        let given = |kind: ResourceKind, field, name: &str| match name {
             "" => Ok(None),
             name => kind.parse(field, name).map(Some),
         };
         let filter = AssetFilter {
-            owner: given(Kind::Owner, "owner", &request.owner)?,
-            key: given(Kind::Key, "key", &request.key)?,
+            owner: given(ResourceKind::Owner, "owner", &request.owner)?,
+            key: given(ResourceKind::Key, "key", &request.key)?,
         };
         let query: [&[u8]; 3] = [b"assets", request.owner.as_bytes(), request.key.as_bytes()];
         let before = page::position(&query, &request.page_token)?;
@@ -114,7 +115,7 @@ fn checked(request: CreateAssetRequest) -> Result<Registration> {
     let asset = asset.ok_or_else(|| Error::invalid("asset", "is missing"))?;
     let mut problems = Violations::default();
     let request_id = problems.take(submission::request_id(&request_id))?.flatten();
-    let owner = problems.take(Kind::Owner.parse("asset.owner", &asset.owner))?;
+    let owner = problems.take(ResourceKind::Owner.parse("asset.owner", &asset.owner))?;
     problems.take(text::display_name("asset.display_name", &asset.display_name))?;
     let original = match &asset.original {
         Some(Original::Sha256(digits)) => {
@@ -123,14 +124,14 @@ fn checked(request: CreateAssetRequest) -> Result<Registration> {
             hash
         }
         Some(Original::Artifact(name)) => problems
-            .take(Kind::Artifact.parse("asset.artifact", name))?
+            .take(ResourceKind::Artifact.parse("asset.artifact", name))?
             .map(Source::Artifact),
         None => {
             problems.add("asset.original", "is missing, one of sha256 and artifact must be set");
             None
         }
     };
-    let key = problems.take(Kind::Key.parse("asset.key", &asset.key))?;
+    let key = problems.take(ResourceKind::Key.parse("asset.key", &asset.key))?;
     for (field, empty) in [
         ("asset.name", asset.name.is_empty()),
         ("asset.payload_number", asset.payload_number == 0),
@@ -155,13 +156,13 @@ fn checked(request: CreateAssetRequest) -> Result<Registration> {
 
 fn message(row: AssetRow) -> Asset {
     Asset {
-        name: Kind::Asset.name(row.id),
-        owner: Kind::Owner.name(row.owner),
+        name: ResourceKind::Asset.name(row.id),
+        owner: ResourceKind::Owner.name(row.owner),
         display_name: row.display_name,
         original: Some(Original::Sha256(hex::encode(row.sha256))),
-        key: Kind::Key.name(row.key),
+        key: ResourceKind::Key.name(row.key),
         payload_number: row.payload,
-        commitment: Kind::Commitment.name(row.commitment),
+        commitment: ResourceKind::Commitment.name(row.commitment),
         create_time: Some(timestamp(row.create_time)),
     }
 }

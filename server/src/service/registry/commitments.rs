@@ -6,7 +6,7 @@ use uuid::Uuid;
 use crate::error::{Error, Result};
 use crate::service::Service;
 use crate::service::clock::timestamp;
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::page;
 
 /// What page tokens of this list are bound to.
@@ -14,7 +14,7 @@ const QUERY: &[&[u8]] = &[b"commitments"];
 
 impl Service {
     pub(crate) async fn commitment(&self, project: &str, name: &str) -> Result<Signed> {
-        let id = Kind::Commitment.parse("name", name)?;
+        let id = ResourceKind::Commitment.parse("name", name)?;
         self.own_commitment(project, id).await
     }
 
@@ -37,7 +37,7 @@ impl Service {
     pub(crate) async fn head(&self, project: &str) -> Result<Commitment> {
         let head = self.ledger().head(project).await?;
         // The chain itself has no name; none has this id.
-        let head = head.ok_or_else(|| Kind::Commitment.not_found(Uuid::nil()))?;
+        let head = head.ok_or_else(|| ResourceKind::Commitment.not_found(Uuid::nil()))?;
         Ok(to_proto(&head))
     }
 
@@ -64,13 +64,13 @@ impl Service {
 pub(crate) fn to_proto(signed: &Signed) -> Commitment {
     let commitment = &signed.commitment;
     Commitment {
-        name: Kind::Commitment.name(commitment.id),
+        name: ResourceKind::Commitment.name(commitment.id),
         sequence: sequence(signed),
         previous_hash: hex::encode(commitment.previous),
-        asset: Kind::Asset.name(commitment.asset),
-        owner: Kind::Owner.name(commitment.owner),
+        asset: ResourceKind::Asset.name(commitment.asset),
+        owner: ResourceKind::Owner.name(commitment.owner),
         sha256: hex::encode(commitment.sha256),
-        key: Kind::Key.name(commitment.key),
+        key: ResourceKind::Key.name(commitment.key),
         payload_number: i64::try_from(commitment.payload).unwrap_or(i64::MAX),
         nonce_hash: hex::encode(commitment.nonce_hash),
         commit_time: Some(timestamp(commitment.time)),

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{NewOwner, OwnerRow};
 use crate::service::Service;
 use crate::service::clock::{self, timestamp};
-use crate::service::names::Kind;
+use crate::service::names::ResourceKind;
 use crate::service::ownership;
 use crate::service::page;
 use crate::service::submission;
@@ -30,7 +30,7 @@ impl Service {
     }
 
     pub(crate) async fn owner(&self, project: &str, name: &str) -> Result<Owner> {
-        let id = Kind::Owner.parse("name", name)?;
+        let id = ResourceKind::Owner.parse("name", name)?;
         Ok(message(self.own_owner(project, id).await?))
     }
 
@@ -71,7 +71,7 @@ fn checked(request: CreateOwnerRequest) -> Result<(String, Option<Uuid>)> {
 
 fn message(row: OwnerRow) -> Owner {
     Owner {
-        name: Kind::Owner.name(row.id),
+        name: ResourceKind::Owner.name(row.id),
         display_name: row.display_name,
         create_time: Some(timestamp(row.create_time)),
     }
