@@ -3,7 +3,7 @@
 # made and a sample scene marked through the client, renders the scene before and after, verifies both, as scenes and as
 # pictures, and stops the server.
 #
-#   deploy/quickstart.sh [--preset draft|standard|paper] [--device auto|wgpu|cpu] [OUT]
+#   deploy/quickstart.sh [--preset draft|standard|thorough|paper] [--device auto|wgpu|cpu] [OUT]
 #
 # OUT is the folder for everything that is made, ./quickstart-out unless given; the server keeps its data in OUT/data.
 # Exits with 0 when the marked scene is recognised and the unmarked one is not, and with 1 otherwise.
