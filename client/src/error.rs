@@ -75,7 +75,7 @@ pub enum Error {
     JobCancelled { job: String },
     /// One that the last line of JSON has said already.
     #[error("{0}")]
-    Told(Box<Error>),
+    AlreadyReported(Box<Error>),
     /// Ctrl-C.
     #[error("interrupted{after}")]
     Interrupted { job: Option<String>, after: String },
@@ -112,7 +112,7 @@ impl Error {
     /// Tells people, and programs where they asked for it.
     pub fn tell(&self, json: bool) {
         say(&format!("error: {self}"));
-        if json && !matches!(self, Self::Told(_)) {
+        if json && !matches!(self, Self::AlreadyReported(_)) {
             print_json_line(&self.document());
         }
     }
@@ -133,7 +133,7 @@ impl Error {
     /// Why, in one word, for a trace: also where programs are told more.
     pub fn reason(&self) -> String {
         match self {
-            Self::Told(error) => error.reason(),
+            Self::AlreadyReported(error) => error.reason(),
             Self::Refused { status, .. } => self.word().unwrap_or_else(|| Details::from(&**status).code),
             // What OpenTelemetry calls what has no name of its own.
             _ => self.word().unwrap_or_else(|| "_OTHER".into()),

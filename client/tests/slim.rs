@@ -1,8 +1,9 @@
-//! Client and server are slim: what computes on an accelerator is not even in their dependency trees.
+//! Dependencies point one way: what computes on an accelerator is not in the trees of client and server, and nothing of a
+//! service is in the engine's.
 use std::process::Command;
 
 /// Packages that only what computes may need.
-const HEAVY: [&str; 7] = ["burn", "cubecl", "wgpu", "naga", "ash", "guardsplat-worker", "cudarc"];
+const HEAVY: [&str; 7] = ["burn", "cubecl", "wgpu", "naga", "ash", "guardsplat-engine", "cudarc"];
 
 /// Names of all packages that `package` is built from.
 fn dependencies(package: &str) -> Vec<String> {
@@ -54,7 +55,23 @@ fn the_server_is_slim() {
 #[test]
 fn the_worker_would_be_noticed() {
     let found = dependencies("guardsplat-worker");
-    for name in ["burn", "cubecl", "wgpu", "guardsplat-worker"] {
+    for name in ["burn", "cubecl", "wgpu", "guardsplat-engine"] {
         assert!(heavy(&found).iter().any(|found| *found == name), "{name}");
+    }
+}
+
+#[test]
+fn the_engine_knows_no_service() {
+    let found = dependencies("guardsplat-engine");
+    for name in [
+        "tonic",
+        "prost",
+        "tokio",
+        "hyper",
+        "clap",
+        "guardsplat-proto",
+        "guardsplat-evaluation",
+    ] {
+        assert!(!found.iter().any(|found| found == name), "{name}");
     }
 }

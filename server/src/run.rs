@@ -162,7 +162,7 @@ impl Server {
         let watched = Watched {
             ledger: self.ledger.clone(),
             store: self.store,
-            workers: self.api.alive(),
+            workers: self.api.workers(),
             metrics: self.api.metrics(),
         };
         let (mut health, health_service) = Health::start(watched, health::EVERY).await;
@@ -284,7 +284,7 @@ fn limits(settings: &Settings) -> Limits {
         abandoned_after: settings.abandoned_after(),
         hooks: rules(settings),
         signed_url: Some(Duration::from_secs(settings.signed_url_seconds)).filter(|time| !time.is_zero()),
-        keep: RetentionPolicy {
+        retention: RetentionPolicy {
             uploads: days(settings.keep_uploads_days),
             outputs: days(settings.keep_outputs_days),
             jobs: days(settings.keep_jobs_days),

@@ -161,7 +161,7 @@ fn outcome(context: &Context, job: Job) -> Result<Exit> {
     let job = match succeeded(job) {
         // The last line of the JSON says so already, and one document a message was promised.
         Err(error @ (Error::JobFailed { .. } | Error::JobCancelled { .. })) if context.json => {
-            return Err(Error::Told(Box::new(error)));
+            return Err(Error::AlreadyReported(Box::new(error)));
         }
         other => other?,
     };

@@ -4,7 +4,7 @@
 //! Binomial(n, 1/2) for whoever lacks the pad, whatever the decoder's bias or the correlation between bits. Views of one
 //! scene are one word: counting them as more bits is wrong by many orders of magnitude.
 use crate::error::{Error, Result};
-use crate::message::MAX_BITS;
+use crate::limits::MAX_BITS;
 
 /// P(Bin(`n`, 1/2) >= `k`), with a relative error below 1e-13 down to the smallest value, 2^-150; 0 for `k` above `n`.
 ///

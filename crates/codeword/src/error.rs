@@ -1,5 +1,5 @@
 //! Everything that can go wrong with words and claims, by what happened.
-use crate::message::MAX_BITS;
+use crate::limits::{MAX_BITS, VERSION};
 
 /// Result of operations on words and claims.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -41,7 +41,7 @@ pub enum Error {
         limit: u64,
     },
     /// A payload was packed by rules that are not known here.
-    #[error("payload: version {version} is not {}", crate::payload::VERSION)]
+    #[error("payload: version {version} is not {VERSION}")]
     UnknownVersion {
         /// The version found.
         version: u8,

@@ -7,9 +7,7 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-
-/// Most bits that a message can have: what the token tables of keys have room for.
-pub const MAX_BITS: u32 = 150;
+use crate::limits::MAX_BITS;
 
 /// Limbs of 64 bits that hold [`MAX_BITS`].
 pub(crate) const LIMBS: usize = MAX_BITS.div_ceil(64) as usize;

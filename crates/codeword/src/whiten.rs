@@ -6,9 +6,10 @@ use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 
 use crate::code::Code;
+use crate::code::Payload;
 use crate::error::{Error, Result};
-use crate::message::{MAX_BITS, Message, MessageLength};
-use crate::payload::Payload;
+use crate::limits::MAX_BITS;
+use crate::message::{Message, MessageLength};
 
 /// Fewest bytes of a nonce.
 pub const NONCE_BYTES: usize = 16;

@@ -2,7 +2,7 @@
 use crate::error::{Error, Result};
 use crate::evidence::{Evidence, SCHEMA, VERSION};
 use crate::limits::JSON_BYTES;
-use crate::sign::Signature;
+use crate::signature::Signature;
 use serde::{Deserialize, Serialize};
 
 /// A report with its signature, as it is kept in a file.

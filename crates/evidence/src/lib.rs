@@ -15,6 +15,7 @@ pub mod limits;
 mod picture;
 mod recompute;
 mod sign;
+mod signature;
 mod stranger;
 mod tried;
 mod validate;

@@ -4,8 +4,8 @@ use crate::evidence::Evidence;
 use crate::hash::{Sha256, bytes_of_hex};
 use crate::html;
 use crate::json::{SignedFile, canonical};
+use crate::signature::Signature;
 use ed25519_dalek::{Signer, SigningKey, VerifyingKey};
-use serde::{Deserialize, Serialize};
 
 /// The only algorithm.
 const ALGORITHM: &str = "ed25519";
@@ -20,17 +20,6 @@ pub struct Signed {
     pub json: String,
     /// The page: the same JSON, the pictures, and all of it in words.
     pub html: String,
-}
-
-/// The signature of a report, with the public key of whoever signed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Signature {
-    algorithm: String,
-    /// 32 bytes in hexadecimal.
-    pub public_key: String,
-    /// 64 bytes in hexadecimal.
-    pub value: String,
 }
 
 /// Which of the two documents a signature is for, so that one never passes as the other.

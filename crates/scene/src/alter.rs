@@ -1,6 +1,6 @@
 //! What strangers do to a scene: leave Gaussians out, drop bands of colour, add noise. Each gives a new scene; rows that
 //! stay keep their order, and the same arguments give the same bytes.
-use crate::scene::bad;
+use crate::error::bad;
 use crate::{Gaussians, Result, Sh};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,5 @@
 //! Everything that can go wrong with scene files, by what happened.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Result of operations on scene files.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -30,5 +30,17 @@ impl Error {
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { path, source }
+    }
+}
+
+/// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
+/// a format whose files may begin in any way.
+pub(crate) const UNKNOWN: &str =
+    "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG or a .splat, since ";
+
+pub(crate) fn bad(path: &Path, reason: String) -> Error {
+    Error::BadScene {
+        path: path.into(),
+        reason,
     }
 }

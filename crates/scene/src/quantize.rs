@@ -6,9 +6,9 @@
 //! Groups of a changed scene follow its changes a little: of independent noise of 0.02 on the harmonics of a captured
 //! scene (101,407 Gaussians, degree 3) files keep 73 % and the stand-in 62 %.
 use crate::convert::{check_arrays, morton, packed, sog, splat, spz};
+use crate::error::bad;
 use crate::packed::{CHUNK, rest};
 use crate::range::Range;
-use crate::scene::bad;
 use crate::spz::colour;
 use crate::{Error, Format, Gaussians, Result};
 use std::path::Path;

@@ -1,5 +1,5 @@
 //! The bytes that a source still has.
-use crate::scene::bad;
+use crate::error::bad;
 use crate::{Error, Result};
 use std::io::{BufReader, Read};
 use std::path::Path;

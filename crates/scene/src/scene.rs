@@ -1,6 +1,7 @@
 //! A scene and the file it came from, whatever its format.
 use crate::atomic_write::write_whole;
 use crate::container::{Container, Format};
+use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::sniff::announced;
@@ -9,11 +10,6 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
-
-/// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
-/// a format whose files may begin in any way.
-pub(crate) const UNKNOWN: &str =
-    "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG or a .splat, since ";
 
 /// A scene: what the engine computes with, and the file it came from.
 #[derive(Clone, Debug)]
@@ -184,12 +180,5 @@ impl Scene {
         if let Some(source) = &self.source {
             source.quantize_colors(row, coefficients);
         }
-    }
-}
-
-pub(crate) fn bad(path: &Path, reason: String) -> Error {
-    Error::BadScene {
-        path: path.into(),
-        reason,
     }
 }

@@ -1,7 +1,8 @@
 //! Which format a file is of, told by its first bytes and never by its name.
 use crate::container::Format;
+use crate::error::bad;
 use crate::ignored::BadRows;
-use crate::scene::bad;
+use crate::summary::Summary;
 use crate::{Error, Result, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -73,6 +74,22 @@ impl Format {
         let mut source = BufReader::new(head.chain(file));
         splat::read(path, &mut source, metadata.len(), BadRows::Ignore).map(|_| Format::Splat)
     }
+}
+
+/// What `head` says, the first [`HEAD`](crate::HEAD) bytes of a file of `size` bytes, or all of a smaller one; `name` is for
+/// messages. `None` where it says nothing: a SOG has its figures anywhere.
+///
+/// # Errors
+/// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read_with`](crate::Scene::read_with) would refuse after
+/// as many bytes, bad rows being ignored: not a scene, or one that is shorter than its header promises.
+pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
+    let said = match head {
+        _ if ply::begins(head) => ply::summary(head, size),
+        _ if spz::is_spz(head) => spz::summary(head, size),
+        _ if sog::detect(head) => return Ok(None),
+        _ => splat::summary(head, size),
+    };
+    said.map(Some).map_err(|reason| bad(name, reason))
 }
 
 #[cfg(test)]

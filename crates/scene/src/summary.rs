@@ -1,9 +1,6 @@
 //! What the first bytes of a file tell of a scene, and of the memory that it will take: enough to refuse one that is too
 //! large before it is read, or queued.
 use crate::container::Format;
-use crate::scene::bad;
-use crate::{Result, ply, sog, splat, spz};
-use std::path::Path;
 
 /// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
 const GEOMETRY: u64 = 11;
@@ -21,22 +18,6 @@ pub struct Summary {
     pub degree: u64,
     /// Bytes that are in memory of the file once it is read, uncompressed, at least.
     pub file: u64,
-}
-
-/// What `head` says, the first [`HEAD`](crate::HEAD) bytes of a file of `size` bytes, or all of a smaller one; `name` is for
-/// messages. `None` where it says nothing: a SOG has its figures anywhere.
-///
-/// # Errors
-/// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read_with`](crate::Scene::read_with) would refuse after
-/// as many bytes, bad rows being ignored: not a scene, or one that is shorter than its header promises.
-pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
-    let said = match head {
-        _ if ply::begins(head) => ply::summary(head, size),
-        _ if spz::is_spz(head) => spz::summary(head, size),
-        _ if sog::detect(head) => return Ok(None),
-        _ => splat::summary(head, size),
-    };
-    said.map(Some).map_err(|reason| bad(name, reason))
 }
 
 impl Summary {
@@ -84,9 +65,10 @@ fn coefficients(degree: u64) -> u64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::HEAD;
     use crate::testing::scene_path;
     use crate::{Error, Scene};
+    use crate::{HEAD, summary};
+    use std::path::Path;
 
     /// Holds the summary of a file that was read against its scene. The files that other tests read come by here.
     pub(crate) fn agrees(bytes: &[u8], scene: &Scene) {

@@ -87,13 +87,13 @@ impl ArtifactService for Service {
 
     async fn get_artifact(&self, request: Request<GetArtifactRequest>) -> Result<Response<Artifact>, Status> {
         let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
-        let row = self.own_artifact(&caller(&request)?.project, id).await?;
+        let row = self.owned_artifact(&caller(&request)?.project, id).await?;
         Ok(Response::new(to_proto::artifact(row)))
     }
 
     async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
         let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
-        let row = self.own_artifact(&caller(&request)?.project, id).await?;
+        let row = self.owned_artifact(&caller(&request)?.project, id).await?;
         self.ledger()
             .delete_artifact(row.id, clock::now())
             .await

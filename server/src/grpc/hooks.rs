@@ -55,7 +55,7 @@ impl HookService for Service {
 
     async fn get_hook(&self, request: Request<GetHookRequest>) -> Result<Response<Hook>, Status> {
         let project = caller(&request)?.project;
-        let row = self.own_hook(&project, "name", &request.get_ref().name).await?;
+        let row = self.owned_hook(&project, "name", &request.get_ref().name).await?;
         Ok(Response::new(hook(row)))
     }
 
@@ -77,7 +77,9 @@ impl HookService for Service {
 
     async fn delete_hook(&self, request: Request<DeleteHookRequest>) -> Result<Response<()>, Status> {
         let caller = caller(&request)?;
-        let row = self.own_hook(&caller.project, "name", &request.get_ref().name).await?;
+        let row = self
+            .owned_hook(&caller.project, "name", &request.get_ref().name)
+            .await?;
         self.ledger().delete_hook(row.id).await.map_err(Error::from)?;
         tracing::info!(hook = %row.id, project = row.project, by = ?caller.token, "hook deleted");
         Ok(Response::new(()))
@@ -93,7 +95,7 @@ impl HookService for Service {
         let filter = DeliveryFilter {
             hook: match request.hook.as_str() {
                 "" => None,
-                name => Some(self.own_hook(&project, "hook", name).await?.id),
+                name => Some(self.owned_hook(&project, "hook", name).await?.id),
             },
             state: state_of(request.state)?,
         };
@@ -124,7 +126,7 @@ impl HookService for Service {
 }
 
 impl Service {
-    async fn own_hook(&self, project: &str, field: &str, name: &str) -> Result<HookRow> {
+    async fn owned_hook(&self, project: &str, field: &str, name: &str) -> Result<HookRow> {
         let id = ResourceKind::Hook.parse(field, name)?;
         let row = self.ledger().get_hook(id).await?;
         let own = row.filter(|row| row.project == project);

@@ -29,8 +29,8 @@ impl JobService for Service {
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
         let id = ResourceKind::Job.parse("name", &request.get_ref().name)?;
-        let row = self.own_job(&caller(&request)?.project, id).await?;
-        Ok(Response::new(self.told(row).await?))
+        let row = self.owned_job(&caller(&request)?.project, id).await?;
+        Ok(Response::new(self.describe_job(row).await?))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
@@ -41,7 +41,7 @@ impl JobService for Service {
     async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<Job>, Status> {
         let caller = caller(&request)?;
         let id = ResourceKind::Job.parse("name", &request.get_ref().name)?;
-        let job = self.own_job(&caller.project, id).await?;
+        let job = self.owned_job(&caller.project, id).await?;
         caller.must(ownership::scope_of(job.kind()))?;
         let row = self.ledger().cancel_job(id, clock::now()).await.map_err(Error::from)?;
         // A running job ends when its worker has heard of it.
@@ -55,7 +55,7 @@ impl JobService for Service {
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
         let caller = caller(&request)?;
-        let place = self.places().take(payer(&caller), self.limits().max_watches)?;
+        let place = self.watch_limit().take(payer(&caller), self.limits().max_watches)?;
         let WatchJobRequest { name, cursor } = request.into_inner();
         let watching = watch::watch(self.clone(), caller.project, &name, &cursor).await?;
         let kept = move |message| {

@@ -22,7 +22,7 @@ const QUERY: &[&[u8]] = &[b"keys"];
 impl KeyService for Service {
     async fn get_key(&self, request: Request<GetKeyRequest>) -> Result<Response<Key>, Status> {
         let id = ResourceKind::Key.parse("name", &request.get_ref().name)?;
-        let row = self.own_key(&caller(&request)?.project, id).await?;
+        let row = self.owned_key(&caller(&request)?.project, id).await?;
         Ok(Response::new(to_proto::key(row)))
     }
 
@@ -44,7 +44,7 @@ impl KeyService for Service {
     async fn update_key_state(&self, request: Request<UpdateKeyStateRequest>) -> Result<Response<Key>, Status> {
         let project = caller(&request)?.project;
         let (id, next, reason) = checked(request.into_inner())?;
-        self.own_key(&project, id).await?;
+        self.owned_key(&project, id).await?;
         let updated = self.ledger().update_key_state(id, next, &reason, clock::now()).await;
         let row = updated.map_err(Error::from)?;
         tracing::info!(key = %id, state = row.state.word(), reason = row.state_reason, "state of a key");

@@ -71,7 +71,7 @@ pub async fn watch(
     let seen = Seen::parse(id, cursor)?;
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
-    let known = api.own_job(&project, id).await?;
+    let known = api.owned_job(&project, id).await?;
     let (metrics, stall) = (api.metrics(), api.limits().watch_stall);
     let watcher = Watcher {
         _watching: metrics.watching(),
@@ -136,7 +136,7 @@ impl Watcher {
                     ..row
                 },
                 // It came, or came back, after they were counted.
-                None => self.api.own_job(&self.project, self.id).await?,
+                None => self.api.owned_job(&self.project, self.id).await?,
             };
         }
         self.read = read;
@@ -152,7 +152,7 @@ impl Watcher {
             let (seen, state) = (Seen::of(&row), row.state);
             let before = self.seen.replace(seen);
             self.over = state.is_over();
-            let job = self.api.told(row.clone()).await?;
+            let job = self.api.describe_job(row.clone()).await?;
             // No part of the cursor: whoever comes back is told of it once more.
             let waits = self.waits.replace(!job.waiting_reason.is_empty());
             if before != Some(seen) || waits.is_some_and(|waits| waits == job.waiting_reason.is_empty()) {

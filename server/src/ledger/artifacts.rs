@@ -3,7 +3,7 @@ use super::Result;
 use super::types::{ArtifactId, ArtifactRow, NewArtifact};
 
 /// The artifacts of all projects; their bytes are in the store.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait ArtifactLedger: Send + Sync + 'static {
     /// Announces an artifact whose bytes are about to be stored at `path`.
     ///

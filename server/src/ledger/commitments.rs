@@ -14,7 +14,7 @@ pub struct SealedSigningKey {
 }
 
 /// The chain of signed commitments to assets.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait CommitmentLog: Send + Sync + 'static {
     /// The key that commitments are signed with; none before the first start.
     async fn signing_key(&self) -> Result<Option<SealedSigningKey>>;

@@ -203,7 +203,7 @@ impl fmt::Debug for Sending {
 }
 
 /// What the service keeps of hooks.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait HookLedger: Send + Sync + 'static {
     /// Keeps a hook. It is told of jobs that are over from then on.
     async fn create_hook(&self, new: NewHook, now: i64) -> Result<HookRow>;

@@ -54,7 +54,7 @@ pub struct AttemptRow {
 }
 
 /// The jobs of all projects.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait JobStore: Send + Sync + 'static {
     /// Queues a job. The same request id with the same request gives the job that the first call made. Requests are the
     /// same if kind, spec and display name are, whatever has become of the artifacts in them, or if fingerprints are:

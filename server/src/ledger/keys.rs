@@ -4,7 +4,7 @@ use super::registry::KeyState;
 use super::types::{KeyId, KeyRow};
 
 /// The keys of all projects; the key files are secret artifacts.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait KeyLedger: Send + Sync + 'static {
     /// One key.
     async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>>;

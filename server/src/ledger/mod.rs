@@ -71,7 +71,7 @@ pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPr
 /// What the service keeps of its work, by capability. A call that returned `Ok` is on disk.
 ///
 /// A caller may be dropped while it waits: then its change happens entirely or not at all.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait Ledger:
     ArtifactLedger
     + CommitmentLog

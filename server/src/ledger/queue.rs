@@ -18,7 +18,7 @@ pub const PRIORITIES: std::ops::RangeInclusive<i32> = -10..=10;
 pub const PATIENCE: Duration = Duration::from_secs(10 * 60);
 
 /// The queue, and jobs as workers see them: leased, reported on, ended.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait JobQueue: Send + Sync + 'static {
     /// Gives the next job that it can hold to a worker, counting the attempt. A job whose attempts are used up is never
     /// given out; it fails here.

@@ -147,7 +147,7 @@ pub struct Candidate {
 }
 
 /// Owners and assets of all projects.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait Registry: Send + Sync + 'static {
     /// Registers an owner. The same request id with the same display name gives the one that the first call made.
     ///

@@ -27,7 +27,7 @@ pub struct Expired {
 }
 
 /// What the service keeps, and until when.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait Retention: Send + Sync + 'static {
     /// Marks as deleted what may go, and removes jobs of which nothing is left; at most `limit` of each kind at once.
     /// `abandoned_artifacts` tells of the artifacts, whose bytes go first.

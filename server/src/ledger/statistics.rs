@@ -45,7 +45,7 @@ pub struct Usage {
 }
 
 /// Numbers for operators, and for limits on what a project takes.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait Statistics: Send + Sync + 'static {
     /// How many jobs there are, of all projects.
     async fn tally(&self) -> Result<Tally>;

@@ -46,7 +46,7 @@ pub struct TokenRow {
 }
 
 /// The tokens of those who may call.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait TokenLedger: Send + Sync + 'static {
     /// Keeps a token.
     async fn create_token(&self, new: NewToken, now: i64) -> Result<TokenRow>;

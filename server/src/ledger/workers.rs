@@ -54,7 +54,7 @@ pub struct SeenWorker {
 }
 
 /// The workers that ask for jobs.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait WorkerPresence: Send + Sync + 'static {
     /// Notes that a worker was seen, and forgets those that were not for a day.
     async fn note_worker(&self, worker: SeenWorker, now: i64) -> Result<()>;

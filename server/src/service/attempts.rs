@@ -26,14 +26,14 @@ impl Service {
         let stage = progress.as_ref().map(Progress::stage);
         let progress = progress.map(checked_progress).transpose()?;
         let (lease, now) = (self.limits().lease, Instant::now());
-        let Some(progress) = self.reports().due(id, &token, progress, lease, now) else {
+        let Some(progress) = self.progress_throttle().due(id, &token, progress, lease, now) else {
             let job = self.ledger().leased_job(id, &token).await?;
             self.heard(id, stage);
             return Ok(job.cancel_requested);
         };
         let changed = progress.is_some();
         let cancel_requested = self.ledger().report(id, &token, progress, lease, clock::now()).await?;
-        self.reports().written(id, &token, now);
+        self.progress_throttle().written(id, &token, now);
         self.heard(id, stage);
         if changed {
             self.changes().job(id);
@@ -45,7 +45,7 @@ impl Service {
     pub(crate) fn attempt_over(&self, job: &JobRow) {
         let id = job.id;
         self.ended(job);
-        self.reports().forget(id);
+        self.progress_throttle().forget(id);
         self.changes().job(id);
         self.changes().queue_grew();
         self.changes().queue_moved();
@@ -53,7 +53,7 @@ impl Service {
 
     /// A worker that has the lease of a job is at this stage of it, if it says so.
     pub(crate) fn heard(&self, id: ledger::JobId, stage: Option<Stage>) {
-        self.alive().heard();
+        self.workers().heard();
         if let Some(stage) = stage {
             self.stages()
                 .reached(id, stage, Instant::now(), &self.metrics(), self.traces());

@@ -48,7 +48,7 @@ impl Service {
         let project = caller.project.as_str();
         let mut clip = None;
         if let Some(id) = submission.key {
-            let key = self.own_key(project, id).await?;
+            let key = self.owned_key(project, id).await?;
             if let Some((field, text)) = &submission.message {
                 message::check(field, text, key.bits)?;
             }
@@ -92,7 +92,7 @@ impl Service {
             self.metrics().created(row.kind());
         }
         self.changes().queue_grew();
-        self.told(row).await
+        self.describe_job(row).await
     }
 
     /// What a request is known by when it is sent again; needed only where it has a name.
@@ -128,7 +128,7 @@ impl Service {
         let mut last = None;
         for row in rows.into_iter().take(size as usize) {
             let position = (row.create_time, row.id);
-            let job = self.told(row).await?;
+            let job = self.describe_job(row).await?;
             bytes += job.encoded_len();
             if bytes > MAX_PAGE_BYTES && !jobs.is_empty() {
                 break;

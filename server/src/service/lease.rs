@@ -38,7 +38,7 @@ impl Service {
         let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
         let end = Instant::now() + wait;
         let mut listener = self.changes().listen();
-        let alive = self.alive();
+        let alive = self.workers();
         let _waiting = alive.wait();
         loop {
             listener.check_running()?;

@@ -66,7 +66,7 @@ pub struct Limits {
     pub watch_stall: Duration,
     /// Watches that a caller may have open; 0 for no limit.
     pub max_watches: u32,
-    /// How often a claim may be said to match by chance, above 0 and below 1.
+    /// How often a scene without the mark may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
     /// Jobs of one project that may wait; none for no limit but that of all.
     pub max_queued_of_project: Option<u64>,
@@ -82,7 +82,7 @@ pub struct Limits {
     /// addresses.
     pub signed_url: Option<Duration>,
     /// How long things are kept.
-    pub keep: retention::RetentionPolicy,
+    pub retention: retention::RetentionPolicy,
 }
 
 impl Default for Limits {
@@ -103,7 +103,7 @@ impl Default for Limits {
             abandoned_after: Duration::from_secs(24 * 60 * 60),
             hooks: Rules::default(),
             signed_url: None,
-            keep: retention::RetentionPolicy::default(),
+            retention: retention::RetentionPolicy::default(),
         }
     }
 }
@@ -184,7 +184,7 @@ impl Service {
     }
 
     /// Whether any worker is there.
-    pub fn alive(&self) -> Arc<worker_presence::WorkerPresence> {
+    pub fn workers(&self) -> Arc<worker_presence::WorkerPresence> {
         self.shared.alive.clone()
     }
 
@@ -233,7 +233,7 @@ impl Service {
         &self.shared.changes
     }
 
-    pub(crate) fn reports(&self) -> &progress::ProgressThrottle {
+    pub(crate) fn progress_throttle(&self) -> &progress::ProgressThrottle {
         &self.shared.reports
     }
 
@@ -241,7 +241,43 @@ impl Service {
         &self.shared.placement
     }
 
-    pub(crate) fn places(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
+    pub(crate) fn watch_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
         &self.shared.places
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    /// Names of the files below a folder that speak of a word.
+    fn speak_of(folder: &Path, word: &str, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                speak_of(&path, word, found);
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && std::fs::read_to_string(&path).unwrap().contains(word)
+            {
+                found.push(path.display().to_string());
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_decided_knows_no_transport() {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        // In two pieces, since this file is read too.
+        let (transport, handlers) = (["ton", "ic::"].concat(), ["crate::", "grpc"].concat());
+        for folder in ["service", "tasks", "ledger"] {
+            for word in [&transport, &handlers] {
+                let mut found = Vec::new();
+                speak_of(&source.join(folder), word, &mut found);
+                assert_eq!(found, Vec::<String>::new(), "{word}");
+            }
+        }
+        let mut found = Vec::new();
+        speak_of(&source.join("grpc"), &transport, &mut found);
+        assert!(!found.is_empty());
     }
 }

@@ -16,12 +16,12 @@ impl Service {
     /// Queues a job that failed once more, if it could be carried out.
     pub(crate) async fn requeue(&self, project: &str, name: &str) -> Result<Job> {
         let id = ResourceKind::Job.parse("name", name)?;
-        let job = self.own_job(project, id).await?;
+        let job = self.owned_job(project, id).await?;
         if job.state != JobState::Failed {
             return Err(Error::NotFailed { name: name.to_owned() });
         }
         if let Some(key) = lease::needed_key(&job)? {
-            keys::usable(&self.own_key(project, key).await?, job.kind())?;
+            keys::usable(&self.owned_key(project, key).await?, job.kind())?;
         }
         self.room_in_queue().await?;
         self.room_for_job(project, job.kind()).await?;
@@ -36,7 +36,7 @@ impl Service {
     /// The attempts of a job, newest first.
     pub(crate) async fn attempts(&self, project: &str, name: &str) -> Result<Vec<JobAttempt>> {
         let id = ResourceKind::Job.parse("name", name)?;
-        self.own_job(project, id).await?;
+        self.owned_job(project, id).await?;
         let rows = self.ledger().attempts(id).await?;
         Ok(rows.into_iter().map(attempt).collect())
     }

@@ -13,7 +13,7 @@ use crate::service::Service;
 use crate::service::names::ResourceKind;
 
 impl Service {
-    pub(crate) async fn own_job(&self, project: &str, id: JobId) -> Result<JobRow> {
+    pub(crate) async fn owned_job(&self, project: &str, id: JobId) -> Result<JobRow> {
         let row = self.ledger().get_job(id).await?;
         let own = row.filter(|row| row.project == project);
         own.ok_or_else(|| ResourceKind::Job.not_found(id))
@@ -25,7 +25,7 @@ impl Service {
         Ok(row.filter(|row| row.project == project))
     }
 
-    pub(crate) async fn own_artifact(&self, project: &str, id: ArtifactId) -> Result<ArtifactRow> {
+    pub(crate) async fn owned_artifact(&self, project: &str, id: ArtifactId) -> Result<ArtifactRow> {
         let own = self.find_artifact(project, id).await?;
         own.ok_or_else(|| ResourceKind::Artifact.not_found(id))
     }
@@ -42,25 +42,25 @@ impl Service {
         Err(ResourceKind::Artifact.not_found(id))
     }
 
-    pub(crate) async fn own_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {
+    pub(crate) async fn owned_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {
         let row = self.ledger().get_key(id).await?;
         let own = row.filter(|row| row.project == project);
         own.ok_or_else(|| ResourceKind::Key.not_found(id))
     }
 
-    pub(crate) async fn own_owner(&self, project: &str, id: OwnerId) -> Result<OwnerRow> {
+    pub(crate) async fn owned_owner(&self, project: &str, id: OwnerId) -> Result<OwnerRow> {
         let row = self.ledger().get_owner(id).await?;
         let own = row.filter(|row| row.project == project);
         own.ok_or_else(|| ResourceKind::Owner.not_found(id))
     }
 
-    pub(crate) async fn own_asset(&self, project: &str, id: AssetId) -> Result<AssetRow> {
+    pub(crate) async fn owned_asset(&self, project: &str, id: AssetId) -> Result<AssetRow> {
         let row = self.ledger().get_asset(id).await?;
         let own = row.filter(|row| row.project == project);
         own.ok_or_else(|| ResourceKind::Asset.not_found(id))
     }
 
-    pub(crate) async fn own_commitment(&self, project: &str, id: CommitmentId) -> Result<Signed> {
+    pub(crate) async fn owned_commitment(&self, project: &str, id: CommitmentId) -> Result<Signed> {
         let missing = || ResourceKind::Commitment.not_found(id);
         let signed = self.ledger().get_commitment(id).await?.ok_or_else(missing)?;
         let asset = self.ledger().get_asset(signed.commitment.asset).await?;

@@ -94,7 +94,7 @@ impl Service {
     }
 
     /// A job for the API; of one that is queued it is told if nobody can have it.
-    pub(crate) async fn told(&self, row: JobRow) -> Result<Job> {
+    pub(crate) async fn describe_job(&self, row: JobRow) -> Result<Job> {
         let waiting_reason = match row.state {
             JobState::Queued => waiting_reason(&row.requirements, &self.workers_lately().await?),
             _ => None,

@@ -34,7 +34,7 @@ impl RetentionPolicy {
 impl Service {
     /// Marks as deleted what is too old, for `collect` to delete, and removes jobs of which nothing is left.
     pub(crate) async fn expire(&self) -> Result<()> {
-        let before = self.limits().keep.before(clock::now());
+        let before = self.limits().retention.before(clock::now());
         if before == Before::default() {
             return Ok(());
         }

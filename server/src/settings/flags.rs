@@ -144,7 +144,7 @@ pub struct Flags {
     /// File of the master key, 64 hexadecimal digits [default: master.key in the data folder, made at the first start]
     #[arg(long, value_name = "FILE")]
     pub master_key_file: Option<PathBuf>,
-    /// How often a claim on a scene without the mark may be said to match, 1e-30 to 0.1 [default: 1e-6]
+    /// How often a scene without the mark may be said to match, 1e-30 to 0.1 [default: 1e-6]
     #[arg(long, value_name = "RATE")]
     pub false_positive_rate: Option<f64>,
     /// Seconds that work may take to end when the server stops [default: 20]

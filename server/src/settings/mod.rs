@@ -96,7 +96,7 @@ pub struct Settings {
     pub worker_device: WorkerDevice,
     /// File of the master key.
     pub master_key_file: Option<PathBuf>,
-    /// How often a claim may be said to match by chance.
+    /// How often a scene without the mark may be said to match by chance.
     pub false_positive_rate: f64,
     /// Seconds that work may take to end when the server stops.
     pub stop_seconds: u64,

@@ -96,7 +96,7 @@ impl Service {
         let ended = self.ledger().reap(clock::now()).await?;
         for &job in &ended {
             tracing::warn!(%job, "the lease has expired: its worker is gone");
-            self.reports().forget(job);
+            self.progress_throttle().forget(job);
             self.count_lost(job).await;
             self.changes().job(job);
         }

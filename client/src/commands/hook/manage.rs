@@ -92,7 +92,7 @@ struct Listed {
 }
 
 #[derive(Serialize)]
-struct Told {
+struct DeliveryList {
     deliveries: Vec<DeliveryReport>,
 }
 
@@ -204,7 +204,7 @@ pub async fn deliveries(context: &Context, arguments: &Deliveries) -> Result<Exi
     let (deliveries, _) = listed.await?;
     let deliveries: Vec<_> = deliveries.iter().map(DeliveryReport::from).collect();
     if context.json {
-        print_json(&Told { deliveries });
+        print_json(&DeliveryList { deliveries });
     } else {
         for delivery in &deliveries {
             print_line(&delivery.line());

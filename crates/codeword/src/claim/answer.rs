@@ -2,8 +2,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::acceptance::Verdict;
+use crate::code::Payload;
 use crate::message::Message;
-use crate::payload::Payload;
 use crate::reading::Reading;
 
 /// A verdict with what it rests on.

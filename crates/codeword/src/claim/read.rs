@@ -2,9 +2,9 @@
 use super::answer::ReadPayload;
 use super::{Scheme, Target};
 use crate::code::Code;
+use crate::code::Payload;
 use crate::error::Result;
 use crate::message::Message;
-use crate::payload::Payload;
 
 /// What a match says: `None` for raw words, and for targets whose pad was not given.
 pub fn payload(scheme: Scheme, target: &Target, logits: &[f32]) -> Result<Option<ReadPayload>> {

@@ -1,8 +1,8 @@
 //! Verdicts at their limits, and p-values whose calibration can be enumerated.
 use super::*;
 use crate::code::Code;
+use crate::code::Payload;
 use crate::message::MessageLength;
-use crate::payload::Payload;
 use crate::whiten::{Whitening, mark};
 use proptest::prelude::*;
 

@@ -3,6 +3,7 @@
 //! Error correction reads, it never decides: [`Code::decode`] accepts 8.3 %, 3.1 % and 0.5 % of random words.
 mod bch;
 mod field;
+mod payload;
 mod scheme;
 mod soft;
 
@@ -10,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::message::{Message, MessageLength};
-use crate::payload::Payload;
 use crate::reading::Reading;
 use bch::Bch;
+pub use payload::{Layout, Payload};
 pub use scheme::{PAPER_LENGTHS, Scheme};
 
 /// A BCH code of 63 bits with one overall parity bit behind it.

@@ -1,7 +1,7 @@
 //! What the report rests on: files, model, key, times, and the signature.
 use super::text::{hash, sent};
 use crate::evidence::{Evidence, Input, Role};
-use crate::sign::Signature;
+use crate::signature::Signature;
 use crate::words::size;
 use maud::{Markup, html};
 

@@ -11,7 +11,7 @@ mod tried;
 mod verdict;
 
 use crate::evidence::Evidence;
-use crate::sign::Signature;
+use crate::signature::Signature;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sha2::Digest;

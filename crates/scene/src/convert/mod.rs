@@ -32,7 +32,7 @@ mod values;
 pub(crate) use order::morton;
 pub(crate) use refuse::check_arrays;
 
-use crate::scene::bad;
+use crate::error::bad;
 use crate::{Error, Format, Gaussians, Result, ply, write_whole};
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! SuperSplat's compressed PLY: chunks of 256 Gaussians in Morton order, four words each, a byte a harmonic.
 use super::values::{opacity_byte, smallest_three, step, unit};
 use crate::Gaussians;
+use crate::fields::{file_index, rest_count};
 use crate::packed::layout::{COLOUR, GEOMETRY, WORDS};
 use crate::packed::{CHUNK, rest};
-use crate::ply::fields::{file_index, rest_count};
 use crate::range::{C0, Range};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::io::{self, Write};

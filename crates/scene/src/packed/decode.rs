@@ -1,9 +1,9 @@
 //! From the words of a compressed PLY to Gaussians.
 use super::layout::{COLOUR, GEOMETRY, Layout};
 use super::{CHUNK, rest};
+use crate::fields::{Rows, band, rest_count};
 use crate::gaussians::Gaussians;
 use crate::ignored::BadRows;
-use crate::ply::fields::{Rows, band, rest_count};
 use crate::range::{Range, logit};
 
 /// Largest magnitude of an end of a range of colours: more than any colour, and so much less than single precision

@@ -1,8 +1,9 @@
 //! Where a compressed PLY has its chunks, Gaussians and spherical harmonics, checked against the size of the file.
 use super::CHUNK;
 use crate::MAX_DEGREE;
-use crate::ply::fields::rest_count;
-use crate::ply::header::{Storage, bytes, element, quote, scalars, storage};
+use crate::fields::rest_count;
+use crate::fields::{bytes, quote};
+use crate::ply::header::{Storage, element, scalars, storage};
 use ply_rs::ply::{Header, ScalarType};
 
 /// The ranges of a chunk's positions and log scales: minima, then maxima.

@@ -13,10 +13,10 @@ pub(crate) mod rest;
 
 use crate::Result;
 use crate::container::{Container, Format};
+use crate::error::bad;
+use crate::fields::file_index;
 use crate::gaussians::{Gaussians, Sh};
-use crate::ply::fields::file_index;
 use crate::range::Range;
-use crate::scene::bad;
 use crate::summary::Summary;
 use decode::{Chunk, word};
 use layout::Layout;

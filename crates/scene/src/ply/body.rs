@@ -1,7 +1,8 @@
 //! The rows of a PLY file: decoded column by column, and written back with nothing but colours changed.
-use super::fields::{COLOUR, Field, Rows, file_index};
-use super::header::{Storage, quote};
+use super::header::Storage;
 use super::layout::{Layout, truncated};
+use crate::fields::quote;
+use crate::fields::{COLOUR, Field, Rows, file_index};
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use std::io::{self, Write};
@@ -59,7 +60,7 @@ pub(super) fn decode(layout: &Layout, body: &[u8], bad_rows: BadRows) -> Result<
                     None => collected.push(&values)?,
                     Some(i) => collected.reject(|| {
                         let word = String::from_utf8_lossy(word(&layout.fields.all[i]));
-                        let (name, word) = (super::fields::name(i), quote(&word));
+                        let (name, word) = (crate::fields::name(i), quote(&word));
                         format!("property {name} of row {row} is {word:?}, not a number")
                     })?,
                 }

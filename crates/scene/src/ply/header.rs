@@ -2,14 +2,13 @@
 //!
 //! At most [`MAX_HEADER`] bytes are read in search of `end_header`; `ply-rs` parses them. Counts are believed only
 //! after they were compared with the size of the file, see the readers of the body.
+use crate::fields::{bytes, quote};
 use ply_rs::parser::{Parser, Reader};
 use ply_rs::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::{BufRead, Read};
 
 /// Longest header, bytes. A scene of degree 4 with all usual properties needs under 3,000.
 pub(crate) const MAX_HEADER: u64 = 64 * 1024;
-/// Most characters of somebody else's message or line that are repeated in ours.
-const MAX_QUOTE: usize = 200;
 
 /// How the rows of the body are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,23 +152,4 @@ pub(crate) fn scalars(element: &ElementDef) -> Result<Vec<(&str, &ScalarType)>, 
             }
         })
         .collect()
-}
-
-/// Bytes of a scalar in a binary row.
-pub(crate) fn bytes(scalar: &ScalarType) -> usize {
-    match scalar {
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    }
-}
-
-/// Somebody else's text on one line and not too long.
-pub(crate) fn quote(text: &str) -> String {
-    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(MAX_QUOTE) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => line,
-    }
 }

@@ -1,6 +1,7 @@
 //! Where a PLY has its Gaussians, checked against the size of the file before anything is allocated.
-use super::fields::Fields;
-use super::header::{Storage, bytes, element, scalars, storage};
+use super::header::{Storage, element, scalars, storage};
+use crate::fields::Fields;
+use crate::fields::bytes;
 use ply_rs::ply::Header;
 
 /// What the header says of the Gaussians.

@@ -3,16 +3,15 @@
 //! A written file differs from the one read in nothing but the values of `f_dc_*` and `f_rest_*`: the header with
 //! its comments, the order of rows, other properties and anything after the Gaussians keep their bytes.
 mod body;
-pub(crate) mod fields;
 pub(crate) mod header;
 mod layout;
 mod standard;
 
 use crate::container::{Container, Format};
+use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::remaining::read_remaining;
-use crate::scene::bad;
 use crate::summary::Summary;
 use crate::{Error, Result, packed};
 use std::io::{self, BufReader, Read, Write};

@@ -1,5 +1,5 @@
 //! The file layout of the reference implementation, for scenes that were not read from a file.
-use super::fields::{file_index, rest_count};
+use crate::fields::{file_index, rest_count};
 use crate::gaussians::{Gaussians, Sh};
 use std::io::{self, Write};
 

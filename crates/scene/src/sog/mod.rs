@@ -13,9 +13,9 @@ pub(crate) mod palette;
 pub(crate) mod picture;
 
 use crate::container::{Container, Format};
+use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored, RowFilter};
-use crate::scene::bad;
 use crate::{Error, Result};
 use archive::Archive;
 use budget::Budget;

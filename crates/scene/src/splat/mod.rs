@@ -4,12 +4,12 @@
 //! as four. There are no spherical harmonics beyond the constant one.
 use crate::Result;
 use crate::container::{Container, Format};
+use crate::error::{UNKNOWN, bad};
+use crate::fields::Rows;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
-use crate::ply::fields::Rows;
 use crate::range::{Range, logit};
 use crate::remaining::read_remaining;
-use crate::scene::{UNKNOWN, bad};
 use crate::summary::Summary;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;

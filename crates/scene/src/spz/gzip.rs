@@ -2,8 +2,8 @@
 use super::header::{COLOURS, HARMONICS, HEADER, Header};
 use super::{attributes, colour, limits};
 use crate::container::{Container, Format};
+use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
-use crate::scene::bad;
 use crate::{Error, Result};
 use flate2::Compression;
 use flate2::bufread::GzDecoder;

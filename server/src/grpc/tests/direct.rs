@@ -217,7 +217,7 @@ async fn what_nobody_finishes_is_collected() {
     )
     .await;
     let object = |path: ArtifactPath| endpoint.path(&format!("artifacts/{path}"));
-    // PendingUpload when it could just be finished still, and a moment earlier.
+    // Begun when it could just be finished still, and a moment earlier.
     let begun = async |before: Duration| {
         let id = Uuid::now_v7();
         let time = clock::now() - clock::micros(before);

@@ -200,7 +200,7 @@ async fn what_happens_is_counted() {
     let missing = not_found(requeue(&server, "jobs/00000000-0000-7000-8000-000000000001").await);
     assert!(missing.starts_with("jobs/"));
     has(r#"guardsplat_calls_total{method="guardsplat.v1.JobService/RequeueJob",code="NOT_FOUND"} 1"#);
-    assert!(server.api.alive().alive());
+    assert!(server.api.workers().alive());
     // Names of nobody and nothing are in there.
     for name in ["scene.ply", &job.name["jobs/".len()..], "output.bin", "default"] {
         assert!(!text().contains(name), "{name}");

@@ -13,7 +13,7 @@ async fn what_is_old_goes_with_its_bytes() {
     let limits = Limits {
         // How often is looked follows from it.
         abandoned_after: Duration::from_secs(1),
-        keep: RetentionPolicy {
+        retention: RetentionPolicy {
             uploads: short,
             outputs: None,
             jobs: short,

@@ -178,7 +178,7 @@ async fn cursors_and_names_are_checked() {
 
 #[tokio::test]
 async fn slow_watchers_hold_up_nobody() {
-    // ProgressThrottle of a lease as short as this are all written.
+    // Reports of a lease as short as this are all written.
     let server = Server::with(Limits {
         lease: Duration::from_millis(400),
         ..Limits::default()
@@ -229,7 +229,7 @@ fn is_told(server: &Server, line: &str) -> bool {
 
 #[tokio::test]
 async fn who_does_not_read_is_shed_and_others_are_not() {
-    // ProgressThrottle of a lease as short as this are written every 400 ms.
+    // Reports of a lease as short as this are written every 400 ms.
     let server = Server::with(Limits {
         lease: Duration::from_millis(1600),
         watch_stall: Duration::from_secs(2),

@@ -36,7 +36,7 @@ pub(crate) use submission::*;
 pub(crate) use tokens::*;
 
 /// A place for one ledger, empty at first.
-#[tonic::async_trait]
+#[async_trait::async_trait]
 pub trait Factory: Send + Sync {
     /// Opens it; again after the one opened before is gone.
     async fn open(&self) -> Arc<dyn Ledger>;

@@ -178,7 +178,7 @@ pub fn check_url(url: &SecretString) -> std::result::Result<(), String> {
     open::check_url(url)
 }
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Ledger for PostgresLedger {
     async fn check(&self) -> Result<()> {
         self.read(with!([] db => presence::check(db))).await

@@ -11,7 +11,7 @@ use super::super::retention::{Before, Expired, LEFT_NOTHING, Retention, WITHOUT_
 use super::super::types::ArtifactId;
 use super::PostgresLedger;
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Retention for PostgresLedger {
     async fn expire(&self, before: Before, limit: u32) -> Result<Expired> {
         self.database.change(with!([] db => expire(db, before, limit))).await

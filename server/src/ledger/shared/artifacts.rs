@@ -7,7 +7,7 @@ use super::super::types::{ArtifactId, ArtifactRow, ArtifactState, JobId, NewArti
 use super::super::{ArtifactLedger, LedgerError, Result, token};
 use super::{DbConnection, DbLedger, jobs, leases, rows};
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl ArtifactLedger for DbLedger {
     async fn create_artifact(&self, new: NewArtifact, now: i64) -> Result<ArtifactRow> {
         self.change(with!([new] db => create(db, &new, now))).await

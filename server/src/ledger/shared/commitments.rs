@@ -24,7 +24,7 @@ pub(super) const CHAIN: &str = concat!(
     "assets a ON a.id = c.asset_id WHERE c.sequence > $1 AND a.project = $3 ORDER BY c.sequence LIMIT $2"
 );
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl CommitmentLog for DbLedger {
     async fn signing_key(&self) -> Result<Option<SealedSigningKey>> {
         self.read(with!([] db => signing_key(db))).await

@@ -26,7 +26,7 @@ pub(super) const OF_HOOK: &str = "SELECT * FROM deliveries \
     WHERE hook_id = $4 AND ($5 IS NULL OR state = $5) AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl HookLedger for DbLedger {
     async fn create_hook(&self, new: NewHook, now: i64) -> Result<HookRow> {
         self.change(with!([new] db => create(db, &new, now))).await

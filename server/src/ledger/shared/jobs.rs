@@ -19,7 +19,7 @@ pub(super) const PAGE_OF_STATE: &str = "SELECT * FROM jobs \
     WHERE project = $4 AND state = $5 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl JobStore for DbLedger {
     async fn create_job(&self, new: NewJob, now: i64) -> Result<JobRow> {
         let made = self.change(with!([new] db => create(db, &new, now)));

@@ -10,7 +10,7 @@ use super::{DbConnection, DbLedger, rows};
 pub(super) const PAGE: &str = "SELECT * FROM keys WHERE project = $4 AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl KeyLedger for DbLedger {
     async fn get_key(&self, id: KeyId) -> Result<Option<KeyRow>> {
         self.read(with!([] db => get(db, id))).await

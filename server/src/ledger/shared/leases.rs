@@ -12,7 +12,7 @@ use super::super::{JobQueue, LedgerError, Result, codec, token};
 use super::transition::leave;
 use super::{DbConnection, DbLedger, DbRow, artifacts, jobs, keys, presence, queue, rows};
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl JobQueue for DbLedger {
     async fn claim_for(&self, capabilities: &WorkerCapabilities, lease: Duration, now: i64) -> Result<Option<Lease>> {
         let capabilities = capabilities.clone();

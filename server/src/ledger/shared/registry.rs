@@ -57,7 +57,7 @@ pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce 
 /// The highest payload number of a key.
 pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = $1 ORDER BY payload DESC LIMIT 1";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Registry for DbLedger {
     async fn create_owner(&self, new: NewOwner, now: i64) -> Result<OwnerRow> {
         self.change(with!([new] db => create_owner(db, &new, now))).await

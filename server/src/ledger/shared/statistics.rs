@@ -33,7 +33,7 @@ pub(super) const USAGE: &str = "SELECT \
     (SELECT count(*) FROM jobs WHERE project = $1 AND state = 1) AS queued_jobs, \
     (SELECT CAST(coalesce(sum(size), 0) AS bigint) FROM artifacts WHERE project = $1 AND state IN (2, 3)) AS artifact_bytes";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Statistics for DbLedger {
     async fn tally(&self) -> Result<Tally> {
         self.read(with!([] db => tally(db))).await

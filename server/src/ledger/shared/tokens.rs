@@ -17,7 +17,7 @@ pub(super) const OF_PROJECT: &str = "SELECT * FROM tokens WHERE project = $4 AND
 /// A page of all; there are few, and only an operator lists them.
 const ALL: &str = "SELECT * FROM tokens WHERE (create_time, id) < ($1, $2) ORDER BY create_time DESC, id DESC LIMIT $3";
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl TokenLedger for DbLedger {
     async fn create_token(&self, new: NewToken, now: i64) -> Result<TokenRow> {
         self.change(with!([new] db => create(db, &new, now))).await

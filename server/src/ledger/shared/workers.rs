@@ -3,7 +3,7 @@ use super::super::Result;
 use super::super::workers::{FORGOTTEN, SeenWorker, WorkerPresence};
 use super::{DbConnection, DbLedger, rows};
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl WorkerPresence for DbLedger {
     async fn note_worker(&self, worker: SeenWorker, now: i64) -> Result<()> {
         self.change(with!([worker] db => note(db, &worker, now))).await

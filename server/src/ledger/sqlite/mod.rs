@@ -154,7 +154,7 @@ impl SqliteLedger {
     }
 }
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Ledger for SqliteLedger {
     async fn check(&self) -> Result<()> {
         self.queue_depth().await?;

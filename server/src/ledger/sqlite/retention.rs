@@ -9,7 +9,7 @@ use super::super::retention::{Before, Expired, LEFT_NOTHING, Retention, WITHOUT_
 use super::super::types::ArtifactId;
 use super::SqliteLedger;
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Retention for SqliteLedger {
     async fn expire(&self, before: Before, limit: u32) -> Result<Expired> {
         self.writer.run(move |db| Box::pin(expire(db, before, limit))).await

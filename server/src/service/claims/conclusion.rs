@@ -5,7 +5,7 @@ use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
 
 use super::decision::Decided;
-use super::{Claim, framing, of_job};
+use super::{Claim, hypotheses, of_job};
 use crate::error::{Error, Result};
 use crate::ledger::{Completion, JobResult, JobRow, KeyRow};
 use crate::service::Service;
@@ -44,7 +44,7 @@ impl Service {
         let key = self.key_of(job).await?;
         let told = Checked {
             told,
-            readings: framing::checked(&told.readings, key.bits)?,
+            readings: hypotheses::checked(&told.readings, key.bits)?,
             views: evidence::checked_views(&told.views)?,
         };
         let report = match &mut completion.result {
@@ -103,7 +103,7 @@ impl Service {
         let files = Files::of_suspects(self, job).await?;
         let read = Read {
             decided: &decided,
-            framings: framing::kinds(&told.readings),
+            framings: hypotheses::kinds(&told.readings),
             named: matches!(claim, Claim::Asset(_)),
         };
         evidence::of_verification(&facts, files, &read)
@@ -126,7 +126,7 @@ impl Service {
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,
-            framings: framing::kinds(&told.readings),
+            framings: hypotheses::kinds(&told.readings),
             named: true,
         });
         let facts = Facts {

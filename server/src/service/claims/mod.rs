@@ -1,7 +1,7 @@
 //! Whose mark a job writes or looks for: named in its spec, checked when it is submitted, decided when it was read.
 mod conclusion;
 mod decision;
-mod framing;
+mod hypotheses;
 
 use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 
@@ -88,11 +88,11 @@ impl Service {
         let id = match claim {
             Claim::Search => return Ok(()),
             Claim::Owner(id) => {
-                return self.own_owner(project, *id).await.map(|_| ());
+                return self.owned_owner(project, *id).await.map(|_| ());
             }
             Claim::Asset(id) => *id,
         };
-        let asset = self.own_asset(project, id).await?;
+        let asset = self.owned_asset(project, id).await?;
         if asset.key != key.id {
             let reason = format!(
                 "was registered for {}, not for this key",

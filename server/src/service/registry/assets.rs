@@ -81,7 +81,7 @@ impl Service {
 
     pub(crate) async fn asset(&self, project: &str, name: &str) -> Result<Asset> {
         let id = ResourceKind::Asset.parse("name", name)?;
-        Ok(message(self.own_asset(project, id).await?))
+        Ok(message(self.owned_asset(project, id).await?))
     }
 
     pub(crate) async fn page_of_assets(

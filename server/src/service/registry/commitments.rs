@@ -15,7 +15,7 @@ const QUERY: &[&[u8]] = &[b"commitments"];
 impl Service {
     pub(crate) async fn commitment(&self, project: &str, name: &str) -> Result<Signed> {
         let id = ResourceKind::Commitment.parse("name", name)?;
-        self.own_commitment(project, id).await
+        self.owned_commitment(project, id).await
     }
 
     pub(crate) async fn page_of_commitments(

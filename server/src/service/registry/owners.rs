@@ -31,7 +31,7 @@ impl Service {
 
     pub(crate) async fn owner(&self, project: &str, name: &str) -> Result<Owner> {
         let id = ResourceKind::Owner.parse("name", name)?;
-        Ok(message(self.own_owner(project, id).await?))
+        Ok(message(self.owned_owner(project, id).await?))
     }
 
     pub(crate) async fn page_of_owners(

@@ -4,7 +4,7 @@ mod ignored;
 mod refusals;
 mod round_trips;
 
-use super::fields::rest_count;
+use crate::fields::rest_count;
 use crate::summary::tests::agrees;
 use crate::{Error, MAX_DEGREE, Result, Scene, Sh};
 use std::fmt::Write as _;

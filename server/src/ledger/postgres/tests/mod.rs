@@ -100,7 +100,7 @@ impl Drop for Place {
     }
 }
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Factory for Place {
     async fn open(&self) -> Arc<dyn Ledger> {
         self.ledger().await

@@ -31,7 +31,7 @@ impl Folder {
     }
 }
 
-#[tonic::async_trait]
+#[async_trait::async_trait]
 impl Factory for Folder {
     async fn open(&self) -> Arc<dyn Ledger> {
         self.ledger().await

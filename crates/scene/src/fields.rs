@@ -1,8 +1,10 @@
 //! The properties of a Gaussian: which columns of a row they are, and what values they may have.
-use super::header::{bytes, quote};
 use crate::gaussians::{Gaussians, MAX_DEGREE, Sh};
 use crate::ignored::{BadRows, Ignored, RowFilter};
 use ply_rs::ply::ScalarType;
+
+/// Most characters of somebody else's message or line that are repeated in ours.
+const MAX_QUOTE: usize = 200;
 
 /// Properties before the rest coefficients, in the order in which rows are handed to [`Rows::push`].
 const FIXED: [&str; 14] = [
@@ -10,11 +12,11 @@ const FIXED: [&str; 14] = [
     "f_dc_2",
 ];
 /// Index of `f_dc_0` in [`FIXED`]: colour is what follows.
-pub(super) const COLOUR: usize = 11;
+pub(crate) const COLOUR: usize = 11;
 
 /// One used property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Field {
+pub(crate) struct Field {
     /// Its place among the properties of a row.
     pub column: usize,
     /// Its first byte in a binary row.
@@ -25,7 +27,7 @@ pub(super) struct Field {
 
 /// The used properties: those of [`FIXED`], then `f_rest_0`, `f_rest_1` and so on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Fields {
+pub(crate) struct Fields {
     /// Degree of the spherical harmonics.
     pub degree: usize,
     /// Where the properties are.
@@ -80,7 +82,7 @@ pub(crate) fn rest_count(degree: usize) -> usize {
 }
 
 /// Name of used property `i` in the order of [`Fields`].
-pub(super) fn name(i: usize) -> String {
+pub(crate) fn name(i: usize) -> String {
     FIXED
         .get(i)
         .map_or_else(|| format!("f_rest_{}", i - FIXED.len()), ToString::to_string)
@@ -177,6 +179,25 @@ fn legal(i: usize, value: f32) -> bool {
         7..=9 => value.is_finite() || value == f32::NEG_INFINITY,
         10 => !value.is_nan(),
         _ => value.is_finite(),
+    }
+}
+
+/// Bytes of a scalar in a binary row.
+pub(crate) fn bytes(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// Somebody else's text on one line and not too long.
+pub(crate) fn quote(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MAX_QUOTE) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
     }
 }
 

@@ -3,9 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::code::Code;
 use crate::error::{Error, Result};
-
-/// The version of the rules by which payloads are packed.
-pub const VERSION: u8 = 1;
+use crate::limits::VERSION;
 
 /// Bits of the version, in every layout: so a reader knows the rules before it knows anything else.
 const VERSION_BITS: u32 = 2;
