@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Checks everything: formatting, protos, lints, all tests, and a little fuzzing. Eighteen minutes on two cores when all
-# dependencies are built; building them takes some twenty-five more.
+# Checks everything: formatting, protos, lints, all tests, and a little fuzzing. CONTRIBUTING.md says how long that takes.
 # Scenes for the tests that want real ones are taken from $GUARDSPLAT_SCENES or ../shared/scenes; without them those
 # tests are skipped, unless CI is set.
 set -euo pipefail

@@ -144,7 +144,8 @@ pub fn run() -> ExitCode {
 fn filter(command: &Command) -> EnvFilter {
     let default = match command {
         Command::Run(_) => "warn,guardsplat_worker=info,guardsplat_engine=info",
-        _ => "error",
+        // Of warnings those that tell a user what to write differently.
+        _ => "error,guardsplat_engine::embed::optimizer=warn",
     };
     EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default))
 }

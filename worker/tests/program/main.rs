@@ -373,3 +373,35 @@ fn a_scene_can_be_inspected() {
     let found = bench.json("inspect nan.ply --ignore-bad-rows --json", 0);
     assert_eq!((&found["gaussians"], &found["ignored_rows"]), (&499.into(), &1.into()));
 }
+
+#[test]
+fn old_names_of_settings_are_heeded_and_warned_about() {
+    let bench = Bench::new();
+    bench.exits("sample in.ply --gaussians 200 --sh-degree 0 --seed 2", 0);
+    bench.exits("key create --bits 8 --seed 7 -o k.key --device cpu", 0);
+    let names = [
+        ("old", r#""descent": null, "adam": {"rate_dc": 0.05}"#),
+        ("new", r#""optimizer": {"adam": {"rate_dc": 0.05}}"#),
+    ];
+    let warned = names.map(|(name, optimizer)| {
+        let few = format!(
+            r#"{{"steps": 2, "views_per_step": 1, "fresh_per_step": 1, "early_stop": null,
+                "verify": {{"views": 1, "message_views": 1}}, {optimizer}}}"#
+        );
+        write(&bench.path(&format!("{name}.json")), &few);
+        let output = bench.run(&format!(
+            "embed in.ply {name}.ply --key k.key --message 5c --size 32 --settings {name}.json --device cpu --force"
+        ));
+        assert_eq!(
+            output.status.code(),
+            Some(3),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        String::from_utf8_lossy(&output.stderr).contains("the old name still works")
+    });
+    assert_eq!(warned, [true, false]);
+    let [old, new] = ["old.ply", "new.ply"].map(|name| std::fs::read(bench.path(name)).unwrap());
+    assert_eq!(old, new);
+    assert_ne!(old, std::fs::read(bench.path("in.ply")).unwrap());
+}
