@@ -52,7 +52,7 @@ say() { printf '\n-- %s\n' "$*"; }
 
 say "Setting up"
 setup
-say "Building (the first time takes 15 to 25 minutes on two cores)"
+say "Building (the first time takes a quarter of an hour or more on two cores)"
 # All of the workspace, as the tests do: for fewer packages some dependencies would be built again.
 cargo build --release --workspace --locked
 programs=${CARGO_TARGET_DIR:-$repository/target}/release

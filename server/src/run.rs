@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::FutureExt as _;
+use health::{Health, Watched};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
@@ -36,8 +37,6 @@ use crate::tasks::{deliveries, housekeeping, remote_changes};
 use crate::tls;
 use crate::traces::Traces;
 pub(crate) use folder::DataFolder;
-use health::{Health, Watched};
-
 pub use health::Readiness;
 
 /// Calls that have begun get at least so long to end, even if the worker took all the time there was.

@@ -10,16 +10,12 @@ use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
 
 use crate::artifacts::ArtifactPath;
-use crate::error::chain;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, chain};
 use crate::grpc::guard::caller;
 use crate::grpc::upload_stream::Incoming;
 use crate::ledger::{ArtifactRow, NewArtifact, Origin};
-use crate::service::Service;
-use crate::service::clock;
 use crate::service::names::ResourceKind;
-use crate::service::to_proto;
-use crate::service::upload;
+use crate::service::{Service, clock, to_proto, upload};
 
 #[tonic::async_trait]
 impl ArtifactService for Service {

@@ -3,12 +3,8 @@ use guardsplat_proto::v1::{CreateJobRequest, UploadMetadata};
 use prost::Message as _;
 
 use crate::error::{Error, Result};
-use crate::service::message;
 use crate::service::names::ResourceKind;
-use crate::service::page;
-use crate::service::submission;
-use crate::service::text;
-use crate::service::upload;
+use crate::service::{message, page, submission, text, upload};
 
 /// Decodes a `CreateJobRequest` and checks it as the service does.
 pub fn create_job(bytes: &[u8]) -> Result<()> {

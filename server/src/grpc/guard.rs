@@ -13,12 +13,10 @@ use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
 use tower::{Layer, Service};
 
 use crate::access::{self, Caller, Need, Scope};
-use crate::error::chain;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, chain};
 use crate::ledger::{Ledger, TokenRow};
 use crate::service::clock;
-use crate::service::rate_limit::payer;
-use crate::service::rate_limit::{Class, Meter, Payer};
+use crate::service::rate_limit::{Class, Meter, Payer, payer};
 
 /// The use of a token is noted so often at most: every note is a write to the ledger.
 const NOTE_EVERY: i64 = 60_000_000;

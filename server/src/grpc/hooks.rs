@@ -16,12 +16,10 @@ use crate::grpc::guard::caller;
 use crate::hooks::{self, Rules, check_url, event, signature};
 use crate::ledger::{DeliveryFilter, DeliveryRow, DeliveryState, HookRow, JobKind, JobState, NewHook, Topics};
 use crate::secrets::{self, SecretError};
-use crate::service::Service;
 use crate::service::clock::{self, timestamp};
 use crate::service::names::ResourceKind;
-use crate::service::page;
-use crate::service::text;
 use crate::service::violations::Violations;
+use crate::service::{Service, page, text};
 
 /// Most hooks of a project: each job's end is told to all of them.
 const MAX_HOOKS: u32 = 100;

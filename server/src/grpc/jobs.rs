@@ -9,14 +9,10 @@ use tonic::{Request, Response, Status};
 
 use crate::error::{Error, Result};
 use crate::grpc::guard::caller;
-use crate::grpc::metrics_layer;
-use crate::grpc::watch;
-use crate::service::Service;
-use crate::service::clock;
+use crate::grpc::{metrics_layer, watch};
 use crate::service::names::ResourceKind;
-use crate::service::ownership;
 use crate::service::rate_limit::payer;
-use crate::service::to_proto;
+use crate::service::{Service, clock, ownership, to_proto};
 
 #[tonic::async_trait]
 impl JobService for Service {
@@ -55,11 +51,11 @@ impl JobService for Service {
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
         let caller = caller(&request)?;
-        let place = self.watch_limit().take(payer(&caller), self.limits().max_watches)?;
+        let permit = self.watch_limit().take(payer(&caller), self.limits().max_watches)?;
         let WatchJobRequest { name, cursor } = request.into_inner();
         let watching = watch::watch(self.clone(), caller.project, &name, &cursor).await?;
         let kept = move |message| {
-            let _ = &place;
+            let _ = &permit;
             message
         };
         Ok(Response::new(watching.map(kept).boxed()))

@@ -7,13 +7,9 @@ use tonic::{Request, Response, Status};
 use crate::error::{Error, Result};
 use crate::grpc::guard::caller;
 use crate::ledger::{KeyId, KeyState};
-use crate::service::Service;
-use crate::service::clock;
 use crate::service::names::ResourceKind;
-use crate::service::page;
-use crate::service::text;
-use crate::service::to_proto;
 use crate::service::violations::Violations;
+use crate::service::{Service, clock, page, text, to_proto};
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"keys"];

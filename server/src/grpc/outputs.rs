@@ -9,10 +9,8 @@ use crate::artifacts::{Announced, ArtifactPath, Check};
 use crate::error::{Error, Result};
 use crate::grpc::upload_stream::Incoming;
 use crate::ledger::{ArtifactRow, JobKind, NewArtifact, Origin};
-use crate::service::Service;
-use crate::service::clock;
 use crate::service::names::ResourceKind;
-use crate::service::upload;
+use crate::service::{Service, clock, upload};
 
 /// Most bytes of a key file. One of 150 bits has less than 3 MiB.
 const MAX_KEY_BYTES: u64 = 4 << 20;

@@ -12,12 +12,10 @@ use crate::access::{self, Scope, Scopes};
 use crate::error::{Error, Result};
 use crate::grpc::guard::caller;
 use crate::ledger::{NewToken, TokenRow};
-use crate::service::Service;
 use crate::service::clock::{self, timestamp};
 use crate::service::names::ResourceKind;
-use crate::service::page;
-use crate::service::text;
 use crate::service::violations::Violations;
+use crate::service::{Service, page, text};
 
 #[tonic::async_trait]
 impl TokenService for Service {

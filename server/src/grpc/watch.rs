@@ -9,11 +9,9 @@ use crate::error::{Error, Result};
 use crate::grpc::slow_consumer::patient;
 use crate::ledger::{JobId, JobRow, JobState};
 use crate::metrics::Watching;
-use crate::service::Service;
 use crate::service::changes::{For, Heard, Listener};
 use crate::service::names::ResourceKind;
-use crate::service::opaque_token;
-use crate::service::queue_positions;
+use crate::service::{Service, opaque_token, queue_positions};
 
 /// How late a change is heard of that was not announced here.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);

@@ -1,7 +1,4 @@
 //! `WorkerService`: what workers say to the server.
-
-use crate::artifacts::CHUNK_BYTES;
-use crate::service::attempts;
 use futures::stream::{self, BoxStream, StreamExt};
 use guardsplat_proto::v1::worker_service_server::WorkerService;
 use guardsplat_proto::v1::{
@@ -12,14 +9,12 @@ use guardsplat_proto::v1::{
 use secrecy::ExposeSecret;
 use tonic::{Request, Response, Status, Streaming};
 
+use crate::artifacts::CHUNK_BYTES;
 use crate::error::{Error, Result};
 use crate::grpc::upload_stream::Incoming;
-use crate::service::Service;
 use crate::service::claims::WorkerReadings;
-use crate::service::clock;
-use crate::service::completion;
 use crate::service::names::ResourceKind;
-use crate::service::to_proto;
+use crate::service::{Service, attempts, clock, completion, to_proto};
 
 #[tonic::async_trait]
 impl WorkerService for Service {

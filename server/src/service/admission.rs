@@ -7,10 +7,9 @@ use guardsplat_scene::{HEAD, Summary};
 use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
-use crate::service::Service;
 use crate::service::names::ResourceKind;
-use crate::service::ownership;
 use crate::service::submission::Submission;
+use crate::service::{Service, ownership};
 
 /// When a submitter tries again while the queue is full.
 const QUEUE_RETRY: Duration = Duration::from_secs(10);

@@ -8,9 +8,8 @@ use uuid::Uuid;
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, NewKey};
 use crate::service::names::ResourceKind;
-use crate::service::text;
-use crate::service::upload;
 use crate::service::violations::Violations;
+use crate::service::{text, upload};
 
 /// Most bytes of a result; figures and a few sentences need far less.
 const MAX_RESULT_BYTES: usize = 64 << 10;

@@ -11,12 +11,12 @@ pub struct ConcurrencyLimit(Mutex<HashMap<Payer, u32>>);
 
 /// Of one watch, for as long as its stream is there: also of one that was shed, since it still takes room.
 pub struct Permit {
-    places: Arc<ConcurrencyLimit>,
+    limit: Arc<ConcurrencyLimit>,
     payer: Payer,
 }
 
 impl ConcurrencyLimit {
-    /// A place for one more, if the caller has fewer than `most`; 0 is no limit.
+    /// A permit for one more, if the caller has fewer than `most`; 0 is no limit.
     pub fn take(self: &Arc<Self>, payer: Payer, most: u32) -> Result<Permit> {
         let mut open = self.lock();
         let count = open.get(&payer).copied().unwrap_or(0);
@@ -26,7 +26,7 @@ impl ConcurrencyLimit {
         open.insert(payer.clone(), count.saturating_add(1));
         drop(open);
         Ok(Permit {
-            places: self.clone(),
+            limit: self.clone(),
             payer,
         })
     }
@@ -39,7 +39,7 @@ impl ConcurrencyLimit {
 
 impl Drop for Permit {
     fn drop(&mut self) {
-        let mut open = self.places.lock();
+        let mut open = self.limit.lock();
         match open.get_mut(&self.payer) {
             Some(count) if *count > 1 => *count -= 1,
             _ => drop(open.remove(&self.payer)),
@@ -53,8 +53,8 @@ mod tests {
 
     #[test]
     fn a_caller_has_so_many_at_once_and_others_have_theirs() {
-        let places = Arc::new(ConcurrencyLimit::default());
-        let take = |name: &str, most| places.take(Payer::Project(name.into()), most);
+        let limit = Arc::new(ConcurrencyLimit::default());
+        let take = |name: &str, most| limit.take(Payer::Project(name.into()), most);
         let (first, _second) = (take("one", 2).unwrap(), take("one", 2).unwrap());
         assert!(matches!(take("one", 2), Err(Error::TooManyWatches { limit: 2 })));
         let other = take("other", 2).unwrap();
@@ -62,7 +62,7 @@ mod tests {
         let third = take("one", 2).unwrap();
         assert!(take("one", 2).is_err());
         drop((third, other));
-        assert_eq!(places.lock().len(), 1);
+        assert_eq!(limit.lock().len(), 1);
         let many: Vec<_> = (0..100).map(|_| take("one", 0).unwrap()).collect();
         drop(many);
         take("one", 2).unwrap();

@@ -12,12 +12,9 @@ use secrecy::ExposeSecret;
 use uuid::Uuid;
 
 use crate::artifacts::{Announced, ArtifactPath, Check, StoreError};
-use crate::error::chain;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, chain};
 use crate::ledger::{ArtifactRow, NewArtifact, Origin};
-use crate::service::Service;
-use crate::service::clock;
-use crate::service::upload;
+use crate::service::{Service, clock, upload};
 
 /// What names of uploads begin with.
 const COLLECTION: &str = "uploads/";

@@ -1,22 +1,14 @@
 //! Jobs that are submitted and listed.
-use crate::access::Caller;
-use crate::error::{Error, Result};
-use crate::ledger::{JobKind, NewJob};
-use crate::service::Service;
-use crate::service::clock;
-use crate::service::fingerprint;
-use crate::service::keys;
-use crate::service::message;
-use crate::service::operations;
-use crate::service::ownership;
-use crate::service::page;
-use crate::service::rate_limit::Class;
-use crate::service::rate_limit::payer;
-use crate::service::submission::{self, Submission};
-use crate::service::to_proto;
 use guardsplat_proto::v1::{CreateJobRequest, Job, ListJobsRequest, ListJobsResponse};
 use prost::Message as _;
 use uuid::Uuid;
+
+use crate::access::Caller;
+use crate::error::{Error, Result};
+use crate::ledger::{JobKind, NewJob};
+use crate::service::rate_limit::{Class, payer};
+use crate::service::submission::{self, Submission};
+use crate::service::{Service, clock, fingerprint, keys, message, operations, ownership, page, to_proto};
 
 /// A page ends early rather than come near the largest message that clients read by default.
 const MAX_PAGE_BYTES: usize = 2 << 20;

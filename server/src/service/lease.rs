@@ -8,15 +8,12 @@ use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use crate::artifacts::ArtifactPath;
-use crate::error::chain;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, chain};
 use crate::ledger::{Failure, FailureReason, JobRow, JobSpec, KeyId, KeyRow, KeyState, Lease, WorkerCapabilities};
-use crate::service::Service;
 use crate::service::changes::For;
-use crate::service::clock;
 use crate::service::names::ResourceKind;
 use crate::service::placement::described;
-use crate::service::to_proto;
+use crate::service::{Service, clock, to_proto};
 use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);

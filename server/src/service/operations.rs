@@ -4,13 +4,9 @@ use guardsplat_proto::v1::{Job, JobAttempt};
 
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, AttemptRow, FailureReason, JobRow, JobSpec, JobState};
-use crate::service::Service;
-use crate::service::clock;
 use crate::service::clock::timestamp;
-use crate::service::keys;
-use crate::service::lease;
 use crate::service::names::ResourceKind;
-use crate::service::to_proto;
+use crate::service::{Service, clock, keys, lease, to_proto};
 
 impl Service {
     /// Queues a job that failed once more, if it could be carried out.

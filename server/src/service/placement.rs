@@ -7,10 +7,7 @@ use guardsplat_proto::v1::Job;
 
 use crate::error::{Error, Result};
 use crate::ledger::{JobRow, JobState, ResourceRequirements, SeenWorker, WorkerCapabilities};
-use crate::service::Service;
-use crate::service::clock;
-use crate::service::text;
-use crate::service::to_proto;
+use crate::service::{Service, clock, text, to_proto};
 
 /// A worker that was not heard of for so long, and has no job, counts for nothing.
 const LATELY: Duration = Duration::from_secs(120);

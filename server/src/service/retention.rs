@@ -3,8 +3,7 @@ use std::time::Duration;
 
 use crate::error::Result;
 use crate::ledger::Before;
-use crate::service::Service;
-use crate::service::clock;
+use crate::service::{Service, clock};
 
 /// Things that go at one go: a transaction must not hold up others for long.
 const AT_ONCE: u32 = 100;

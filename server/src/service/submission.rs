@@ -11,10 +11,9 @@ use crate::error::{Error, Result};
 use crate::ledger::queue::PRIORITIES;
 use crate::ledger::{ArtifactId, JobSpec, KeyId};
 use crate::service::claims::{self, Claim};
-use crate::service::fingerprint;
 use crate::service::names::ResourceKind;
-use crate::service::text;
 use crate::service::violations::Violations;
+use crate::service::{fingerprint, text};
 
 /// Most suspects of one job.
 pub const MAX_SUSPECTS: usize = 1000;

@@ -7,13 +7,10 @@ use secrecy::ExposeSecret;
 use tokio::task::{Id, JoinSet};
 use tokio::time::{Instant, interval, timeout};
 
-use crate::error::Error;
-use crate::error::chain;
+use crate::error::{Error, chain};
 use crate::hooks::{PostError, Poster, event, next_attempt, signature};
 use crate::ledger::{HookId, Sending};
-use crate::service::Service;
-use crate::service::clock;
-use crate::service::text;
+use crate::service::{Service, clock, text};
 
 /// How often what is due is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(500);

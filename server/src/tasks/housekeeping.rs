@@ -4,11 +4,9 @@ use std::time::Duration;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use crate::artifacts::ArtifactPath;
-use crate::error::Result;
-use crate::error::chain;
+use crate::error::{Result, chain};
 use crate::ledger::{ArtifactRow, JobId};
-use crate::service::Service;
-use crate::service::clock;
+use crate::service::{Service, clock};
 
 /// How late an expired lease may be noticed.
 const REAP_EVERY: Duration = Duration::from_secs(1);

@@ -6,11 +6,9 @@ use std::collections::HashSet;
 use futures::TryStreamExt;
 
 use crate::artifacts::Listed;
-use crate::error::chain;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, chain};
 use crate::ledger::ArtifactId;
-use crate::service::Service;
-use crate::service::clock;
+use crate::service::{Service, clock};
 
 /// Paths that the ledger is asked about at one go.
 const AT_ONCE: usize = 500;

@@ -16,8 +16,7 @@ use super::stores::{bytes, download, server};
 use crate::access::DEFAULT_PROJECT;
 use crate::artifacts::ArtifactPath;
 use crate::artifacts::tests::endpoint::Endpoint;
-use crate::service::Limits;
-use crate::service::clock;
+use crate::service::{Limits, clock};
 
 const LIFETIME: Duration = Duration::from_secs(60);
 

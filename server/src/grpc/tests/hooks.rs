@@ -28,9 +28,8 @@ use crate::hooks::tests::{Received, Receiver, loose, poster};
 use crate::hooks::{Poster, Rules, signature};
 use crate::ledger::postgres::tests::Place;
 use crate::ledger::{Ledger, SqliteLedger};
-use crate::service::Limits;
-use crate::service::clock;
 use crate::service::clock::now;
+use crate::service::{Limits, clock};
 use crate::tasks::deliveries::deliveries;
 
 /// How long claims of these tests hold.

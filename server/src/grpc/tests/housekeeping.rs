@@ -8,8 +8,7 @@ use tonic::Code;
 
 use super::harness::{Server, chunk, first, key_spec, metadata, refused, soon};
 use crate::ledger::{NewArtifact, Origin};
-use crate::service::Limits;
-use crate::service::clock;
+use crate::service::{Limits, clock};
 
 /// An upload that was begun, and what continues it.
 async fn begin(

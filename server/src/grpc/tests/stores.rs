@@ -17,10 +17,8 @@ use uuid::Uuid;
 use super::harness::{MAX_ARTIFACT_BYTES, Server, metadata, not_found, sha256, soon, upload_messages};
 use crate::artifacts::tests::endpoint::{BUCKET, Endpoint};
 use crate::artifacts::{Announced, ArtifactPath, ArtifactStore, Place};
-use crate::ledger::SqliteLedger;
-use crate::ledger::postgres;
-use crate::service::Limits;
-use crate::service::clock;
+use crate::ledger::{SqliteLedger, postgres};
+use crate::service::{Limits, clock};
 
 /// How many jobs the test of faults has, where this is set.
 const JOBS_VARIABLE: &str = "GUARDSPLAT_STORE_JOBS";

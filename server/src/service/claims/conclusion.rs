@@ -8,11 +8,10 @@ use super::decision::Decided;
 use super::{Claim, hypotheses, of_job};
 use crate::error::{Error, Result};
 use crate::ledger::{Completion, JobResult, JobRow, KeyRow};
-use crate::service::Service;
-use crate::service::evidence;
 use crate::service::evidence::{Facts, Files, Read};
 use crate::service::lease::needed_key;
 use crate::service::names::ResourceKind;
+use crate::service::{Service, evidence};
 
 /// What a worker told besides the result.
 pub(crate) struct WorkerReadings {

@@ -8,12 +8,10 @@ use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 use crate::error::{Error, Result};
 use crate::ledger::{AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
 use crate::marks;
-use crate::service::Service;
 use crate::service::names::ResourceKind;
 use crate::service::submission::Submission;
-use crate::service::upload;
 use crate::service::violations::Violations;
-
+use crate::service::{Service, upload};
 pub(crate) use conclusion::WorkerReadings;
 pub(crate) use decision::Decided;
 

@@ -8,9 +8,8 @@ use super::hash;
 use crate::artifacts::{Announced, ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobId, JobRow, JobSpec, NewArtifact, Origin};
-use crate::service::Service;
-use crate::service::clock;
 use crate::service::names::ResourceKind;
+use crate::service::{Service, clock};
 
 /// Files with what they are for.
 pub struct Files {

@@ -7,15 +7,10 @@ use uuid::Uuid;
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, AssetFilter, AssetRow, KeyId, NewAsset, OwnerId};
 use crate::notary;
-use crate::service::Service;
 use crate::service::clock::{self, timestamp};
 use crate::service::names::ResourceKind;
-use crate::service::ownership;
-use crate::service::page;
-use crate::service::submission;
-use crate::service::text;
-use crate::service::upload;
 use crate::service::violations::Violations;
+use crate::service::{Service, ownership, page, submission, text, upload};
 
 const HASH: &str = "must be 64 hexadecimal digits in lower case";
 

@@ -4,10 +4,9 @@ use guardsplat_proto::v1::{Commitment, ListCommitmentsRequest, ListCommitmentsRe
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
-use crate::service::Service;
 use crate::service::clock::timestamp;
 use crate::service::names::ResourceKind;
-use crate::service::page;
+use crate::service::{Service, page};
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"commitments"];

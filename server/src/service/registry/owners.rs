@@ -4,14 +4,10 @@ use uuid::Uuid;
 
 use crate::error::{Error, Result};
 use crate::ledger::{NewOwner, OwnerRow};
-use crate::service::Service;
 use crate::service::clock::{self, timestamp};
 use crate::service::names::ResourceKind;
-use crate::service::ownership;
-use crate::service::page;
-use crate::service::submission;
-use crate::service::text;
 use crate::service::violations::Violations;
+use crate::service::{Service, ownership, page, submission, text};
 
 /// What page tokens of this list are bound to.
 const QUERY: &[&[u8]] = &[b"owners"];
