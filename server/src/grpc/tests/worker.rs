@@ -11,6 +11,7 @@ use guardsplat_proto::v1::{
 use tonic::{Code, Status};
 
 use super::harness::{Server, invalid, key_spec, not_found, refused};
+use crate::service::Limits;
 
 const LONG: Duration = Duration::from_secs(60);
 
@@ -48,6 +49,20 @@ async fn fail(server: &Server, job: &str, token: &str, reason: Reason, retryable
         ..FailJobRequest::default()
     };
     server.worker.clone().fail_job(request).await.map(|_| ())
+}
+
+#[tokio::test]
+async fn a_lease_tells_the_rate_that_the_operator_chose() {
+    for false_positive_rate in [Limits::default().false_positive_rate, 1e-9] {
+        let limits = Limits {
+            false_positive_rate,
+            ..Limits::default()
+        };
+        let server = Server::with(limits).await;
+        server.embed_job().await;
+        let lease = server.lease(LONG).await;
+        assert_eq!(lease.false_positive_rate, false_positive_rate);
+    }
 }
 
 #[tokio::test]
