@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Seeds, each with a key, a message and views of its own
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2,3")]
     seeds: Vec<u64>,
-    /// The settings that are called standard: draft, standard, thorough or paper
+    /// The settings that are called standard: draft, standard, robust, thorough or paper
     #[arg(long, default_value = "standard")]
     preset: Preset,
     /// A JSON file with settings in place of the preset's

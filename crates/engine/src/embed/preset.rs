@@ -27,6 +27,8 @@ pub enum Preset {
     /// What the figures in the documentation were made with.
     #[default]
     Standard,
+    /// Stands all that is done to pictures, at a message of 16 bits.
+    Robust,
     /// Twice the steps of standard, for more bits that are right at the same likeness.
     Thorough,
     /// Steps, views, sizes and weights as the GuardSplat paper has them.
@@ -40,11 +42,12 @@ impl std::str::FromStr for Preset {
         match text {
             "draft" => Ok(Self::Draft),
             "standard" => Ok(Self::Standard),
+            "robust" => Ok(Self::Robust),
             "thorough" => Ok(Self::Thorough),
             "paper" => Ok(Self::Paper),
             other => Err(Error::BadOption {
                 field: "preset",
-                reason: format!("{other:?} is not a preset, must be draft, standard, thorough or paper"),
+                reason: format!("{other:?} is not a preset, must be draft, standard, robust, thorough or paper"),
             }),
         }
     }
@@ -52,13 +55,14 @@ impl std::str::FromStr for Preset {
 
 impl Preset {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Draft, Self::Standard, Self::Thorough, Self::Paper];
+    pub const ALL: [Self; 5] = [Self::Draft, Self::Standard, Self::Robust, Self::Thorough, Self::Paper];
 
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self {
             Self::Draft => "draft",
             Self::Standard => "standard",
+            Self::Robust => "robust",
             Self::Thorough => "thorough",
             Self::Paper => "paper",
         }
@@ -160,6 +164,11 @@ impl Preset {
                 },
                 ..standard
             },
+            Self::Robust => Settings {
+                steps: 240,
+                robust_to: EVERYDAY.into_iter().chain(RobustTo::all().of_pictures()).collect(),
+                ..standard
+            },
             Self::Thorough => Settings { steps: 480, ..standard },
             Self::Paper => Settings {
                 distortions: Ranges::default(),
@@ -205,6 +214,10 @@ mod tests {
                 settings.robust_to.contains(DistortionKind::ShTruncation),
                 preset != Preset::Paper
             );
+            let stands_pictures = RobustTo::all()
+                .of_pictures()
+                .all(|kind| settings.robust_to.contains(kind));
+            assert_eq!(stands_pictures, preset == Preset::Robust);
         }
     }
 }
