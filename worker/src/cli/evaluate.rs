@@ -5,6 +5,7 @@ use std::time::Instant;
 use crate::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
+use guardsplat_engine::clip::{Clip, Parts};
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::embed::{self, Preset, Settings};
 use guardsplat_engine::extract::Engine;
@@ -228,7 +229,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or(load::SHIPPED),
+        Extractor::Clip => clip.unwrap_or(Clip::shipped_for(bits)),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {
@@ -241,7 +242,7 @@ fn engine(
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
     let known = match arguments.extractor {
         Extractor::Clip => {
-            let (_, identity) = load::clip(clip, &compute, guardsplat_engine::clip::Parts::Image)?;
+            let (_, identity) = load::clip(name, None, &compute, Parts::Image)?;
             // A key of another CLIP of that name is one of an earlier version.
             known.filter(|key| key.clip.hash == identity.hash)
         }

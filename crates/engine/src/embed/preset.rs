@@ -120,6 +120,7 @@ impl Preset {
                 ..Ranges::default()
             },
             distorted_size: 640,
+            shared_views: 0.5,
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
@@ -179,6 +180,7 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 distorted_size: 224,
+                shared_views: 0.0,
                 robust_to: RobustTo::none(),
                 lambda: LossWeights {
                     l1: 0.8,

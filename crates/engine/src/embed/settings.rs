@@ -132,6 +132,11 @@ pub struct Settings {
     /// Side in pixels to which a training view is enlarged before its picture is distorted, where that is more than its
     /// own: squares of JPEG and grains of noise are as large, against the scene, as in pictures of that side.
     pub distorted_size: u32,
+    /// Share of the views of a step that are read as shared pictures are: compressed, with noise, or with tones that were
+    /// estimated a little wrongly.
+    // Left out of JSON where there are none, as above.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub shared_views: f32,
     /// When to stop before the last step.
     pub early_stop: Option<EarlyStop>,
     /// How the result is verified.
@@ -204,6 +209,7 @@ impl Settings {
         if let Some(ring) = &self.ring {
             within("ring.elevation", f64::from(ring.elevation), -80.0, 80.0)?;
         }
+        within("shared_views", f64::from(self.shared_views), 0.0, 1.0)?;
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         let l = &self.lambda;
@@ -241,6 +247,10 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+fn is_zero(value: &f32) -> bool {
+    *value == 0.0
 }
 
 /// Fails unless `low <= value <= high`.
