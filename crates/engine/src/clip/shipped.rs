@@ -2,6 +2,7 @@
 //! marks are read for ever. `docs/clip.md` tells how they came about.
 use std::path::Path;
 
+use burn::module::Module;
 use burn::tensor::Device;
 
 use super::config::ClipConfig;
