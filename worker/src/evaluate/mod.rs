@@ -12,6 +12,7 @@ mod run;
 mod steganalysis;
 mod trial;
 mod variants;
+mod view_readings;
 
 pub use plan::{Trade, plan};
 pub use run::{Options, Progress, run};
