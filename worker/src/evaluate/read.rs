@@ -80,7 +80,7 @@ impl Views {
         // One at a time: large pictures of all views need not be there as floats.
         let pictures = self.images.iter().map(to_picture);
         if self.processed && engine.extractor.tones() == Tones::Estimated {
-            let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture)?));
+            let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture, &[])?));
             return Ok(ViewReadings::Estimated(read.collect::<Result<_>>()?));
         }
         let mut logits = Vec::with_capacity(self.images.len());

@@ -18,7 +18,9 @@ impl ViewReadings {
         match self {
             Self::Decided(logits) => Ok(logits.clone()),
             Self::Estimated(pictures) => {
-                let alone = pictures.iter().flat_map(|picture| estimated(std::slice::from_ref(picture)));
+                let alone = pictures
+                    .iter()
+                    .flat_map(|picture| estimated(std::slice::from_ref(picture)));
                 Ok(PooledLogits::new(alone.collect())?)
             }
         }

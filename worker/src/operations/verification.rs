@@ -122,7 +122,8 @@ pub fn read_hypotheses(
     for (index, path) in source.pictures.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
         shown.see("picture", index, &picture)?;
-        pictures.push(PictureLogits::read(engine, &picture)?);
+        let read = PictureLogits::read(engine, &picture, &pictures)?;
+        pictures.push(read);
         progress(of_scenes.len() + index + 1, count(source, views));
     }
     let together = |(hypothesis, logits): (Hypothesis, PooledLogits)| {
@@ -132,7 +133,11 @@ pub fn read_hypotheses(
     let read = hypotheses(engine, &pictures)?.into_iter().map(together);
     Ok(HypothesisReadings {
         readings: read.collect::<Result<_>>()?,
-        estimates: estimates(&pictures).into_iter().flatten().map(ToString::to_string).collect(),
+        estimates: estimates(&pictures)
+            .into_iter()
+            .flatten()
+            .map(ToString::to_string)
+            .collect(),
         ignored,
     })
 }

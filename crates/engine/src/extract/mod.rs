@@ -10,8 +10,8 @@ mod pooled;
 mod suspect_kind;
 mod window;
 
-pub(crate) use engine::cpu_weight_cache;
 pub use blind::Candidate;
+pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
 pub use hypothesis::{searched_hypotheses, without_borders};

@@ -30,14 +30,16 @@ struct Searched {
 }
 
 impl PictureLogits {
-    /// Reads a picture under every hypothesis that the engine searches.
+    /// Reads a picture under every hypothesis that the engine searches. Where what was done is estimated, what was done to
+    /// `others` of the same suspect is tried, too.
     ///
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
-    pub fn read(engine: &Engine, picture: &Picture) -> Result<Self> {
+    pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
+        let others: Vec<_> = others.iter().filter_map(Self::estimated).collect();
         Ok(Self(match engine.extractor.tones() {
             Tones::Searched => Read::Searched(Searched::read(engine, picture)?),
-            Tones::Estimated => Read::Estimated(BlindReading::read(engine, picture)?),
+            Tones::Estimated => Read::Estimated(BlindReading::read(engine, picture, &others)?),
         }))
     }
 
@@ -115,7 +117,11 @@ fn estimated_hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<V
     let estimated = estimates(pictures)
         .into_iter()
         .zip(pictures)
-        .map(|(estimate, picture)| estimate.map_or(picture.as_given(), |estimate| estimate.logits()).to_vec());
+        .map(|(estimate, picture)| {
+            estimate
+                .map_or(picture.as_given(), |estimate| estimate.logits())
+                .to_vec()
+        });
     let readings = [given.collect(), estimated.collect()].map(PooledLogits::new);
     searched_hypotheses(engine.extractor.as_ref())
         .into_iter()

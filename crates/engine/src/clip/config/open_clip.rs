@@ -1,6 +1,8 @@
 //! Reads and writes OpenCLIP's model configuration. Unknown fields are errors: most of them change what the
 //! model computes without changing the shape of its weights.
-use super::{Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, Tones, VisionConfig, VisionTower};
+use super::{
+    Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, Tones, VisionConfig, VisionTower,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

@@ -29,7 +29,10 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
                 (place, score::of_logits(&with) + own)
             });
             // The first of equal ones.
-            let best = scored.fold((0, f64::NEG_INFINITY), |best, now| if now.1 > best.1 { now } else { best });
+            let best = scored.fold(
+                (0, f64::NEG_INFINITY),
+                |best, now| if now.1 > best.1 { now } else { best },
+            );
             places[picture] = best.0;
             add(&mut sum, picture, places[picture], 1.0);
         }
@@ -37,5 +40,9 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
             break;
         }
     }
-    pictures.iter().zip(places).map(|(picture, place)| picture.candidates.get(place)).collect()
+    pictures
+        .iter()
+        .zip(places)
+        .map(|(picture, place)| picture.candidates.get(place))
+        .collect()
 }

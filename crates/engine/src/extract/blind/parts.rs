@@ -1,11 +1,13 @@
 //! Parts of a picture that may be all that shows the scene.
 use guardsplat_codeword::Window;
 
-use super::BETTER;
 use crate::error::Result;
 use crate::extract::window::{crop, windows_of};
 use crate::extract::{Engine, without_borders};
 use crate::picture::Picture;
+
+/// How much better a window must look than the whole, as the logarithm of the size of logits.
+const BETTER: f64 = 0.05;
 
 /// Which part of a picture is read.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,32 +1,65 @@
 //! How much logits look like those of a mark, whatever it says.
 //!
 //! A mark pushes all bits of a picture away from 0, about equally far. Logits of an unmarked picture, or of one whose tones
-//! are wrong, spread around 0, and few are large. Nothing here knows a message, so that a reading may be chosen by it
-//! without being paid for.
+//! are wrong, spread around 0: fewer are large, and some are small. Nothing here knows a message, so that a reading may be
+//! chosen by it without being paid for.
 use crate::extract::photometric::ToneChange;
 
-/// How unlikely changes are: a change as large as these, in logarithms, costs what [`COST`] says.
-const COMMON: [f32; 6] = [0.4, 0.4, 0.4, 0.35, 0.35, 0.35];
-/// How much tints cost: channels that differ by this much.
+/// Changes of brightness, gamma, saturation or contrast that are nothing special, as logarithms.
+const COMMON: f32 = 0.4;
+/// How far channels commonly differ.
 const TINT: f32 = 0.1;
-/// What a common change costs, in logarithms of the size of logits.
+/// What a change of that size must gain, in logarithms of the size of logits. It decides among equals, and no more.
 const COST: f64 = 0.02;
+/// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
+/// times reaches two to three.
+const CLEAR: f64 = 3.0;
 
-/// The logarithm of a mean size of logits, in which large ones count less than their squares would; not a number where
-/// one isn't.
+/// The logarithm of the size of logits: of the mean of their roots, squared, which is largest where all are alike. Not finite
+/// where one isn't.
 pub(super) fn of_logits(logits: &[f32]) -> f64 {
-    let mean = logits.iter().map(|v| f64::from(v.abs())).sum::<f64>() / logits.len().max(1) as f64;
-    match mean > 0.0 {
-        true => mean.ln(),
-        false => f64::NEG_INFINITY,
-    }
+    let roots: f64 = logits.iter().map(|v| f64::from(v.abs()).sqrt()).sum();
+    2.0 * (roots / logits.len().max(1) as f64).ln()
 }
 
 /// What a change must gain to be believed.
 pub(super) fn cost(change: &ToneChange) -> f64 {
     let square = |v: f32| f64::from(v * v);
-    let common: f64 = change.logs.iter().zip(COMMON).map(|(v, most)| square(v / most)).sum();
-    let mean = change.logs[..3].iter().sum::<f32>() / 3.0;
-    let tint: f64 = change.logs[..3].iter().map(|v| square((v - mean) / TINT)).sum();
+    let [gains @ .., gamma, saturation, contrast] = change.logs;
+    let mean = gains.iter().sum::<f32>() / gains.len() as f32;
+    let common: f64 = [mean, gamma, saturation, contrast]
+        .map(|v| square(v / COMMON))
+        .iter()
+        .sum();
+    let tint: f64 = gains.iter().map(|v| square((v - mean) / TINT)).sum();
     COST * (common + tint)
+}
+
+/// How scores of readings are spread that are nearly all wrong.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spread {
+    middle: f64,
+    deviation: f64,
+}
+
+impl Spread {
+    /// That of these; `None` of too few.
+    pub fn of(scores: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut scores: Vec<f64> = scores.collect();
+        if scores.len() < 20 {
+            return None;
+        }
+        scores.sort_by(f64::total_cmp);
+        let at = |share: f64| scores[(share * (scores.len() - 1) as f64) as usize];
+        Some(Self {
+            middle: at(0.5),
+            // The middle half of a normal distribution is 1.349 deviations wide.
+            deviation: (at(0.75) - at(0.25)) / 1.349,
+        })
+    }
+
+    /// Whether a score is so far above that it is hardly one of these.
+    pub fn is_clear(&self, score: f64) -> bool {
+        score > self.middle + CLEAR * self.deviation
+    }
 }

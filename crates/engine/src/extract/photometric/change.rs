@@ -122,3 +122,75 @@ impl fmt::Display for ToneChange {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(pixels: Vec<f32>) -> Picture {
+        Picture {
+            width: (pixels.len() / 3) as u32,
+            height: 1,
+            pixels,
+        }
+    }
+
+    #[test]
+    fn each_coordinate_is_undone_as_it_was_done() {
+        let before = picture((0..60).map(|i| 0.3 + 0.3 * (i as f32 * 0.37).sin().abs()).collect());
+        for place in 0..COORDINATES {
+            for log in [-0.2, 0.2] {
+                let change = |log: f32| {
+                    let mut change = ToneChange::default();
+                    change.logs[place] = log;
+                    change
+                };
+                let done = change(-log).undone(&before, &before).unwrap();
+                assert_ne!(done, before);
+                let after = change(log).undone(&done, &done).unwrap();
+                for (a, b) in after.pixels.iter().zip(&before.pixels) {
+                    assert!((a - b).abs() < 1e-5, "{place} {log}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn contrast_is_undone_about_the_mean_from_before_a_ground_was_cut() {
+        let scene = (0..30).map(|i| 0.3 + 0.01 * i as f32);
+        let before = picture(scene.chain(std::iter::repeat_n(1.0, 60)).collect());
+        let mean = before.pixels.iter().sum::<f32>() / before.pixels.len() as f32;
+        let more = |v: &f32| (mean + 1.2 * (v - mean)).clamp(0.0, 1.0);
+        let done = picture(before.pixels.iter().map(more).collect());
+        let mut change = ToneChange::default();
+        change.logs[ToneChange::CONTRAST] = 1.2_f32.ln();
+        let after = change.undone(&done, &done).unwrap();
+        for (a, b) in after.pixels.iter().zip(&before.pixels[..30]) {
+            assert!((a - b).abs() < 0.003, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_have_been_done_is_told() {
+        let dim = picture(vec![0.9; 30]);
+        let mut change = ToneChange::default();
+        change.logs[..3].fill(-0.4);
+        assert_eq!(change.undone(&dim, &dim), None);
+        // White that was cut says nothing.
+        let white = picture(vec![1.0; 30]);
+        assert_eq!(change.undone(&white, &white), Some(white.clone()));
+        let fitted = change.with_white([0.9, 0.8, 1.0], &dim);
+        let gains = fitted.logs.map(f32::exp);
+        assert!((gains[0] - 0.9).abs() < 1e-6 && (gains[1] - 0.8).abs() < 1e-6 && gains[2] == 1.0);
+    }
+
+    #[test]
+    fn changes_are_told_in_words() {
+        let change = ToneChange {
+            logs: [0.8_f32, 0.8, 0.88, 1.0, 1.2, 1.0].map(f32::ln),
+        };
+        let told = "brightness x 0.81, red x 0.99, green x 0.99, blue x 1.09, saturation x 1.20 undone";
+        assert_eq!(change.to_string(), told);
+        assert_eq!(ToneChange::default().to_string(), "tones as they are");
+    }
+}
