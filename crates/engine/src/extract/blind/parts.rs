@@ -7,7 +7,7 @@ use crate::extract::{Engine, without_borders};
 use crate::picture::Picture;
 
 /// How much better a window must look than the whole, as the logarithm of the size of logits.
-const BETTER: f64 = 0.05;
+const BETTER: f64 = 0.1;
 
 /// Which part of a picture is read.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,12 +5,11 @@
 //! chosen by it without being paid for.
 use crate::extract::photometric::ToneChange;
 
-/// Changes of brightness, gamma, saturation or contrast that are nothing special, as logarithms.
-const COMMON: f32 = 0.4;
-/// How far channels commonly differ.
-const TINT: f32 = 0.1;
-/// What a change of that size must gain, in logarithms of the size of logits. It decides among equals, and no more.
-const COST: f64 = 0.02;
+/// A change of a coordinate, as a logarithm, that costs half as much as the largest.
+const SMALL: f32 = 0.1;
+/// What the largest change of a coordinate must gain to be believed, in logarithms of the size of logits. The size of
+/// logits is largest a little beside the truth, and most people change one thing or nothing.
+const COST: f64 = 0.06;
 /// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
 /// times reaches two to three.
 const CLEAR: f64 = 3.0;
@@ -22,17 +21,21 @@ pub(super) fn of_logits(logits: &[f32]) -> f64 {
     2.0 * (roots / logits.len().max(1) as f64).ln()
 }
 
-/// What a change must gain to be believed.
+/// What a change must gain to be believed. A tint is what channels differ by from the middle one.
 pub(super) fn cost(change: &ToneChange) -> f64 {
-    let square = |v: f32| f64::from(v * v);
-    let [gains @ .., gamma, saturation, contrast] = change.logs;
-    let mean = gains.iter().sum::<f32>() / gains.len() as f32;
-    let common: f64 = [mean, gamma, saturation, contrast]
-        .map(|v| square(v / COMMON))
-        .iter()
-        .sum();
-    let tint: f64 = gains.iter().map(|v| square((v - mean) / TINT)).sum();
-    COST * (common + tint)
+    let [mut gains @ .., gamma, saturation, contrast] = change.logs;
+    gains.sort_by(f32::total_cmp);
+    let [low, brightness, high] = gains;
+    let done = [
+        brightness,
+        low - brightness,
+        high - brightness,
+        gamma,
+        saturation,
+        contrast,
+    ];
+    let share = |v: f32| f64::from(v.abs() / (v.abs() + SMALL));
+    COST * done.map(share).iter().sum::<f64>()
 }
 
 /// How scores of readings are spread that are nearly all wrong.
