@@ -3,7 +3,7 @@
 # made and a sample scene marked through the client, renders the scene before and after, verifies both, as scenes and as
 # pictures, and stops the server.
 #
-#   deploy/quickstart.sh [--preset draft|standard|thorough|paper] [--device auto|wgpu|cpu] [OUT]
+#   deploy/quickstart.sh [--preset draft|standard|robust|thorough|paper] [--device auto|wgpu|cpu] [OUT]
 #
 # OUT is the folder for everything that is made, ./quickstart-out unless given; the server keeps its data in OUT/data.
 # Exits with 0 when the marked scene is recognised and the unmarked one is not, and with 1 otherwise.
@@ -34,8 +34,8 @@ while [ $# -gt 0 ]; do
 done
 
 case $preset in
-    draft | standard | thorough | paper) ;;
-    *) echo "quickstart: $preset is not a preset, must be draft, standard, thorough or paper" >&2; exit 1 ;;
+    draft | standard | robust | thorough | paper) ;;
+    *) echo "quickstart: $preset is not a preset, must be draft, standard, robust, thorough or paper" >&2; exit 1 ;;
 esac
 case $device in
     auto | wgpu | cpu) ;;

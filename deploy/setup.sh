@@ -55,6 +55,8 @@ setup_tests() {
     type -P kill >/dev/null || missing+=(procps)
     # Pages of evidence are looked at in a browser.
     type -P chromium >/dev/null || missing+=(chromium)
+    # AVIF, one of the codecs that pictures go through.
+    command -v avifenc >/dev/null || missing+=(libavif-bin)
     # Looks at the units in deploy/systemd.
     command -v systemd-analyze >/dev/null || missing+=(systemd)
     has_postgresql || missing+=(postgresql)

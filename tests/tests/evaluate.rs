@@ -108,7 +108,7 @@ fn codec() -> Vec<u8> {
 #[test]
 fn the_learned_codec_attacks_where_its_weights_are_given() {
     let environment = environment();
-    let line = "evaluate results --scenes one.ply --experiments robustness --only standard --bits 16 --seeds 1 \
+    let line = "evaluate results --scenes one.ply --experiments robustness --attacks none,vae:3 --bits 16 --seeds 1 \
         --settings hasty.json --size 32 --views 2 --device cpu";
     let missing = || {
         let report: Value = serde_json::from_slice(&environment.read("results/report.json")).unwrap();
@@ -129,6 +129,59 @@ fn the_learned_codec_attacks_where_its_weights_are_given() {
     environment.write("codec.safetensors", &codec()[..9000]);
     environment.refuses(&format!("{line} --vae codec.safetensors"), &["vae", "safetensors"]);
     environment.refuses(&format!("{line} --vae none"), &["none"]);
+}
+
+const ROBUSTNESS: &str = "evaluate results --scenes one.ply --experiments robustness --bits 16,32 --seeds 1 \
+    --settings hasty.json --size 48 --views 5 --device cpu --attacks jpeg-turbo:30";
+
+#[test]
+fn the_robustness_table_is_read_from_other_views_and_goes_on_where_it_was() {
+    let environment = environment();
+    environment.write("page.md", "<!-- BEGIN robustness -->\n<!-- END robustness -->\n");
+    let line = format!("{ROBUSTNESS} --document page.md");
+    environment.exits(&line, 0);
+    let whole = environment.read("results/results.jsonl");
+    let all = records(&environment);
+    let of = |kind: &str| -> Vec<&Value> {
+        let records = all.iter().map(|line| &line["record"][kind]);
+        records.filter(|record| !record.is_null()).collect()
+    };
+    let marks: Vec<(&Value, &Value)> = of("mark")
+        .iter()
+        .map(|mark| (&mark["embedding"]["variant"], &mark["embedding"]["bits"]))
+        .collect();
+    assert_eq!(
+        marks,
+        [(&"standard".into(), &32.into()), (&"robust".into(), &16.into())]
+    );
+    let readings = of("reading");
+    assert_eq!(readings.len(), 2);
+    // The views of the verification come first.
+    assert!(readings.iter().all(|reading| reading["first_view"] == 20));
+    // 16 bits can make no claim.
+    let claims = of("claims");
+    assert_eq!(claims.len(), 1);
+    assert!(
+        claims
+            .iter()
+            .all(|claim| claim["pool"] == 5 && claim["p_values"].as_array().unwrap().len() == 1)
+    );
+
+    let table = String::from_utf8(environment.read("results/robustness.csv")).unwrap();
+    // A head, and for either mark one attack, over all scenes and of one.
+    assert_eq!(table.lines().count(), 1 + 2 * 2, "{table}");
+    let page = String::from_utf8(environment.read("page.md")).unwrap();
+    for text in [
+        "| JPEG 30 | jpeg-turbo:30 | 1 |",
+        "bar 93.0",
+        "64 bits, standard: not measured",
+    ] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+
+    environment.write("results/results.jsonl", &whole[..whole.len() - 40]);
+    environment.exits(&line, 0);
+    assert_eq!(environment.read("results/results.jsonl"), whole);
 }
 
 const SECURITY: &str = "evaluate results --scenes one.ply two.ply --experiments security --bits 16 --seeds 1 \
@@ -252,6 +305,12 @@ fn what_cannot_be_evaluated_is_refused() {
     environment.refuses(
         "evaluate results --experiments magic --scenes one.ply",
         &["magic", "capacity"],
+    );
+    let robustness = "evaluate results --experiments robustness --device cpu --scenes one.ply";
+    environment.refuses(&format!("{robustness} --attacks jpeg:0"), &["jpeg", "1 to 100"]);
+    environment.refuses(
+        "evaluate results --device cpu --scenes one.ply --attacks none",
+        &["attacks", "robustness"],
     );
     let trade = "evaluate results --experiments trade --device cpu --scenes one.ply";
     environment.refuses(&format!("{trade} --only magic"), &["magic", "draft", "half-weights"]);

@@ -194,7 +194,7 @@ fn what_does_not_fit_the_key_is_refused() {
         (embed("--key none.key --message c0ffee42"), &["none.key"]),
         (
             embed("--key k.key --message c0ffee42 --preset best"),
-            &["best", "draft, standard, thorough or paper"],
+            &["best", "draft, standard, robust, thorough or paper"],
         ),
         (
             embed("--key k.key --message c0ffee42 --robust-to jpeg,magic"),

@@ -28,6 +28,8 @@ pub enum Preset {
     Draft,
     /// What is recommended
     Standard,
+    /// Stands all that is done to pictures; for messages of 16 bits
+    Robust,
     /// Twice the work, for more bits that are right
     Thorough,
     /// Steps, views and sizes of the paper
@@ -39,6 +41,7 @@ impl From<Preset> for embed_spec::Preset {
         match preset {
             Preset::Draft => Self::Draft,
             Preset::Standard => Self::Standard,
+            Preset::Robust => Self::Robust,
             Preset::Thorough => Self::Thorough,
             Preset::Paper => Self::Paper,
         }

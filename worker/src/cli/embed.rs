@@ -34,7 +34,7 @@ pub struct Arguments {
     /// The message in hexadecimal, as many bits as the key has
     #[arg(long, value_name = "HEX")]
     message: String,
-    /// draft, standard, thorough or paper
+    /// draft, standard, robust, thorough or paper
     #[arg(long, default_value = "standard")]
     preset: Preset,
     /// Decides views, backgrounds and augmentation

@@ -2,9 +2,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::evaluate::{Options, Progress, Trade, Variant, plan, run as carry_out, variants};
+use crate::evaluate::{Options, Progress, Robustness, Trade, Variant, attacks, plan, run as carry_out, variants};
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
+use guardsplat_engine::clip::{Clip, Parts};
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::embed::{self, Preset, Settings};
 use guardsplat_engine::extract::Engine;
@@ -40,7 +41,7 @@ pub struct Arguments {
     /// Seeds, each with a key, a message and views of its own
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2,3")]
     seeds: Vec<u64>,
-    /// The settings that are called standard: draft, standard, thorough or paper
+    /// The settings that are called standard: draft, standard, robust, thorough or paper
     #[arg(long, default_value = "standard")]
     preset: Preset,
     /// A JSON file with settings in place of the preset's
@@ -53,6 +54,10 @@ pub struct Arguments {
     /// Only these variants: those of trade where that is among the experiments, or else of all of them
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
+    /// Only these attacks of robustness, and others that are no line of it: none, jpeg:50..95, tint:1.05/1/0.95, and
+    /// occlusion:0.1, or the suites paper, everyday and all
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    attacks: Vec<String>,
     /// Side of the pictures that are read, in pixels
     #[arg(long, value_name = "PX", default_value_t = 160, value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: u32,
@@ -127,6 +132,7 @@ fn plotted(arguments: &Arguments) -> Option<Experiment> {
 /// last scene.
 fn check(arguments: &Arguments) -> Result<()> {
     timed(arguments)?;
+    robustness(arguments)?;
     if let (Extractor::Hidden, Some(name)) = (arguments.extractor, &arguments.clip) {
         return Err(Error::bad_option(
             "clip",
@@ -166,9 +172,18 @@ fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Opti
         device: compute.name.split(':').next().unwrap_or_default().into(),
         variants: timed(arguments)?,
     };
-    let mut plan = plan(&arguments.experiments, &settings(arguments)?, &arguments.bits, &trade)?;
+    let mut plan = plan(
+        &arguments.experiments,
+        &settings(arguments, arguments.preset)?,
+        &arguments.bits,
+        &trade,
+        &robustness(arguments)?,
+    )?;
     if !arguments.experiments.contains(&Experiment::Trade) {
         plan.keep_only(&arguments.only)?;
+    }
+    for missing in plan.missing_programs() {
+        eprintln!("note: not all attacks are measured: {missing}");
     }
     let options = Options {
         scenes: arguments.scenes.clone(),
@@ -189,13 +204,20 @@ fn measure(arguments: &Arguments, store: &mut Store, compute: Compute, vae: Opti
         Progress::Embedding(_) => {}
         Progress::Read(attack, accuracy) => display.say(&format!("  {attack}: {:.2} %", 100.0 * accuracy)),
         Progress::Claimed(about, matches, of) => display.say(&format!("  claims, {about}: {matches} of {of} match")),
+        Progress::ReadAll(attacks, time) => {
+            display.say(&format!(
+                "  read under {attacks} attacks in {:.0} s",
+                time.as_secs_f64()
+            ));
+        }
         Progress::Failed(why) => display.say(&format!("  failed: {why}")),
         Progress::Detected(bits, detector, area) => display.say(&format!("{bits} bits, {detector}: area {area:.3}")),
     })
 }
 
-fn settings(arguments: &Arguments) -> Result<Settings> {
-    let settings = arguments.preset.settings();
+/// The settings of a preset, with those of the file in their place.
+fn settings(arguments: &Arguments, preset: Preset) -> Result<Settings> {
+    let settings = preset.settings();
     match &arguments.settings {
         None => Ok(settings),
         Some(path) => Ok(settings.overridden(&std::fs::read_to_string(path).map_err(Error::io(path))?)?),
@@ -204,7 +226,7 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
 
 /// What trade times, if it is asked for.
 fn timed(arguments: &Arguments) -> Result<Vec<Variant>> {
-    let base = settings(arguments)?;
+    let base = settings(arguments, arguments.preset)?;
     let own = match &arguments.variants {
         None => None,
         Some(path) => Some(std::fs::read_to_string(path).map_err(Error::io(path))?),
@@ -214,6 +236,20 @@ fn timed(arguments: &Arguments) -> Result<Vec<Variant>> {
         false => &[],
     };
     variants(&base, own.as_deref(), only)
+}
+
+/// What robustness measures.
+fn robustness(arguments: &Arguments) -> Result<Robustness> {
+    if !arguments.attacks.is_empty() && !arguments.experiments.contains(&Experiment::Robustness) {
+        return Err(Error::bad_option(
+            "attacks",
+            "they are of robustness: name it in --experiments",
+        ));
+    }
+    Ok(Robustness {
+        robust: settings(arguments, Preset::Robust)?,
+        attacks: attacks(&arguments.attacks)?,
+    })
 }
 
 /// The engine for a length and a seed, with a key that is kept in `folder`, and the seconds that making it took.
@@ -228,7 +264,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or(load::SHIPPED),
+        Extractor::Clip => clip.unwrap_or(Clip::shipped_for(bits)),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {
@@ -241,7 +277,7 @@ fn engine(
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
     let known = match arguments.extractor {
         Extractor::Clip => {
-            let (_, identity) = load::clip(clip, &compute, guardsplat_engine::clip::Parts::Image)?;
+            let (_, identity) = load::clip(name, None, &compute, Parts::Image)?;
             // A key of another CLIP of that name is one of an earlier version.
             known.filter(|key| key.clip.hash == identity.hash)
         }
@@ -296,6 +332,9 @@ fn write_reports(arguments: &Arguments, store: &Store) -> Result<()> {
             .collect::<guardsplat_evaluation::Result<Vec<_>>>()?;
         output::write_json(&reports, &folder.join("report.json"))?;
         output::write_csv(&selection, &folder.join("readings.csv"))?;
+        if arguments.experiments.contains(&Experiment::Robustness) {
+            output::write_robustness_csv(&selection, &folder.join("robustness.csv"))?;
+        }
         output::write_html(&reports, folder, &folder.join("report.html"))?;
         if let Some(path) = &arguments.plot {
             let of = plotted(arguments).map(Experiment::name);

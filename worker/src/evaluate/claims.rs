@@ -38,7 +38,7 @@ const CHANGES: [&str; 8] = [
 /// What is looked at, and in how many ways.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Case {
-    suspect: &'static str,
+    suspect: String,
     searched: bool,
     pools: Vec<usize>,
 }
@@ -56,8 +56,8 @@ pub(super) struct ClaimTrials<'a> {
 impl ClaimTrials<'_> {
     /// What the store does not have yet, of so many views.
     pub fn left(&self, store: &Store, views: usize) -> Vec<Case> {
-        let case = |suspect, searched, pools: &[usize]| Case {
-            suspect,
+        let case = |suspect: &str, searched, pools: &[usize]| Case {
+            suspect: suspect.into(),
             searched,
             pools: pools.to_vec(),
         };
@@ -69,7 +69,7 @@ impl ClaimTrials<'_> {
         for case in &mut all {
             case.pools.retain(|pool| {
                 let shape = (self.size, views as u32, *pool as u32);
-                *pool <= views && !store.has(&claims_id(self.mark, case.suspect, case.searched, shape))
+                *pool <= views && !store.has(&claims_id(self.mark, &case.suspect, case.searched, shape))
             });
         }
         all.retain(|case| !case.pools.is_empty());
@@ -79,7 +79,7 @@ impl ClaimTrials<'_> {
     /// Makes the claims of a case, a record for each number of views. `marked` are views of the mark, and `clean` renders
     /// them of the scene without it.
     pub fn carry_out(&self, case: &Case, marked: &Views, clean: impl FnOnce() -> Result<Views>) -> Result<Vec<Claims>> {
-        let pictures = match case.suspect {
+        let pictures = match case.suspect.as_str() {
             SCENE | NONE => marked.pictures()?,
             UNMARKED => clean()?.pictures()?,
             change => {
@@ -92,14 +92,30 @@ impl ClaimTrials<'_> {
             .map(|picture| Suspect::read(self.engine, picture, case.searched))
             .collect::<Result<Vec<_>>>()?;
         let pools = case.pools.iter();
-        pools.map(|pool| self.claims(case, *pool, &suspects)).collect()
+        pools.map(|pool| self.claims(case, *pool, &suspects, WRONG)).collect()
     }
 
-    fn claims(&self, case: &Case, pool: usize, suspects: &[Suspect]) -> Result<Claims> {
+    /// The claim about the first pictures of views that this was done to, read together under every hypothesis; no wrong
+    /// ones beside it.
+    pub fn together(&self, suspect: &str, views: &Views, pictures: usize) -> Result<Claims> {
+        let suspects = views
+            .first(pictures)
+            .iter()
+            .map(|picture| Suspect::read(self.engine, picture, true))
+            .collect::<Result<Vec<_>>>()?;
+        let case = Case {
+            suspect: suspect.into(),
+            searched: true,
+            pools: vec![pictures],
+        };
+        self.claims(&case, pictures, &suspects, 0)
+    }
+
+    fn claims(&self, case: &Case, pool: usize, suspects: &[Suspect], wrong: u64) -> Result<Claims> {
         let target = self.target()?;
         let mut claims = Claims {
             mark: self.mark.clone(),
-            suspect: case.suspect.into(),
+            suspect: case.suspect.clone(),
             searched: case.searched,
             size: self.size,
             views: suspects.len() as u32,
@@ -110,7 +126,7 @@ impl ClaimTrials<'_> {
             payloads: 0,
             wrong: 0,
             wrong_at_most: [0; POWERS],
-            wrong_as_trials: (pool > 1).then_some([0; POWERS]),
+            wrong_as_trials: (pool > 1 && wrong > 0).then_some([0; POWERS]),
         };
         // The same wrong claims whatever was read, and others for each group of views.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0x7772_6f6e_6700 ^ ((pool as u64) << 32));
@@ -122,7 +138,7 @@ impl ClaimTrials<'_> {
                 claims.p_values.push(p);
                 claims.payloads += u32::from(payload);
             }
-            for _ in 0..WRONG {
+            for _ in 0..wrong {
                 let wrong = wrong_target(&mut rng)?;
                 count(&mut claims.wrong_at_most, decide(&readings, &wrong, claims.rate)?.0);
                 if let (Some(counts), [first, second, ..]) = (&mut claims.wrong_as_trials, views) {
@@ -137,6 +153,13 @@ impl ClaimTrials<'_> {
     /// The message as the word of an asset: its pad is what makes a codeword of it.
     fn target(&self) -> Result<Target> {
         let word = *self.message;
+        if !is_word(&word) {
+            return Ok(Target {
+                id: String::new(),
+                word,
+                pad: None,
+            });
+        }
         let payload = Payload {
             key: 1,
             number: self.seed as u32 & 0xffff,
@@ -194,10 +217,20 @@ impl Suspect {
     }
 }
 
+/// Whether a message is as long as the words that assets are marked with.
+fn is_word(message: &Message) -> bool {
+    message.length() == Scheme::default().length()
+}
+
 /// The p-value of a claim, and whether the payload was read as it is registered.
 fn decide(readings: &[HypothesisReading], target: &Target, rate: f64) -> Result<(f64, bool)> {
     let claim = Claim {
-        scheme: Scheme::default(),
+        scheme: match is_word(&target.word) {
+            true => Scheme::default(),
+            false => Scheme::Raw {
+                bits: target.word.length(),
+            },
+        },
         readings,
         targets: std::slice::from_ref(target),
         targets_tried: None,

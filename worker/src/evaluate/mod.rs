@@ -8,12 +8,15 @@ mod machine;
 mod mark;
 mod plan;
 mod read;
+mod robustness;
 mod run;
 mod steganalysis;
 mod trial;
+mod trials;
 mod variants;
 mod view_readings;
 
 pub use plan::{Trade, plan};
+pub use robustness::{Robustness, attacks};
 pub use run::{Options, Progress, run};
 pub use variants::{Variant, variants};

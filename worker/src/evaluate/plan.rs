@@ -1,9 +1,11 @@
 //! What the experiments of the paper, and ours, need: marks, and what is done to them.
-use guardsplat_distortion::{DistortionKind as Distortion, RobustTo};
-use guardsplat_evaluation::attack::Attack;
+use std::collections::BTreeSet;
+
 use guardsplat_evaluation::report::named::Experiment;
 use guardsplat_evaluation::report::names;
+use guardsplat_evaluation::report::targets::Column;
 
+use super::robustness::Robustness;
 use super::trial::Trial;
 use super::variants::Variant;
 use crate::error::{Error, Result};
@@ -11,8 +13,6 @@ use guardsplat_engine::embed::{Ring, Settings, TrainableCoefficients};
 
 /// Bits of most experiments.
 const BITS: usize = 32;
-/// Bits of the paper's robustness table.
-const ROBUST_BITS: usize = 16;
 /// Bits of the words that assets are marked with.
 const CLAIM_BITS: usize = 64;
 /// Bits that other work has a figure for.
@@ -35,6 +35,10 @@ pub struct WantedMark {
     pub timed: bool,
     /// Whether claims are made about marks besides.
     pub claims: bool,
+    /// Number of the first held-out view that is read.
+    pub first_view: usize,
+    /// After each trial, pictures that a claim is made about together; 0 for none.
+    pub together: usize,
 }
 
 /// Everything that some experiments need.
@@ -63,8 +67,12 @@ impl Plan {
     pub fn keep_only(&mut self, names: &[String]) -> Result<()> {
         let known = |name: &String| self.wanted.iter().any(|wanted| wanted.variant == *name);
         if let Some(unknown) = names.iter().find(|name| !known(name)) {
-            let mut all: Vec<&str> = self.wanted.iter().map(|wanted| wanted.variant.as_str()).collect();
-            all.dedup();
+            let mut all: Vec<&str> = Vec::new();
+            for wanted in &self.wanted {
+                if !all.contains(&wanted.variant.as_str()) {
+                    all.push(&wanted.variant);
+                }
+            }
             return Err(Error::bad_option(
                 "only",
                 format!("{unknown:?} is none of {}", all.join(", ")),
@@ -75,27 +83,54 @@ impl Plan {
         Ok(())
     }
 
-    fn add(&mut self, experiment: Experiment, bits: usize, variant: &str, settings: Settings, trials: Vec<Trial>) {
-        let same = |w: &&mut WantedMark| w.bits == bits && w.variant == variant;
-        let claims = experiment == Experiment::Claims;
-        if let Some(known) = self.wanted.iter_mut().find(same) {
-            known.claims |= claims;
-            for trial in trials {
-                if !known.trials.contains(&trial) {
-                    known.trials.push(trial);
-                }
-            }
-            return;
-        }
-        self.wanted.push(WantedMark {
-            experiment,
-            bits,
-            variant: variant.into(),
-            settings,
-            trials,
-            timed: experiment == Experiment::Trade,
-            claims,
+    /// Programs of the system that trials need and that are not there, with what to do about it.
+    pub fn missing_programs(&self) -> BTreeSet<String> {
+        let trials = self.wanted.iter().flat_map(|wanted| &wanted.trials);
+        trials.filter_map(Trial::missing_program).collect()
+    }
+
+    /// The mark of the robustness table, to be read under these trials.
+    pub(super) fn robustness(
+        &mut self,
+        bits: usize,
+        variant: &str,
+        settings: Settings,
+        trials: Vec<Trial>,
+    ) -> &mut WantedMark {
+        self.add(Experiment::Robustness, bits, variant, settings, trials)
+    }
+
+    fn add(
+        &mut self,
+        experiment: Experiment,
+        bits: usize,
+        variant: &str,
+        settings: Settings,
+        trials: Vec<Trial>,
+    ) -> &mut WantedMark {
+        let same = |w: &WantedMark| w.bits == bits && w.variant == variant;
+        let place = self.wanted.iter().position(same).unwrap_or_else(|| {
+            self.wanted.push(WantedMark {
+                experiment,
+                bits,
+                variant: variant.into(),
+                settings,
+                trials: Vec::new(),
+                timed: experiment == Experiment::Trade,
+                claims: false,
+                first_view: 0,
+                together: 0,
+            });
+            self.wanted.len() - 1
         });
+        let wanted = &mut self.wanted[place];
+        wanted.claims |= experiment == Experiment::Claims;
+        for trial in trials {
+            if !wanted.trials.contains(&trial) {
+                wanted.trials.push(trial);
+            }
+        }
+        wanted
     }
 }
 
@@ -103,8 +138,14 @@ impl Plan {
 /// of any length, and of 32 bits without.
 ///
 /// # Errors
-/// None but a suite of attacks that cannot be read, which the tests rule out.
-pub fn plan(experiments: &[Experiment], standard: &Settings, bits: &[usize], trade: &Trade) -> Result<Plan> {
+/// Attacks of `robustness` that cannot be read.
+pub fn plan(
+    experiments: &[Experiment],
+    standard: &Settings,
+    bits: &[usize],
+    trade: &Trade,
+    robustness: &Robustness,
+) -> Result<Plan> {
     let mut plan = Plan::default();
     let free: &[usize] = if bits.is_empty() { &[BITS] } else { bits };
     if experiments.contains(&Experiment::Security) {
@@ -126,26 +167,11 @@ pub fn plan(experiments: &[Experiment], standard: &Settings, bits: &[usize], tra
             }
             Experiment::Longer => add(LONGER_BITS, names::STANDARD, *standard, &none)?,
             Experiment::Robustness => {
-                let attacks: Vec<String> = Attack::suite("all")
-                    .map_err(Error::Evaluation)?
-                    .iter()
-                    .map(ToString::to_string)
-                    .collect();
-                let attacks: Vec<&str> = attacks.iter().map(String::as_str).chain([names::VAE]).collect();
-                add(ROBUST_BITS, names::STANDARD, *standard, &attacks)?;
-                let stands = [Distortion::ShTruncation, Distortion::Noise, Distortion::Jpeg]
-                    .into_iter()
-                    .collect();
-                let robust = Settings {
-                    robust_to: stands,
-                    ..*standard
-                };
-                add(ROBUST_BITS, names::ROBUST, robust, &attacks)?;
-                let all = Settings {
-                    robust_to: RobustTo::all(),
-                    ..*standard
-                };
-                add(ROBUST_BITS, names::ROBUST_TO_ALL, all, &attacks)?;
+                for column in Column::ALL {
+                    if bits.is_empty() || bits.contains(&(column.bits() as usize)) {
+                        robustness.add(column, standard, &mut plan)?;
+                    }
+                }
             }
             Experiment::Trained => {
                 add(BITS, names::STANDARD, *standard, &none)?;
@@ -249,7 +275,7 @@ mod tests {
             device: "cpu".into(),
             variants: variants(&standard, None, &[]).unwrap(),
         };
-        let plan = plan(&Experiment::ALL, &standard, &[], &trade).unwrap();
+        let plan = plan(&Experiment::ALL, &standard, &[], &trade, &Robustness::default()).unwrap();
         assert_eq!(plan.judged, [32]);
         let timed: Vec<&str> = plan
             .wanted
@@ -286,13 +312,18 @@ mod tests {
     #[test]
     fn variants_can_be_chosen() {
         let settings = Preset::Standard.settings();
-        let mut plan = plan(&[Experiment::Robustness], &settings, &[], &Trade::default()).unwrap();
+        let robustness = Robustness::default();
+        let mut plan = plan(
+            &[Experiment::Robustness],
+            &settings,
+            &[],
+            &Trade::default(),
+            &robustness,
+        )
+        .unwrap();
         assert_eq!(plan.wanted.len(), 3);
         let error = plan.keep_only(&["strong".into()]).unwrap_err().to_string();
-        assert!(
-            error.contains("\"strong\" is none of standard, robust, robust to all"),
-            "{error}"
-        );
+        assert!(error.contains("\"strong\" is none of standard, robust"), "{error}");
         plan.keep_only(&[]).unwrap();
         plan.keep_only(&[names::ROBUST.into()]).unwrap();
         assert_eq!(plan.wanted.len(), 1);
@@ -305,6 +336,7 @@ mod tests {
             &Preset::Standard.settings(),
             &[32, 64],
             &Trade::default(),
+            &Robustness::default(),
         )
         .unwrap();
         let bits: Vec<usize> = plan.wanted.iter().map(|w| w.bits).collect();
@@ -314,6 +346,7 @@ mod tests {
             &Preset::Standard.settings(),
             &[16],
             &Trade::default(),
+            &Robustness::default(),
         )
         .unwrap();
         assert_eq!((other.wanted.len(), other.judged), (1, vec![16]));

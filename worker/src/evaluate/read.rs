@@ -28,8 +28,13 @@ pub(super) struct HeldOutCamera {
     pub elevation: f32,
 }
 
-/// Held-out cameras around a scene.
-pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64) -> Result<Vec<HeldOutCamera>> {
+/// Held-out cameras around a scene, by their numbers.
+pub(super) fn cameras(
+    gaussians: &Gaussians,
+    views: std::ops::Range<usize>,
+    size: u32,
+    seed: u64,
+) -> Result<Vec<HeldOutCamera>> {
     let sampler = ViewSampler::new(gaussians, seed)?;
     let (up, centre) = (sampler.extent().up, sampler.extent().centre);
     let place = |index: usize| {
@@ -47,7 +52,7 @@ pub(super) fn cameras(gaussians: &Gaussians, views: usize, size: u32, seed: u64)
             elevation: height.clamp(-1.0, 1.0).asin().to_degrees(),
         }
     };
-    Ok((0..views).map(place).collect())
+    Ok(views.map(place).collect())
 }
 
 /// Pictures of a scene from some cameras, over white.
@@ -73,6 +78,11 @@ impl Views {
 
     pub fn pictures(&self) -> Result<Vec<Picture>> {
         Ok(self.images.iter().map(to_picture).collect())
+    }
+
+    /// The first pictures only: large ones of all views need not be there as floats.
+    pub fn first(&self, count: usize) -> Vec<Picture> {
+        self.images.iter().take(count).map(to_picture).collect()
     }
 
     /// What is read of all views; of pictures that somebody else made, under what may have been done to them.
@@ -149,6 +159,7 @@ impl Views {
             attack: attack.into(),
             size: self.cameras.first().map_or(0, |placed| placed.camera.width),
             views: right.len() as u32,
+            first_view: 0,
             bits: message.len() as u32,
             bits_right: right,
             message_right_from: from,

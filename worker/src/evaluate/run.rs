@@ -1,10 +1,11 @@
 //! Does what a plan wants and the store does not have yet.
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use guardsplat_distortion::Vae;
 use guardsplat_evaluation::report::names;
-use guardsplat_evaluation::report::record::{Embedding, Id, Record, reading_id};
+use guardsplat_evaluation::report::record::{Embedding, Id, Record};
 use guardsplat_evaluation::report::store::Store;
 use rand::SeedableRng;
 use rand_chacha::ChaCha20Rng;
@@ -16,7 +17,7 @@ use super::mark::{Marking, path};
 use super::plan::{Plan, WantedMark};
 use super::read::{Views, cameras};
 use super::steganalysis::{Marked, SteganalysisRun};
-use super::trial::Trial;
+use super::trials::TrialRun;
 use crate::error::{Error, Result};
 use guardsplat_engine::embed;
 use guardsplat_engine::extract::Engine;
@@ -47,6 +48,8 @@ pub enum Progress {
     Embedding(embed::Progress),
     /// A mark was read under an attack, with this share of bits right.
     Read(String, f64),
+    /// A mark was read under so many attacks, in this time.
+    ReadAll(usize, Duration),
     /// A mark could not be made, and the run goes on without it: why.
     Failed(String),
     /// Claims were made about a mark: what was looked at, and how many right ones matched, of how many.
@@ -147,6 +150,18 @@ fn message(bits: usize, seed: u64) -> Result<Message> {
     Ok(Message::random(bits, &mut rng)?)
 }
 
+/// What was read of a mark, for whoever watches.
+fn told(record: &Record) -> Option<Progress> {
+    match record {
+        Record::Reading(reading) => Some(Progress::Read(reading.attack.clone(), reading.accuracy())),
+        Record::Claims(claims) => {
+            let (matches, of) = (claims.matches(), claims.p_values.len());
+            Some(Progress::Claimed(claims.told(), matches, of))
+        }
+        Record::Mark(_) | Record::Detection(_) => None,
+    }
+}
+
 /// One mark and its readings.
 struct MarkRun<'a> {
     wanted: &'a WantedMark,
@@ -189,11 +204,6 @@ impl MarkRun<'_> {
         let embedding = self.embedding(name, &message)?;
         let id = embedding.id();
         let (size, views) = (self.options.size, self.options.views);
-        let left = |store: &Store| -> Vec<&Trial> {
-            let is_left = |trial: &&Trial| !store.has(&reading_id(&id, &trial.to_string(), size, views as u32));
-            let possible = |trial: &&Trial| **trial != Trial::Vae || self.options.vae.is_some();
-            self.wanted.trials.iter().filter(possible).filter(is_left).collect()
-        };
         let claiming = ClaimTrials {
             engine: self.engine,
             message: &message,
@@ -201,15 +211,25 @@ impl MarkRun<'_> {
             size,
             seed: self.seed,
         };
+        let trials = TrialRun {
+            engine: self.engine,
+            message: &message,
+            mark: &id,
+            wanted: self.wanted,
+            claiming: &claiming,
+            vae: self.options.vae.as_ref(),
+            views,
+        };
         let cases = |store: &Store| match self.wanted.claims {
             true => claiming.left(store, views),
             false => Vec::new(),
         };
-        if store.has(&id) && left(store).is_empty() && cases(store).is_empty() {
+        if store.has(&id) && trials.left(store).is_empty() && cases(store).is_empty() {
             return Ok(id);
         }
         let scene = Scene::read(path_of_scene)?;
-        let cameras = cameras(&scene.gaussians, views, size, self.seed)?;
+        let first = self.wanted.first_view;
+        let cameras = cameras(&scene.gaussians, first..first + views, size, self.seed)?;
         let file = path(store.folder(), &id.to_string(), &scene);
         let marked = if store.has(&id) && file.is_file() {
             Scene::read(&file)?.into_gaussians()
@@ -239,33 +259,24 @@ impl MarkRun<'_> {
             }
             marked
         };
-        let trials = left(store);
+        let start = Instant::now();
         let plain = Views::render(self.engine, &marked, &cameras)?;
-        for trial in trials {
-            let read = match trial {
-                Trial::Pictures { attack, .. } => plain.attacked(attack, self.seed)?,
-                Trial::Vae => match &self.options.vae {
-                    Some(vae) => plain.compressed(self.engine, vae)?,
-                    None => continue,
-                },
-                Trial::Scene(change) => {
-                    let changed = change.apply(&marked, self.seed)?;
-                    Views::render(self.engine, &changed, &cameras)?
-                }
-            };
-            let attack = trial.to_string();
-            let record = read.record(self.engine, &message, &id, &attack, &plain)?;
-            let accuracy = record.accuracy();
-            store.append(Record::Reading(record)).map_err(Error::Evaluation)?;
-            progress(Progress::Read(attack, accuracy));
+        let left = trials.left(store);
+        trials.carry_out(&left, &marked, &plain, |record| {
+            told(&record).into_iter().for_each(&mut *progress);
+            store.append(record).map_err(Error::Evaluation)?;
+            Ok(())
+        })?;
+        if !left.is_empty() {
+            progress(Progress::ReadAll(left.len(), start.elapsed()));
         }
         for case in cases(store) {
             let clean = || Views::render(self.engine, &scene.gaussians, &cameras);
             let records = claiming.carry_out(&case, &plain, clean)?;
             for record in records {
-                let (matches, of) = (record.matches(), record.p_values.len());
-                progress(Progress::Claimed(record.told(), matches, of));
-                store.append(Record::Claims(record)).map_err(Error::Evaluation)?;
+                let record = Record::Claims(record);
+                told(&record).into_iter().for_each(&mut *progress);
+                store.append(record).map_err(Error::Evaluation)?;
             }
         }
         Ok(id)

@@ -106,7 +106,7 @@ impl SteganalysisRun<'_> {
             };
             engine.stop.check()?;
             let scene = Scene::read(&mark.scene)?;
-            let cameras = cameras(&scene.gaussians, self.options.views, self.options.size, mark.seed)?;
+            let cameras = cameras(&scene.gaussians, 0..self.options.views, self.options.size, mark.seed)?;
             let clean = Views::render(engine, &scene.gaussians, &cameras)?.images;
             let marked = Scene::read(&path(folder, &mark.id.to_string(), &scene))?.into_gaussians();
             let marked = Views::render(engine, &marked, &cameras)?.images;

@@ -44,6 +44,16 @@ pub enum SceneChange {
     Format(Format),
 }
 
+impl Trial {
+    /// A program of the system that it needs and that is not there, with what to do about it.
+    pub fn missing_program(&self) -> Option<String> {
+        match self {
+            Self::Pictures { attack, .. } => attack.missing_program(),
+            Self::Vae | Self::Scene(_) => None,
+        }
+    }
+}
+
 impl FromStr for Trial {
     type Err = Error;
 

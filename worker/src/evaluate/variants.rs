@@ -190,7 +190,10 @@ mod tests {
     fn presets_and_changes_differ_from_each_other() {
         let base = Preset::Standard.settings();
         let all = variants(&base, None, &[]).unwrap();
-        assert_eq!(names(&all)[..5], ["draft", "standard", "thorough", "paper", "steps-50"]);
+        assert_eq!(
+            names(&all)[..6],
+            ["draft", "standard", "robust", "thorough", "paper", "steps-50"]
+        );
         for (place, one) in all.iter().enumerate() {
             one.settings.check().unwrap();
             assert!(

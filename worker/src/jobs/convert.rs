@@ -28,6 +28,7 @@ pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
     let preset = match ApiPreset::try_from(spec.preset) {
         Ok(ApiPreset::Unspecified | ApiPreset::Standard) => Preset::Standard,
         Ok(ApiPreset::Draft) => Preset::Draft,
+        Ok(ApiPreset::Robust) => Preset::Robust,
         Ok(ApiPreset::Thorough) => Preset::Thorough,
         Ok(ApiPreset::Paper) => Preset::Paper,
         Err(_) => return Err(Error::BadJob(format!("preset: {} is none", spec.preset))),

@@ -220,7 +220,7 @@ fn bad_input_is_told_clearly_and_leaves_nothing() {
         ),
         (
             "embed in.ply out.ply --key k.key --message 5c --preset fast",
-            "draft, standard, thorough or paper",
+            "draft, standard, robust, thorough or paper",
         ),
         (
             "embed in.ply out.ply --key k.key --message 5c --device cpu --size 4",

@@ -17,6 +17,7 @@ mod progress;
 mod resources;
 mod scene_augmentation;
 mod settings;
+mod shared_views;
 mod step_timer;
 mod target;
 mod trainable;

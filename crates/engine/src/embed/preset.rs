@@ -27,6 +27,8 @@ pub enum Preset {
     /// What the figures in the documentation were made with.
     #[default]
     Standard,
+    /// Stands all that is done to pictures, at a message of 16 bits.
+    Robust,
     /// Twice the steps of standard, for more bits that are right at the same likeness.
     Thorough,
     /// Steps, views, sizes and weights as the GuardSplat paper has them.
@@ -40,11 +42,12 @@ impl std::str::FromStr for Preset {
         match text {
             "draft" => Ok(Self::Draft),
             "standard" => Ok(Self::Standard),
+            "robust" => Ok(Self::Robust),
             "thorough" => Ok(Self::Thorough),
             "paper" => Ok(Self::Paper),
             other => Err(Error::BadOption {
                 field: "preset",
-                reason: format!("{other:?} is not a preset, must be draft, standard, thorough or paper"),
+                reason: format!("{other:?} is not a preset, must be draft, standard, robust, thorough or paper"),
             }),
         }
     }
@@ -52,13 +55,14 @@ impl std::str::FromStr for Preset {
 
 impl Preset {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Draft, Self::Standard, Self::Thorough, Self::Paper];
+    pub const ALL: [Self; 5] = [Self::Draft, Self::Standard, Self::Robust, Self::Thorough, Self::Paper];
 
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self {
             Self::Draft => "draft",
             Self::Standard => "standard",
+            Self::Robust => "robust",
             Self::Thorough => "thorough",
             Self::Paper => "paper",
         }
@@ -116,6 +120,7 @@ impl Preset {
                 ..Ranges::default()
             },
             distorted_size: 640,
+            shared_views: 0.5,
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
@@ -160,6 +165,11 @@ impl Preset {
                 },
                 ..standard
             },
+            Self::Robust => Settings {
+                steps: 240,
+                robust_to: EVERYDAY.into_iter().chain(RobustTo::all().of_pictures()).collect(),
+                ..standard
+            },
             Self::Thorough => Settings { steps: 480, ..standard },
             Self::Paper => Settings {
                 distortions: Ranges::default(),
@@ -170,6 +180,7 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 distorted_size: 224,
+                shared_views: 0.0,
                 robust_to: RobustTo::none(),
                 lambda: LossWeights {
                     l1: 0.8,
@@ -205,6 +216,10 @@ mod tests {
                 settings.robust_to.contains(DistortionKind::ShTruncation),
                 preset != Preset::Paper
             );
+            let stands_pictures = RobustTo::all()
+                .of_pictures()
+                .all(|kind| settings.robust_to.contains(kind));
+            assert_eq!(stands_pictures, preset == Preset::Robust);
         }
     }
 }

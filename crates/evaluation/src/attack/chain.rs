@@ -5,7 +5,9 @@ use std::str::FromStr;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
+use super::avif;
 use super::draw::RandomSource;
+use super::kind::AttackKind;
 use super::size;
 use super::step::Step;
 use crate::{Error, Result};
@@ -49,6 +51,12 @@ impl Attack {
     pub fn drawn(&self, seed: u64, index: u64) -> Self {
         let steps = self.sources(seed, index).map(|(step, source)| step.drawn(source));
         Self { steps: steps.collect() }
+    }
+
+    /// A program of the system that the attack needs and that is not there, with what to do about it.
+    pub fn missing_program(&self) -> Option<String> {
+        let needs = self.steps.iter().any(|step| step.kind() == AttackKind::Avif);
+        (needs && !avif::is_installed()).then(|| avif::missing(avif::ENCODER))
     }
 
     /// The picture after the attack.

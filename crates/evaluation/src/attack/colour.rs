@@ -6,6 +6,13 @@ pub(super) fn brightness(picture: RgbImage, factor: f64) -> RgbImage {
     by_table(picture, |value| value * factor)
 }
 
+/// The values of each channel times its factor.
+pub(super) fn tint(picture: RgbImage, factors: [f64; 3]) -> RgbImage {
+    by_pixel(picture, |pixel| {
+        std::array::from_fn(|channel| f64::from(pixel.0[channel]) * factors[channel])
+    })
+}
+
 /// Distance from the mean grey times `factor`.
 pub(super) fn contrast(picture: RgbImage, factor: f64) -> RgbImage {
     let sum: f64 = picture.pixels().map(luma).sum();

@@ -1,4 +1,5 @@
 //! Every attack with its name, unit and limits.
+use super::limits::{Grid, Limits, limits, real};
 
 /// What an attack does. The docs give the meaning of its strength; [`AttackKind::limits`] what it may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -8,6 +9,13 @@ pub enum AttackKind {
     Jpeg,
     /// Written as lossy WebP of this quality by libwebp with its default method, and read again; always 4:2:0.
     Webp,
+    /// Written by libjpeg-turbo's encoder at this quality, as its `cjpeg` does, and read again by its decoder.
+    JpegTurbo,
+    /// Written by mozjpeg at this quality with its own tables and trellis quantisation, and read again by the same library.
+    Mozjpeg,
+    /// Written as AVIF of this quality by Debian's `avifenc` (libaom, 4:2:0, speed 6) and read again by its `avifdec`. The
+    /// quality is that of libavif 1.0, whose quantiser is `63 · (1 - quality / 100)`.
+    Avif,
     /// Normal noise of this standard deviation in units of [0, 1], a number per pixel and channel, then clamped and rounded.
     Noise,
     /// Gaussian blur with a kernel of this odd side and the σ that torchvision gives it; the picture is mirrored at its edges.
@@ -41,6 +49,9 @@ pub enum AttackKind {
     Page,
     /// Values times this, clamped.
     Brightness,
+    /// Each channel times a factor of its own: `tint:1.05/1/0.95` has one for red, green and blue, and of one range,
+    /// `tint:0.95..1.05`, each draws its own.
+    Tint,
     /// Distance of values from the mean grey of the picture times this, as torchvision's `adjust_contrast`.
     Contrast,
     /// Values of [0, 1] to this power.
@@ -59,42 +70,14 @@ pub enum AttackKind {
     Erase,
 }
 
-/// Which numbers between its limits a strength may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Grid {
-    Real,
-    Whole,
-    Odd,
-}
-
-/// What a strength may be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Limits {
-    pub least: f64,
-    pub most: f64,
-    pub grid: Grid,
-    /// The strength at which the picture stays as it is, where there is one.
-    pub identity: Option<f64>,
-}
-
-const fn real(least: f64, most: f64, identity: f64) -> Option<Limits> {
-    limits(least, most, Grid::Real, Some(identity))
-}
-
-const fn limits(least: f64, most: f64, grid: Grid, identity: Option<f64>) -> Option<Limits> {
-    Some(Limits {
-        least,
-        most,
-        grid,
-        identity,
-    })
-}
-
 impl AttackKind {
     /// Every kind, in the order of the docs.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 30] = [
         Self::Jpeg,
         Self::Webp,
+        Self::JpegTurbo,
+        Self::Mozjpeg,
+        Self::Avif,
         Self::Noise,
         Self::Blur,
         Self::Median,
@@ -111,6 +94,7 @@ impl AttackKind {
         Self::Border,
         Self::Page,
         Self::Brightness,
+        Self::Tint,
         Self::Contrast,
         Self::Gamma,
         Self::Hue,
@@ -140,6 +124,9 @@ impl AttackKind {
         match self {
             Self::Jpeg => ("jpeg", limits(1.0, 100.0, Grid::Whole, None)),
             Self::Webp => ("webp", limits(0.0, 100.0, Grid::Whole, None)),
+            Self::JpegTurbo => ("jpeg-turbo", limits(1.0, 100.0, Grid::Whole, None)),
+            Self::Mozjpeg => ("mozjpeg", limits(1.0, 100.0, Grid::Whole, None)),
+            Self::Avif => ("avif", limits(0.0, 100.0, Grid::Whole, None)),
             Self::Noise => ("noise", real(0.0, 1.0, 0.0)),
             Self::Blur => ("blur", limits(1.0, 31.0, Grid::Odd, Some(1.0))),
             // A window's values are sorted for each pixel, which takes too long for large ones.
@@ -157,6 +144,7 @@ impl AttackKind {
             Self::Border => ("border", real(0.0, 1.0, 0.0)),
             Self::Page => ("page", real(0.1, 1.0, 1.0)),
             Self::Brightness => ("brightness", real(0.0, 10.0, 1.0)),
+            Self::Tint => ("tint", real(0.0, 10.0, 1.0)),
             Self::Contrast => ("contrast", real(0.0, 10.0, 1.0)),
             Self::Gamma => ("gamma", real(0.1, 10.0, 1.0)),
             Self::Hue => ("hue", real(-1.0, 1.0, 0.0)),

@@ -4,8 +4,8 @@
 //! in a row are joined by `+`: `crop:0.6+brightness:1.3+jpeg:50`. [`AttackKind`] lists them with units and limits.
 //!
 //! Whatever is random follows from a seed and the index of the picture, so that every picture gets its own and gets it
-//! again. Pictures are taken as they are stored, without linearising their colours, as nearly all software does. AVIF and
-//! HEIC are left out: to read them back needs libraries of the system.
+//! again. Pictures are taken as they are stored, without linearising their colours, as nearly all software does. AVIF is
+//! written and read by programs of the system ([`Attack::missing_program`]); HEIC is left out.
 //!
 //! ```
 //! use guardsplat_evaluation::attack::Attack;
@@ -17,6 +17,8 @@
 //! assert_eq!(attack.to_string(), "crop:0.6+brightness:0.5..1.5+jpeg:50");
 //! # Ok::<(), guardsplat_evaluation::Error>(())
 //! ```
+mod amount;
+mod avif;
 mod chain;
 mod codec;
 mod colour;
@@ -25,6 +27,8 @@ mod draw;
 mod filter;
 mod frame;
 mod kind;
+mod libjpeg;
+mod limits;
 mod noise;
 mod resample;
 mod rotate;

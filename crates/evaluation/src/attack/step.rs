@@ -2,20 +2,20 @@
 use std::fmt;
 use std::str::FromStr;
 
-use image::{Rgb, RgbImage};
-use rand::RngExt;
-
+use super::amount::Amount;
 use super::draw::{RandomSource, RandomStream};
-use super::kind::{AttackKind, Grid, Limits};
+use super::kind::AttackKind;
+use super::libjpeg::{self, Encoder};
 use super::strength::{Strength, start_of};
-use super::{codec, colour, cover, filter, frame, noise, resample, rotate};
+use super::{avif, codec, colour, cover, filter, frame, noise, resample, rotate};
 use crate::{Error, Result};
+use image::{Rgb, RgbImage};
 
 /// One step of an attack: what is done, and how strongly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     kind: AttackKind,
-    strength: Option<Strength>,
+    amount: Amount,
 }
 
 impl Step {
@@ -24,21 +24,39 @@ impl Step {
     /// # Errors
     /// [`Error::BadOption`] with the limits.
     pub fn new(kind: AttackKind, strength: Option<Strength>) -> Result<Self> {
+        Self::of(kind, strength.map_or(Amount::Nothing, Amount::One))
+    }
+
+    /// Red, green and blue times a factor each: [`AttackKind::Tint`].
+    ///
+    /// # Errors
+    /// [`Error::BadOption`] with the limits.
+    pub fn tint(factors: [Strength; 3]) -> Result<Self> {
+        Self::of(AttackKind::Tint, Amount::Channels(factors))
+    }
+
+    fn of(kind: AttackKind, amount: Amount) -> Result<Self> {
         let bad = |reason| Error::BadOption {
             field: kind.name(),
             reason,
         };
-        match (kind.spec(), strength) {
-            (None, None) => {}
-            (None, Some(strength)) => return Err(bad(format!("takes no strength, but has {strength}"))),
-            (Some(limits), None) => return Err(bad(format!("needs {limits}"))),
-            (Some(limits), Some(strength)) => {
-                if !(limits.allow(strength.low()) && limits.allow(strength.high())) {
-                    return Err(bad(format!("{strength} is not {limits}")));
-                }
+        let Some(limits) = kind.spec() else {
+            return match amount {
+                Amount::Nothing => Ok(Self { kind, amount }),
+                _ => Err(bad(format!("takes no strength, but has {amount}"))),
+            };
+        };
+        match amount {
+            Amount::Nothing => return Err(bad(format!("needs {limits}"))),
+            Amount::Channels(_) if kind != AttackKind::Tint => {
+                return Err(bad(format!("{amount} is three numbers; needs {limits}")));
             }
+            _ => {}
         }
-        Ok(Self { kind, strength })
+        match amount.strengths().iter().all(|strength| limits.allow(*strength)) {
+            true => Ok(Self { kind, amount }),
+            false => Err(bad(format!("{amount} is not {limits}"))),
+        }
     }
 
     /// What is done.
@@ -46,32 +64,47 @@ impl Step {
         self.kind
     }
 
-    /// How strongly, for kinds that have a strength.
+    /// How strongly, for kinds that have a strength; of channels with strengths of their own, see [`Step::channels`].
     pub fn strength(self) -> Option<Strength> {
-        self.strength
+        match self.amount {
+            Amount::One(strength) => Some(strength),
+            Amount::Nothing | Amount::Channels(_) => None,
+        }
+    }
+
+    /// The strengths of red, green and blue, where each has its own.
+    pub fn channels(self) -> Option<[Strength; 3]> {
+        match self.amount {
+            Amount::Channels(channels) => Some(channels),
+            Amount::Nothing | Amount::One(_) => None,
+        }
     }
 
     /// The step with the one strength that a picture draws.
     pub(super) fn drawn(self, source: RandomSource) -> Self {
-        let (Some(limits), Some(strength)) = (self.kind.spec(), self.strength) else {
+        let Some(limits) = self.kind.spec() else {
             return self;
         };
+        let random = &mut source.random(RandomStream::Strength);
         Self {
-            strength: Some(strength.became(limits.draw(strength, source))),
+            amount: self.amount.drawn(limits, self.kind == AttackKind::Tint, random),
             ..self
         }
     }
 
     /// Does it, with the lower end of its strength: ranges are [`Step::drawn`] before.
     pub(super) fn apply(self, picture: RgbImage, source: RandomSource) -> Result<RgbImage> {
-        let value = self.strength.map_or(0.0, Strength::low);
-        if self.strength.is_some() && self.kind.spec().and_then(|limits| limits.identity) == Some(value) {
+        if self.amount.is_identity(self.kind.spec()) {
             return Ok(picture);
         }
+        let value = self.strength().map_or(0.0, Strength::low);
         let random = &mut source.random(RandomStream::Pixels);
         Ok(match self.kind {
             AttackKind::Jpeg => codec::jpeg(&picture, value as u8)?,
             AttackKind::Webp => codec::webp(&picture, value as f32)?,
+            AttackKind::JpegTurbo => libjpeg::written(Encoder::Turbo, &picture, value as u8)?,
+            AttackKind::Mozjpeg => libjpeg::written(Encoder::Mozjpeg, &picture, value as u8)?,
+            AttackKind::Avif => avif::written(&picture, value as u8)?,
             AttackKind::Noise => noise::add(picture, value as f32, random),
             AttackKind::Blur => filter::blur(&picture, value as u32),
             AttackKind::Median => filter::median(&picture, value as u32),
@@ -88,6 +121,10 @@ impl Step {
             AttackKind::Border => frame::border(&picture, value)?,
             AttackKind::Page => frame::page(&picture, value, random)?,
             AttackKind::Brightness => colour::brightness(picture, value),
+            AttackKind::Tint => {
+                let factors = self.channels().map(|channels| channels.map(Strength::low));
+                colour::tint(picture, factors.unwrap_or([value; 3]))
+            }
             AttackKind::Contrast => colour::contrast(picture, value),
             AttackKind::Gamma => colour::gamma(picture, value),
             AttackKind::Hue => colour::hue(picture, value),
@@ -101,48 +138,11 @@ impl Step {
     }
 }
 
-impl Limits {
-    fn allow(self, value: f64) -> bool {
-        let on_grid = match self.grid {
-            Grid::Real => true,
-            Grid::Whole => value.fract() == 0.0,
-            Grid::Odd => value.rem_euclid(2.0) == 1.0,
-        };
-        on_grid && (self.least..=self.most).contains(&value)
-    }
-
-    /// Uniform over the numbers that are allowed.
-    fn draw(self, strength: Strength, source: RandomSource) -> f64 {
-        let (low, high) = (strength.low(), strength.high());
-        if strength.is_fixed() {
-            return low;
-        }
-        let random = &mut source.random(RandomStream::Strength);
-        let mut whole = |every: f64| low + every * f64::from(random.random_range(0..=((high - low) / every) as u32));
-        match self.grid {
-            Grid::Whole => whole(1.0),
-            Grid::Odd => whole(2.0),
-            Grid::Real => random.random_range(low..=high),
-        }
-    }
-}
-
-impl fmt::Display for Limits {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let numbers = match self.grid {
-            Grid::Real => "a number",
-            Grid::Whole => "a whole number",
-            Grid::Odd => "an odd number",
-        };
-        write!(f, "{numbers} from {} to {}", self.least, self.most)
-    }
-}
-
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.strength {
-            None => f.write_str(self.kind.name()),
-            Some(strength) => write!(f, "{}:{strength}", self.kind.name()),
+        match self.amount {
+            Amount::Nothing => f.write_str(self.kind.name()),
+            amount => write!(f, "{}:{amount}", self.kind.name()),
         }
     }
 }
@@ -150,10 +150,10 @@ impl fmt::Display for Step {
 impl FromStr for Step {
     type Err = Error;
 
-    /// Reads `flip`, `jpeg:10` or `rotate:-30..30`.
+    /// Reads `flip`, `jpeg:10`, `rotate:-30..30` or `tint:1.05/1/0.95`.
     fn from_str(text: &str) -> Result<Self> {
-        let (name, strength) = match text.split_once(':') {
-            Some((name, strength)) => (name, Some(strength)),
+        let (name, amount) = match text.split_once(':') {
+            Some((name, amount)) => (name, Some(amount)),
             None => (text, None),
         };
         let Some(kind) = AttackKind::ALL.into_iter().find(|kind| kind.name() == name) else {
@@ -166,8 +166,8 @@ impl FromStr for Step {
                 ),
             });
         };
-        let strength = strength.map(|text| text.parse().map_err(|error| named(kind, error)));
-        Self::new(kind, strength.transpose()?)
+        let amount = amount.map(|text| Amount::parse(text).map_err(|error| named(kind, error)));
+        Self::of(kind, amount.transpose()?.unwrap_or(Amount::Nothing))
     }
 }
 

@@ -10,5 +10,6 @@ pub mod selection;
 pub mod store;
 pub mod summary;
 pub mod table;
+pub mod targets;
 #[cfg(test)]
 mod testing;

@@ -10,10 +10,8 @@ pub const ALL_ATTRIBUTES: &str = "all attributes";
 pub const DC: &str = "dc";
 /// Only the other bands are learned.
 pub const REST: &str = "rest";
-/// Trained to stand dropped bands, noise and JPEG.
+/// The preset `robust`, trained to stand what is done to pictures.
 pub const ROBUST: &str = "robust";
-/// Trained to stand every distortion that is known.
-pub const ROBUST_TO_ALL: &str = "robust to all";
 /// Training views are on one circle around the scene, instead of over the sphere.
 pub const RING: &str = "ring";
 /// Only the message counts.

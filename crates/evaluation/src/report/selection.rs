@@ -69,7 +69,7 @@ impl<'a> Selection<'a> {
     ///
     /// Where marks of the same bits and variant were made with different settings or sizes of views, those like the
     /// one written last are taken. Where a mark was read twice under one attack, the reading from most views counts,
-    /// then that at the mark's own size, then the one written last. [`Selection::notes`] says what was left out.
+    /// then that at the mark's own size, then that from views that no decision was taken on, then the one written last. [`Selection::notes`] says what was left out.
     pub fn of(records: &'a Records, pair: &Pair) -> Self {
         let mut notes: Vec<String> = records.notes().to_vec();
         let of_pair = || records.marks().iter().filter(|(_, mark)| Pair::of(mark) == *pair);
@@ -100,7 +100,7 @@ impl<'a> Selection<'a> {
             let Some(size) = sizes.get(&reading.mark) else {
                 continue;
             };
-            let worth = |reading: &ReadingRecord| (reading.views, reading.size == *size);
+            let worth = |reading: &ReadingRecord| (reading.views, reading.size == *size, reading.first_view);
             let place = (&reading.mark, reading.attack.as_str());
             let known = readings.get(&place).copied();
             repeated += usize::from(known.is_some());

@@ -1,5 +1,6 @@
 //! What some runs have in common: means over runs with their intervals.
 use super::interval;
+use super::record::Mark;
 use super::selection::Run;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -71,6 +72,27 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Of marks that nothing was read of.
+    pub fn of_marks(marks: &[&Mark]) -> Self {
+        let all = |value: &dyn Fn(&Mark) -> Option<f64>| {
+            let values: Vec<f64> = marks.iter().filter_map(|mark| value(mark)).collect();
+            Estimate::of(&values)
+        };
+        Self {
+            runs: marks.len(),
+            accuracy: None,
+            whole: BTreeMap::new(),
+            psnr: Psnr {
+                differing: all(&|mark| mark.psnr_db),
+                identical: marks.iter().filter(|mark| mark.psnr_db.is_none()).count(),
+            },
+            ssim: all(&|mark| Some(mark.ssim)).map(|mean| mean.within(-1.0, 1.0)),
+            lpips: all(&|mark| mark.lpips).map(|mean| mean.within(0.0, f64::INFINITY)),
+            seconds: all(&|mark| Some(mark.seconds)).map(|mean| mean.within(0.0, f64::INFINITY)),
+            attacked_psnr: None,
+        }
+    }
+
     /// Of some runs.
     pub fn of(runs: &[Run<'_>]) -> Self {
         let all = |value: &dyn Fn(&Run<'_>) -> Option<f64>| {
@@ -88,17 +110,10 @@ impl Summary {
             (views, Share { right, of, interval })
         };
         Self {
-            runs: runs.len(),
             accuracy: all(&|run| Some(100.0 * run.reading.accuracy())).map(|mean| mean.within(0.0, 100.0)),
             whole: numbers.into_iter().map(whole).collect(),
-            psnr: Psnr {
-                differing: all(&|run| run.mark.psnr_db),
-                identical: runs.iter().filter(|run| run.mark.psnr_db.is_none()).count(),
-            },
-            ssim: all(&|run| Some(run.mark.ssim)).map(|mean| mean.within(-1.0, 1.0)),
-            lpips: all(&|run| run.mark.lpips).map(|mean| mean.within(0.0, f64::INFINITY)),
-            seconds: all(&|run| Some(run.mark.seconds)).map(|mean| mean.within(0.0, f64::INFINITY)),
             attacked_psnr: all(&|run| run.reading.psnr_db),
+            ..Self::of_marks(&runs.iter().map(|run| run.mark).collect::<Vec<_>>())
         }
     }
 }

@@ -48,6 +48,7 @@ pub fn reading(mark: &Mark, attack: &str, bits_right: &[u16]) -> ReadingRecord {
         attack: attack.into(),
         size: mark.embedding.size,
         views: bits_right.len() as u32,
+        first_view: 0,
         bits,
         bits_right: bits_right.to_vec(),
         message_right_from: [(1, bits_right.first().is_some_and(|right| u32::from(*right) == bits))].into(),

@@ -16,6 +16,7 @@ fn presets_seeds_and_sizes_reach_the_settings() {
         (ApiPreset::Unspecified, Preset::Standard),
         (ApiPreset::Draft, Preset::Draft),
         (ApiPreset::Standard, Preset::Standard),
+        (ApiPreset::Robust, Preset::Robust),
         (ApiPreset::Thorough, Preset::Thorough),
         (ApiPreset::Paper, Preset::Paper),
     ] {

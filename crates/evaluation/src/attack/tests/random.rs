@@ -3,11 +3,12 @@ use image::{Rgb, RgbImage};
 
 use super::{attack, varied};
 
-const RANDOM: [&str; 7] = [
+const RANDOM: [&str; 8] = [
     "noise:0.1",
     "rotate:-30..30",
     "scale:0.25..4",
     "brightness:0.5..1.5",
+    "tint:0.5..1.5",
     "crop-random:0.3",
     "mask:0.2",
     "erase:0.2",
@@ -28,7 +29,7 @@ fn seed_and_index_reproduce_and_differ() {
 #[test]
 fn what_is_drawn_can_be_told_beforehand() {
     let picture = varied(60, 50);
-    let range = attack("crop-random:0.3..0.9+brightness:0.5..1.5+noise:0.05..0.2+blur:3..9+jpeg:10..90");
+    let range = attack("tint:0.8..1.2+crop-random:0.3..0.9+brightness:0.5..1.5+noise:0.05..0.2+blur:3..9+jpeg:10..90");
     for index in 0..10 {
         let drawn = range.drawn(7, index);
         assert_eq!(drawn.drawn(7, index), drawn);
@@ -36,6 +37,8 @@ fn what_is_drawn_can_be_told_beforehand() {
         assert_eq!(told, range.apply(&picture, 7, index).unwrap(), "{drawn}");
     }
     assert_ne!(range.drawn(7, 0), range.drawn(7, 1));
+    let [red, green, blue] = range.drawn(7, 0).steps()[0].channels().unwrap();
+    assert!(red != green && green != blue && blue != red);
 }
 
 #[test]

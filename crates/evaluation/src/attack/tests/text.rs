@@ -18,6 +18,9 @@ fn texts_are_read_and_printed() {
         "flip",
         "crop:0.6+brightness:1.3+jpeg:50",
         "quarter-turns:1..3",
+        "tint:1.05/1/0.95",
+        "tint:0.95..1.05/1/1..1.1",
+        "brightness:1.05+crop:0.8+fit:600+jpeg-turbo:80",
     ] {
         assert_eq!(attack(text).to_string(), text);
     }
@@ -58,6 +61,12 @@ fn bad_texts_are_refused_with_the_limits() {
             "rotate: 30..-30 is not a range of finite numbers from low to high; needs a number from -360 to 360",
         ),
         ("flip:1", "flip: takes no strength, but has 1"),
+        ("tint:1/2", "tint: \"1/2\" is not a number; needs a number from 0 to 10"),
+        ("tint:1/1/11", "tint: 1/1/11 is not a number from 0 to 10"),
+        (
+            "brightness:1/1/1",
+            "brightness: 1/1/1 is three numbers; needs a number from 0 to 10",
+        ),
         ("window:0", "window: 0 is not a whole number from 1 to 16383"),
     ] {
         assert_eq!(refused(text), reason);
@@ -145,7 +154,15 @@ proptest! {
     fn what_is_drawn_is_fixed_and_allowed(step in step(), seed: u64, index: u64) {
         let drawn = Attack::new(vec![step]).unwrap().drawn(seed, index).steps()[0];
         prop_assert_eq!(drawn.kind(), step.kind());
-        prop_assert!(Step::new(drawn.kind(), drawn.strength()).is_ok());
+        let again = match drawn.channels() {
+            Some(channels) => Step::tint(channels),
+            None => Step::new(drawn.kind(), drawn.strength()),
+        };
+        prop_assert_eq!(again.unwrap(), drawn);
+        for one in drawn.channels().into_iter().flatten() {
+            let range = step.strength().unwrap();
+            prop_assert!(one.is_fixed() && range.low() <= one.low() && one.high() <= range.high());
+        }
         if let (Some(range), Some(one)) = (step.strength(), drawn.strength()) {
             prop_assert!(one.is_fixed() && range.low() <= one.low() && one.high() <= range.high());
         }

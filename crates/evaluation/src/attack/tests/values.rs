@@ -29,6 +29,13 @@ fn tones_follow_their_formulas() {
 }
 
 #[test]
+fn tints_change_each_channel() {
+    assert_eq!(pixel("tint:1.05/1/0.95", [100, 100, 100]), [105, 100, 95]);
+    assert_eq!(pixel("tint:2", [10, 130, 200]), pixel("brightness:2", [10, 130, 200]));
+    assert_eq!(done("tint:1/1/1", &varied(5, 4)), varied(5, 4));
+}
+
+#[test]
 fn colours_follow_their_formulas() {
     // 0.299 · 255 = 76.2; 0.299 · 100 + 0.587 · 150 + 0.114 · 200 = 140.75.
     assert_eq!(pixel("grey", [255, 0, 0]), [76; 3]);

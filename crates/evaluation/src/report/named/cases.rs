@@ -1,11 +1,10 @@
 //! Which cases each report asks for, whether they were measured or not.
 use super::{Experiment, Options};
 use crate::report::names::{
-    ALL_ATTRIBUTES, DC, FIXED_WEIGHTS, FORMAT, LAMBDA_MSG, LAMBDA_RECON, MESSAGE_ONLY, NONE, OCCLUSION, PAPER_ATTACKS,
-    PRUNE_LOWEST, PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, ROBUST, ROBUST_TO_ALL, SH_DEGREE,
-    SH_NOISE, STANDARD, formats,
+    ALL_ATTRIBUTES, DC, FIXED_WEIGHTS, FORMAT, LAMBDA_MSG, LAMBDA_RECON, MESSAGE_ONLY, NONE, OCCLUSION, PRUNE_LOWEST,
+    PRUNE_LOWEST_PREFIX, PRUNE_RANDOM, PRUNE_RANDOM_PREFIX, REST, SH_DEGREE, SH_NOISE, STANDARD, formats,
 };
-use crate::report::paper::{self, ABLATION_BITS, ROBUSTNESS_BITS, Source};
+use crate::report::paper::{self, ABLATION_BITS, Source};
 use crate::report::selection::Selection;
 use crate::report::table::Case;
 use std::collections::BTreeSet;
@@ -54,47 +53,6 @@ pub(super) fn sections(kind: Experiment, selection: &Selection<'_>, options: &Op
             let mut bits = measured(&|bits| bits > longest);
             bits.insert(LONGER_BITS);
             vec![section("bits", true, by_bits(bits, None))]
-        }
-        Experiment::Robustness => {
-            let mut attacks: Vec<&str> = PAPER_ATTACKS.to_vec();
-            attacks.extend(others(selection, ROBUSTNESS_BITS, &attacks));
-            let cases = by_attack(ROBUSTNESS_BITS, attacks, Some(Source::Robustness));
-            let mut sections = vec![section("attack", false, cases)];
-            for (variant, stands) in [(ROBUST, "dropped bands, noise and JPEG"), (ROBUST_TO_ALL, "everything")] {
-                // The paper's decoder was trained against distortions, so its figures stand beside these too.
-                let case = |attack: &str| Case {
-                    variant: variant.into(),
-                    ..case(
-                        attack.into(),
-                        ROBUSTNESS_BITS,
-                        STANDARD,
-                        attack,
-                        Some(Source::Robustness),
-                    )
-                };
-                let known = |attack: &&str| !selection.runs(ROBUSTNESS_BITS, variant, attack).is_empty();
-                if selection.attacks().iter().any(known) {
-                    let more = selection.attacks().into_iter().filter(|attack| known(attack));
-                    let more = more.filter(|attack| !PAPER_ATTACKS.contains(attack));
-                    let mut robust = section(
-                        "attack",
-                        false,
-                        PAPER_ATTACKS.into_iter().chain(more).map(case).collect(),
-                    );
-                    robust.title = format!("{}, trained to stand {stands}", kind.title());
-                    sections.push(robust);
-                }
-            }
-            for bits in measured(&|bits| bits != ROBUSTNESS_BITS) {
-                // Of other lengths the paper says nothing, so only what was measured is told.
-                let attacks = others(selection, bits, &[NONE]);
-                if !attacks.is_empty() {
-                    let mut more = section("attack", false, by_attack(bits, attacks, None));
-                    more.title = format!("{}, {bits} bits", kind.title());
-                    sections.push(more);
-                }
-            }
-            sections
         }
         Experiment::Trained => {
             let variants = [
@@ -159,7 +117,11 @@ pub(super) fn sections(kind: Experiment, selection: &Selection<'_>, options: &Op
             };
             weights.into_iter().map(of_weight).collect()
         }
-        Experiment::Elevation | Experiment::Security | Experiment::Claims | Experiment::Trade => Vec::new(),
+        Experiment::Robustness
+        | Experiment::Elevation
+        | Experiment::Security
+        | Experiment::Claims
+        | Experiment::Trade => Vec::new(),
     }
 }
 
@@ -218,21 +180,5 @@ fn attacks<'a>(selection: &Selection<'a>, bits: u32) -> impl Iterator<Item = &'a
 fn family<'a>(selection: &Selection<'a>, bits: u32, prefix: &str, known: &[&str]) -> Vec<&'a str> {
     let all = attacks(selection, bits);
     all.filter(|attack| attack.starts_with(prefix) && !known.contains(attack))
-        .collect()
-}
-
-/// Attacks on pictures that are not among those known: all that no other report tells.
-fn others<'a>(selection: &Selection<'a>, bits: u32, known: &[&str]) -> Vec<&'a str> {
-    let told = [
-        PRUNE_LOWEST_PREFIX,
-        PRUNE_RANDOM_PREFIX,
-        SH_NOISE,
-        OCCLUSION,
-        FORMAT,
-        SH_DEGREE,
-    ];
-    let is_told = |attack: &str| told.iter().any(|prefix| attack.starts_with(prefix));
-    let all = attacks(selection, bits);
-    all.filter(|attack| !is_told(attack) && !known.contains(attack))
         .collect()
 }

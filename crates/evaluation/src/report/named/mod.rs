@@ -3,8 +3,11 @@ mod cases;
 mod claims;
 mod elevation;
 mod figures;
+mod robustness;
 mod security;
 mod trade;
+
+pub use robustness::to_csv as robustness_csv;
 
 use super::paper::ABLATION_BITS;
 use super::selection::{Pair, Selection};
@@ -18,7 +21,7 @@ use std::path::PathBuf;
 pub enum Experiment {
     /// Accuracy and quality by bits (the paper's Table 1).
     Capacity,
-    /// Accuracy under attacks on pictures (Table 2).
+    /// Accuracy and matches under attacks on pictures, beside what is asked (and Table 2).
     Robustness,
     /// What is learned of the Gaussians (Table 3).
     Trained,
@@ -190,6 +193,7 @@ pub fn report(kind: Experiment, selection: &Selection<'_>, options: &Options) ->
         notes: selection.notes().to_vec(),
     };
     match kind {
+        Experiment::Robustness => robustness::fill(&mut report, selection, options)?,
         Experiment::Elevation => elevation::fill(&mut report, selection, options)?,
         Experiment::Security => security::fill(&mut report, selection)?,
         Experiment::Claims => claims::fill(&mut report, selection)?,

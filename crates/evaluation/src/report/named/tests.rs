@@ -66,20 +66,6 @@ fn capacity_has_all_lengths_of_the_paper() {
 }
 
 #[test]
-fn robustness_has_the_papers_attacks_and_then_others() {
-    let records = some();
-    let report = made(Experiment::Robustness, &records);
-    let rows = rows(&report);
-    assert_eq!(rows[0], row("none", "87.50"));
-    assert_eq!(rows[1], row("noise:0.1", "not measured"));
-    assert_eq!(rows[7], row("jpeg:10", "93.75"));
-    assert_eq!(rows[10], row("squeeze:3", "93.75"));
-    // The same attacks on 32 bits are a table of their own.
-    assert_eq!(rows[11..], [row("jpeg:10", "96.88"), row("squeeze:3", "96.88")]);
-    assert_eq!(report.tables.len(), 2);
-}
-
-#[test]
 fn ablations_and_families() {
     let records = some();
     let trained = rows(&made(Experiment::Trained, &records));

@@ -1,6 +1,7 @@
 //! Readings as CSV in long form: one row a reading, with all that is known of its mark.
 use super::atomic_write::write_whole;
 use crate::error::{Error, Result};
+use crate::report::named::robustness_csv;
 use crate::report::selection::{Run, Selection};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -78,6 +79,14 @@ pub fn to_csv(selection: &Selection<'_>) -> Result<String> {
 /// Those of [`to_csv`], and [`Error::Io`].
 pub fn write_csv(selection: &Selection<'_>, path: &Path) -> Result<()> {
     write_whole(path, to_csv(selection)?.as_bytes())
+}
+
+/// Writes the robustness table, [`robustness_csv`], to a file, whole or not at all.
+///
+/// # Errors
+/// [`Error::Codec`] if the text cannot be made, and [`Error::Io`].
+pub fn write_robustness_csv(selection: &Selection<'_>, path: &Path) -> Result<()> {
+    write_whole(path, robustness_csv(selection)?.as_bytes())
 }
 
 /// In the order of [`COLUMNS`].

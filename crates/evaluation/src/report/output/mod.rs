@@ -9,7 +9,7 @@ mod markers;
 mod picture;
 mod svg;
 
-pub use csv::{to_csv, write_csv};
+pub use csv::{to_csv, write_csv, write_robustness_csv};
 pub use html::{to_html, write_html};
 pub use json::{to_json, write_json};
 pub use markdown::{to_markdown, write_markdown};

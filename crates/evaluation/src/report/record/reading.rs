@@ -17,6 +17,10 @@ pub struct ReadingRecord {
     pub size: u32,
     /// Views that were read, at least 1.
     pub views: u32,
+    /// Number of the first of them in the stream of held-out views.
+    // Left out of JSON and identities where it is the first there is, so that older readings stay what they are.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub first_view: u32,
     /// Bits of the message.
     pub bits: u32,
     /// Bits read right, by view; each at most `bits`.
@@ -30,20 +34,28 @@ pub struct ReadingRecord {
     pub elevation_deg: Option<Vec<f32>>,
 }
 
-/// The identity of what is read of a mark under an attack; known before it is read.
-pub fn reading_id(mark: &Id, attack: &str, size: u32, views: u32) -> Id {
-    Identity::of("reading")
+/// The identity of what is read of a mark under an attack; known before it is read. Side in pixels, views, and the number
+/// of the first.
+pub fn reading_id(mark: &Id, attack: &str, (size, views, first_view): (u32, u32, u32)) -> Id {
+    let identity = Identity::of("reading")
         .text(mark.as_str())
         .text(attack)
         .number(size.into())
-        .number(views.into())
-        .id()
+        .number(views.into());
+    match first_view {
+        0 => identity.id(),
+        first => identity.number(first.into()).id(),
+    }
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 impl ReadingRecord {
     /// Its identity.
     pub fn id(&self) -> Id {
-        reading_id(&self.mark, &self.attack, self.size, self.views)
+        reading_id(&self.mark, &self.attack, (self.size, self.views, self.first_view))
     }
 
     /// Share of bits read right in one view, mean over views, 0..=1.
@@ -125,11 +137,12 @@ mod tests {
         let mut better = first.clone();
         better.bits_right = vec![16, 16];
         assert_eq!(first.id(), better.id());
-        assert_eq!(first.id(), reading_id(&mark.id(), "none", first.size, 2));
-        assert_ne!(first.id(), reading_id(&mark.id(), "none", first.size, 3));
-        assert_ne!(first.id(), reading_id(&mark.id(), "none", 1, 2));
-        assert_ne!(first.id(), reading_id(&mark.id(), "jpeg:10", first.size, 2));
-        assert_ne!(first.id(), reading_id(&first.id(), "none", first.size, 2));
+        assert_eq!(first.id(), reading_id(&mark.id(), "none", (first.size, 2, 0)));
+        assert_ne!(first.id(), reading_id(&mark.id(), "none", (first.size, 3, 0)));
+        assert_ne!(first.id(), reading_id(&mark.id(), "none", (1, 2, 0)));
+        assert_ne!(first.id(), reading_id(&mark.id(), "jpeg:10", (first.size, 2, 0)));
+        assert_ne!(first.id(), reading_id(&first.id(), "none", (first.size, 2, 0)));
+        assert_ne!(first.id(), reading_id(&mark.id(), "none", (first.size, 2, 28)));
     }
 
     #[test]
