@@ -31,6 +31,9 @@ pub enum PhotometricCorrection {
     WhiteBackground,
     /// Its tones were changed, and with them its background.
     Tone(Tone),
+    /// Whatever was done to its tones, and whichever part of it shows the scene, was estimated from the picture and the
+    /// key alone. The message that is claimed has no say in it, so however many were looked at, one is paid for.
+    Estimated,
 }
 
 /// Something that was done to all pixels of a picture alike.
@@ -57,6 +60,16 @@ pub struct Window {
     pub side: u32,
 }
 
+impl Hypothesis {
+    /// What was done to each picture is estimated from it.
+    pub fn estimated() -> Self {
+        Self {
+            correction: PhotometricCorrection::Estimated,
+            ..Self::default()
+        }
+    }
+}
+
 /// In words, "as given" where nothing is undone.
 impl fmt::Display for Hypothesis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -65,6 +78,7 @@ impl fmt::Display for Hypothesis {
             PhotometricCorrection::None => {}
             PhotometricCorrection::WhiteBackground => undone.push("ground made white".to_owned()),
             PhotometricCorrection::Tone(tone) => undone.push(format!("{tone} undone")),
+            PhotometricCorrection::Estimated => undone.push("tones and part estimated from each picture".into()),
         }
         if self.quarter_turns > 0 {
             undone.push(format!("turned by {} degrees", 90 * u32::from(self.quarter_turns)));
@@ -129,5 +143,9 @@ mod tests {
             ..Hypothesis::default()
         };
         assert_eq!(white.to_string(), "ground made white");
+        assert_eq!(
+            Hypothesis::estimated().to_string(),
+            "tones and part estimated from each picture"
+        );
     }
 }

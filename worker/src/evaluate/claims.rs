@@ -182,7 +182,7 @@ enum Suspect {
 impl Suspect {
     fn read(engine: &Engine, picture: &Picture, searched: bool) -> Result<Self> {
         if searched {
-            return Ok(Self::Searched(PictureLogits::read(engine, picture)?));
+            return Ok(Self::Searched(PictureLogits::read(engine, picture, &[])?));
         }
         let logits = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
         Ok(Self::AsGiven(logits))

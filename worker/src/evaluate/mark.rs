@@ -79,6 +79,7 @@ impl Marking<'_> {
         write_picture(&self.folder.join(&picture), &contact_sheet(shown)?)?;
         let before = unmarked
             .read(self.engine, self.message)?
+            .each()?
             .compare(self.message, &self.engine.acceptance_rule(1))?;
         Ok((
             Mark {

@@ -14,6 +14,7 @@ mod steganalysis;
 mod trial;
 mod trials;
 mod variants;
+mod view_readings;
 
 pub use plan::{Trade, plan};
 pub use robustness::{Robustness, attacks};

@@ -9,8 +9,10 @@ use guardsplat_evaluation::report::record::{Id, ReadingRecord};
 use image::RgbImage;
 
 use super::guessed::cross_chosen;
+use super::view_readings::ViewReadings;
 use crate::error::{Error, Result};
-use guardsplat_engine::extract::{Engine, PooledLogits, read_corrections};
+use guardsplat_engine::clip::config::Tones;
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, read_corrections};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
 use guardsplat_engine::scene::Gaussians;
@@ -83,18 +85,22 @@ impl Views {
         self.images.iter().take(count).map(to_picture).collect()
     }
 
-    /// Logits of all views; of pictures that somebody else made, under what may have been done to them.
-    pub fn read(&self, engine: &Engine, message: &Message) -> Result<PooledLogits> {
-        let mut logits = Vec::with_capacity(self.images.len());
+    /// What is read of all views; of pictures that somebody else made, under what may have been done to them.
+    pub fn read(&self, engine: &Engine, message: &Message) -> Result<ViewReadings> {
         // One at a time: large pictures of all views need not be there as floats.
-        for image in &self.images {
-            let picture = to_picture(image);
+        let pictures = self.images.iter().map(to_picture);
+        if self.processed && engine.extractor.tones() == Tones::Estimated {
+            let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture, &[])?));
+            return Ok(ViewReadings::Estimated(read.collect::<Result<_>>()?));
+        }
+        let mut logits = Vec::with_capacity(self.images.len());
+        for picture in pictures {
             match self.processed {
                 true => logits.push(cross_chosen(&read_corrections(engine, &picture)?, message)),
                 false => logits.extend(engine.read_logits(&[picture])?),
             }
         }
-        Ok(PooledLogits::new(logits)?)
+        Ok(ViewReadings::Decided(PooledLogits::new(logits)?))
     }
 
     /// The same views after an attack on each.
@@ -136,6 +142,7 @@ impl Views {
     ) -> Result<ReadingRecord> {
         let reading = self.read(engine, message)?;
         let right = reading
+            .each()?
             .views
             .iter()
             .map(|logits| Ok(Reading::from_logits(logits)?.matches(message)? as u16))

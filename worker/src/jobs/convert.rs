@@ -195,6 +195,7 @@ fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
     let (kind, factor) = match correction {
         PhotometricCorrection::None => return None,
         PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
+        PhotometricCorrection::Estimated => (Kind::Estimated, 1.0),
         PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
         PhotometricCorrection::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
         PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),

@@ -51,11 +51,14 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
         let mut shown = Thumbnails::default();
         let (findings, framed) = if claim {
-            let (framed, ignored) = read_hypotheses(engine, &source, &views, &mut shown, progress)?;
+            let read = read_hypotheses(engine, &source, &views, &mut shown, progress)?;
+            for (picture, estimate) in read.estimates.iter().enumerate() {
+                tracing::info!(picture, estimate, "estimated what was done to a picture");
+            }
             // As given comes first.
-            let reading = framed.first().map(|(_, reading)| reading);
+            let reading = read.readings.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-            (VerificationReport::new(reading, None, &ignored)?, framed)
+            (VerificationReport::new(reading, None, &read.ignored)?, read.readings)
         } else {
             let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
             (VerificationReport::of(&compared)?, Vec::new())

@@ -2,7 +2,7 @@
 use guardsplat_codeword::{Hypothesis, Message, Verdict};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, hypotheses, read_scene,
+    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, estimates, hypotheses, read_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
@@ -90,8 +90,15 @@ fn read_scenes(
     Ok((logits, ignored))
 }
 
-/// A reading under each hypothesis, as given first, and rows of scenes that were ignored.
-pub type HypothesisReadings = (Vec<(Hypothesis, PooledLogits)>, Vec<Ignored>);
+/// What was read under every hypothesis.
+pub struct HypothesisReadings {
+    /// A reading under each, as given first.
+    pub readings: Vec<(Hypothesis, PooledLogits)>,
+    /// What is estimated to have been done to each picture, in words, where that is how the engine reads.
+    pub estimates: Vec<String>,
+    /// Rows of scenes that were ignored.
+    pub ignored: Vec<Ignored>,
+}
 
 /// As [`read`], under every hypothesis about what was done to pictures; views of scenes are as they are under all of them,
 /// and without pictures there is one only. Those without borders are there only if some picture has any: others would be
@@ -105,13 +112,18 @@ pub fn read_hypotheses(
 ) -> Result<HypothesisReadings> {
     let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
     if source.pictures.is_empty() {
-        return Ok((vec![(Hypothesis::default(), PooledLogits::new(of_scenes)?)], ignored));
+        return Ok(HypothesisReadings {
+            readings: vec![(Hypothesis::default(), PooledLogits::new(of_scenes)?)],
+            estimates: Vec::new(),
+            ignored,
+        });
     }
     let mut pictures = Vec::with_capacity(source.pictures.len());
     for (index, path) in source.pictures.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
         shown.see("picture", index, &picture)?;
-        pictures.push(PictureLogits::read(engine, &picture)?);
+        let read = PictureLogits::read(engine, &picture, &pictures)?;
+        pictures.push(read);
         progress(of_scenes.len() + index + 1, count(source, views));
     }
     let together = |(hypothesis, logits): (Hypothesis, PooledLogits)| {
@@ -119,7 +131,15 @@ pub fn read_hypotheses(
         Ok((hypothesis, PooledLogits::new(all)?))
     };
     let read = hypotheses(engine, &pictures)?.into_iter().map(together);
-    Ok((read.collect::<Result<_>>()?, ignored))
+    Ok(HypothesisReadings {
+        readings: read.collect::<Result<_>>()?,
+        estimates: estimates(&pictures)
+            .into_iter()
+            .flatten()
+            .map(ToString::to_string)
+            .collect(),
+        ignored,
+    })
 }
 
 /// What was read, and how it compares with a raw message.
@@ -132,6 +152,8 @@ pub struct Compared {
     pub hypothesis: Hypothesis,
     /// Hypotheses under which the pictures were read.
     pub hypotheses: usize,
+    /// What is estimated to have been done to each picture, in words, if it was estimated.
+    pub estimates: Vec<String>,
     /// Rows of scenes that were ignored.
     pub ignored: Vec<Ignored>,
 }
@@ -154,6 +176,7 @@ pub fn read_and_compare(
         comparison: None,
         hypothesis: Hypothesis::default(),
         hypotheses: 1,
+        estimates: Vec::new(),
         ignored,
     };
     let Some(message) = message else {
@@ -167,8 +190,12 @@ pub fn read_and_compare(
     if decided {
         return Ok(best);
     }
-    let (read, _) = read_hypotheses(engine, source, views, &mut shown, progress)?;
-    best.hypotheses = read.len();
+    let HypothesisReadings {
+        readings: read,
+        estimates,
+        ..
+    } = read_hypotheses(engine, source, views, &mut shown, progress)?;
+    (best.hypotheses, best.estimates) = (read.len(), estimates);
     let rule = engine.acceptance_rule(halves * read.len().saturating_sub(1).max(1));
     for (hypothesis, reading) in read.into_iter().skip(1) {
         let comparison = reading.compare(message, &rule)?;
@@ -213,6 +240,9 @@ pub struct VerificationReport {
     /// The way that agreed best, where it is not the first: what was undone, whether borders were cut off.
     #[serde(rename = "framing")]
     pub hypothesis: Option<String>,
+    /// What is estimated to have been done to each picture, where that was estimated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub estimates: Vec<String>,
     /// Rows of the scene that are no Gaussians of it and were ignored.
     pub ignored_rows: usize,
     /// Why nothing could be decided.
@@ -227,6 +257,7 @@ impl VerificationReport {
         Ok(Self {
             hypotheses: compared.hypotheses,
             hypothesis: (!as_given).then(|| compared.hypothesis.to_string()),
+            estimates: compared.estimates.clone(),
             ..found
         })
     }
@@ -250,6 +281,7 @@ impl VerificationReport {
             view_agreement: reading.agreement(),
             hypotheses: 1,
             hypothesis: None,
+            estimates: Vec::new(),
             ignored_rows: ignored.iter().map(Ignored::count).sum(),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),

@@ -21,7 +21,7 @@ mod weights;
 
 pub use config::ClipConfig;
 pub use model::{ClipModel, ImageTower, Parts, normalize};
-pub use preprocess::{preprocess, resize};
+pub use preprocess::{normalized, preprocess, resize};
 pub use random_fourier::RandomFourierEncoder;
 pub use resnet::ResNet;
 pub use shipped::{ROBUST, ROBUST_BITS, STANDARD};
@@ -97,13 +97,22 @@ impl Clip {
     /// # Panics
     /// When the model was loaded without its image tower.
     pub fn image_features(&self, pictures: Tensor<4>) -> Tensor<2> {
+        let side = self.config.vision.image_size;
+        self.features_as_they_are(resize(pictures, side, side))
+    }
+
+    /// [`Clip::image_features`] of pictures that are not resized. Only a tower that averages over pixels takes other sizes than
+    /// its own.
+    ///
+    /// # Panics
+    /// When the model was loaded without its image tower.
+    pub fn features_as_they_are(&self, pictures: Tensor<4>) -> Tensor<2> {
         let tower = self
             .model
             .visual
             .as_ref()
             .expect("loaded with Parts::Image or Parts::Both");
-        let input = preprocess(pictures, self.config.vision.image_size, &self.config.normalization);
-        normalize(tower.forward(input))
+        normalize(tower.forward(normalized(pictures, &self.config.normalization)))
     }
 
     /// L2-normalised features `[b, dim]` of token ids `[b, n]`, each below `vocab_size`, `n` at most the context

@@ -69,6 +69,7 @@ impl ImageTower {
                 scales,
                 kernel,
                 surround,
+                tones: _,
             } => Self::RandomFourier(RandomFourierEncoder::new(
                 vision, scales, *kernel, *surround, embed_dim, device,
             )),

@@ -4,10 +4,14 @@ use burn::tensor::{Device, Tensor, TensorData};
 
 /// Resizes `[b, 3, h, w]` to `[b, 3, size, size]` (the aspect is squashed) and normalises the channels.
 pub fn preprocess(pictures: Tensor<4>, size: usize, normalization: &Normalization) -> Tensor<4> {
+    normalized(resize(pictures, size, size), normalization)
+}
+
+/// Pictures `[b, 3, h, w]` with mean and deviation of their channels removed.
+pub fn normalized(pictures: Tensor<4>, normalization: &Normalization) -> Tensor<4> {
     let device = pictures.device();
     let channels = |values: [f32; 3]| Tensor::<1>::from_floats(values, &device).reshape([1, 3, 1, 1]);
-    let resized = resize(pictures, size, size);
-    (resized - channels(normalization.mean)) / channels(normalization.std)
+    (pictures - channels(normalization.mean)) / channels(normalization.std)
 }
 
 /// Antialiased bilinear resize of `[b, c, h, w]` to `[b, c, height, width]`, equal to torch's

@@ -169,12 +169,24 @@ impl Engine {
     /// # Errors
     /// Pictures without pixels, a failing device, or [`Error::Stopped`].
     pub fn read_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
+        self.read_with(pictures, |pictures| self.logits(pictures))
+    }
+
+    /// Logits of pictures that were put together from squares that the extractor looks at one by one.
+    ///
+    /// # Errors
+    /// Those of [`Engine::read_logits`].
+    pub(super) fn read_square_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
+        self.read_with(pictures, |pictures| self.extractor.square_logits(pictures))
+    }
+
+    fn read_with(&self, pictures: &[Picture], read: impl Fn(Tensor<4>) -> Result<Tensor<2>>) -> Result<Vec<Vec<f32>>> {
         let mut rows = Vec::with_capacity(pictures.len());
         for same in pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
             for chunk in same.chunks(READ_BATCH) {
                 self.stop.check()?;
                 let chunk: Vec<&Picture> = chunk.iter().collect();
-                let logits = self.logits(batch(&chunk, &self.compute.device)?)?;
+                let logits = read(batch(&chunk, &self.compute.device)?)?;
                 rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
             }
         }

@@ -1,7 +1,7 @@
 //! What reads a message from pictures: the part of the engine that embedding differentiates through, and readings ask.
 use burn::tensor::{Device, Tensor};
 
-use crate::clip::config::VisionTower;
+use crate::clip::config::{Tones, VisionTower};
 use crate::clip::{Clip, resize};
 use crate::error::{Error, Result};
 use crate::message::{Decoding, Key, Reader};
@@ -23,6 +23,26 @@ pub trait Extractor: Send + Sync {
     /// Whether a change of tones by a few hundredths makes it read something else.
     fn reads_exact_colours(&self) -> bool {
         false
+    }
+
+    /// How changed tones, and the part of a picture that shows the scene, are found where exact colours are read.
+    fn tones(&self) -> Tones {
+        Tones::Searched
+    }
+
+    /// Side of the squares of a picture that it looks at one by one and averages over, wherever they are; `None` where it
+    /// matters where things are.
+    fn square(&self) -> Option<usize> {
+        None
+    }
+
+    /// Logits of pictures that were put together from such squares. They may be smaller than [`Extractor::side`], and are
+    /// not resized.
+    ///
+    /// # Errors
+    /// As [`Extractor::logits`].
+    fn square_logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        self.logits(pictures)
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]` in [0, 1], positive for 1 and negative for 0; differentiable in the
@@ -83,6 +103,30 @@ impl Extractor for ClipExtractor {
 
     fn reads_exact_colours(&self) -> bool {
         matches!(self.clip.config.vision.tower, VisionTower::Statistics { .. })
+    }
+
+    fn tones(&self) -> Tones {
+        match self.clip.config.vision.tower {
+            VisionTower::Statistics { tones, .. } => tones,
+            _ => Tones::Searched,
+        }
+    }
+
+    fn square(&self) -> Option<usize> {
+        match &self.clip.config.vision.tower {
+            VisionTower::Statistics { scales, surround, .. } => {
+                let largest = scales.iter().copied().max().filter(|_| *surround == 1)?;
+                scales
+                    .iter()
+                    .all(|scale| largest.is_multiple_of(*scale))
+                    .then_some(largest)
+            }
+            _ => None,
+        }
+    }
+
+    fn square_logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        Ok(self.reader.image_logits(self.clip.features_as_they_are(pictures)))
     }
 
     fn logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {

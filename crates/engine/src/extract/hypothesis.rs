@@ -6,6 +6,7 @@ use guardsplat_codeword::Hypothesis;
 use super::photometric::{corrections, read_corrections};
 use super::window::windows;
 use super::{Engine, Extractor};
+use crate::clip::config::Tones;
 use crate::error::Result;
 use crate::picture::Picture;
 
@@ -15,8 +16,12 @@ const TOLERANCE: f32 = 8.0 / 255.0;
 const LEAST_SIDE: u32 = 16;
 
 /// All hypotheses under which this extractor reads one picture that has borders and is large enough to be read in parts:
-/// the most that a claim about a picture pays for.
+/// the most that a claim about a picture pays for. Where what was done is estimated without the claimed message, they are
+/// two.
 pub fn searched_hypotheses(extractor: &dyn Extractor) -> Vec<Hypothesis> {
+    if extractor.tones() == Tones::Estimated {
+        return vec![Hypothesis::default(), Hypothesis::estimated()];
+    }
     let whole = [false, true].map(|trimmed| whole_hypotheses(extractor, trimmed));
     whole.into_iter().flatten().chain(part_hypotheses(extractor)).collect()
 }
@@ -156,6 +161,7 @@ mod tests {
     /// Reads nothing.
     struct Fake {
         exact: bool,
+        tones: Tones,
     }
 
     impl Extractor for Fake {
@@ -173,6 +179,10 @@ mod tests {
 
         fn reads_exact_colours(&self) -> bool {
             self.exact
+        }
+
+        fn tones(&self) -> Tones {
+            self.tones
         }
 
         fn logits(&self, _: Tensor<4>) -> Result<Tensor<2>> {
@@ -252,10 +262,15 @@ mod tests {
 
     #[test]
     fn as_many_hypotheses_are_searched_as_claims_about_pictures_are_told_to_pay_for() {
-        let exact = searched_hypotheses(&Fake { exact: true });
+        let of = |exact, tones| searched_hypotheses(&Fake { exact, tones });
+        let exact = of(true, Tones::Searched);
         // 72 tones with borders and without, and 34 parts (docs/verify.md).
         assert_eq!(exact.len(), 178);
-        assert_eq!(searched_hypotheses(&Fake { exact: false }).len(), 16);
+        assert_eq!(of(false, Tones::Searched).len(), 16);
+        assert_eq!(
+            of(true, Tones::Estimated),
+            [Hypothesis::default(), Hypothesis::estimated()]
+        );
         assert_eq!(exact[0], Hypothesis::default());
         for (place, hypothesis) in exact.iter().enumerate() {
             assert!(!exact[..place].contains(hypothesis), "{hypothesis}");

@@ -1,4 +1,5 @@
 //! Extraction: reads a message from pictures of a scene, or from a scene by rendering it over the sphere.
+mod blind;
 mod engine;
 mod extractor;
 mod hypothesis;
@@ -9,12 +10,13 @@ mod pooled;
 mod suspect_kind;
 mod window;
 
+pub use blind::Candidate;
 pub(crate) use engine::cpu_weight_cache;
 pub use engine::{Engine, rasterizer};
 pub use extractor::{ClipExtractor, Extractor, HiddenExtractor};
 pub use hypothesis::{searched_hypotheses, without_borders};
 pub use photometric::{corrections, read_corrections};
-pub use picture_logits::{PictureLogits, hypotheses};
+pub use picture_logits::{PictureLogits, estimates, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
 pub use suspect_kind::SuspectKind;

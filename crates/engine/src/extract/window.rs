@@ -23,16 +23,22 @@ pub(super) fn windows() -> impl Iterator<Item = Window> {
     })
 }
 
+/// All windows of a picture; none where it is too small for them.
+pub(super) fn windows_of(picture: &Picture) -> impl Iterator<Item = Window> {
+    let least = TRIED.iter().map(|(side, _)| *side).min().unwrap_or(STEPS);
+    let large = picture.width.min(picture.height) * least / STEPS >= LEAST_SIDE;
+    windows().filter(move |_| large)
+}
+
 /// Logits of a picture in each of these windows, in their order; `None` where the picture is too small for them.
 ///
 /// # Errors
 /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub(super) fn read_windows(engine: &Engine, picture: &Picture) -> Result<Option<Vec<Vec<f32>>>> {
-    let least = TRIED.iter().map(|(side, _)| *side).min().unwrap_or(STEPS);
-    if picture.width.min(picture.height) * least / STEPS < LEAST_SIDE {
+    let windows: Vec<Window> = windows_of(picture).collect();
+    if windows.is_empty() {
         return Ok(None);
     }
-    let windows: Vec<Window> = windows().collect();
     let mut logits = Vec::with_capacity(windows.len());
     for chunk in windows.chunks(BATCH) {
         // Made small one by one: a large picture need not fit in memory eight times.
@@ -43,7 +49,7 @@ pub(super) fn read_windows(engine: &Engine, picture: &Picture) -> Result<Option<
 }
 
 /// A part of a picture.
-fn crop(window: Window, picture: &Picture) -> Picture {
+pub(super) fn crop(window: Window, picture: &Picture) -> Picture {
     let place = |side: u32, twelfths: u32| (u64::from(side) * u64::from(twelfths) / u64::from(STEPS)) as usize;
     let [left, right] = [window.left, window.left + window.side].map(|at| place(picture.width, at));
     let [top, bottom] = [window.top, window.top + window.side].map(|at| place(picture.height, at));

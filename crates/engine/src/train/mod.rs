@@ -27,7 +27,9 @@ pub use drawing::{Drawing, SIDE, draw, random_view};
 #[cfg(test)]
 pub(crate) use filters::filters;
 
-use crate::clip::config::{Activation, BlockConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
+use crate::clip::config::{
+    Activation, BlockConfig, EndToken, Normalization, TextConfig, Tones, VisionConfig, VisionTower,
+};
 use crate::clip::{ClipConfig, ClipModel, ImageTower, Parts, RandomFourierEncoder};
 use crate::device::Compute;
 use crate::error::{Error, Result};
@@ -134,6 +136,7 @@ pub fn config(options: &TrainOptions) -> ClipConfig {
                 scales: options.scales.clone(),
                 kernel: filters::KERNEL,
                 surround: options.surround,
+                tones: Tones::Estimated,
             },
         },
         text: TextConfig {

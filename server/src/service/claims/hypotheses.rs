@@ -69,6 +69,7 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
         correction: match correction {
             None | Some((Kind::Unspecified, _)) => PhotometricCorrection::None, // refused
             Some((Kind::Ground, _)) => PhotometricCorrection::WhiteBackground,
+            Some((Kind::Estimated, _)) => PhotometricCorrection::Estimated,
             Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),
             Some((Kind::Gamma, exponent)) => PhotometricCorrection::Tone(Tone::Gamma(exponent)),
             Some((Kind::Contrast, factor)) => PhotometricCorrection::Tone(Tone::Contrast(factor)),
@@ -165,6 +166,20 @@ mod tests {
         assert_eq!(counts, [1, 2]);
         assert!(checked(&[brightened(0.81), brightened(0.81)], 64).is_err());
         assert!(checked(&[brightened(0.0)], 64).is_err() && checked(&[brightened(f32::NAN)], 64).is_err());
+    }
+
+    #[test]
+    fn an_estimate_is_one_framing_whatever_it_took() {
+        let mut estimated = brightened(1.0);
+        estimated.undone = Some(Undone {
+            kind: Kind::Estimated.into(),
+            factor: 1.0,
+        });
+        let readings = [reading(0, false, false), estimated];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "tones and part estimated from each picture");
+        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        assert_eq!(counts, [1, 1]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod open_clip;
 mod published;
 
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 pub use published::{PUBLISHED, published};
@@ -61,7 +62,28 @@ pub enum VisionTower {
         kernel: usize,
         /// Side of the square whose mean is subtracted from a pixel before the filters, odd; 1 subtracts nothing.
         surround: usize,
+        /// How what was done to the tones of a picture is found.
+        tones: Tones,
     },
+}
+
+/// How what was done to the tones of a picture, and which part of it shows the scene, is found before it is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tones {
+    /// Every guess is read, and a claim pays for each. So it is where a configuration says nothing: towers from before
+    /// there was an estimate.
+    #[default]
+    Searched,
+    /// They are estimated from the picture and the key alone, whatever is claimed, so that a claim pays for one guess.
+    Estimated,
+}
+
+impl Tones {
+    /// Whether this is what a configuration means that says nothing.
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Sizes of the text tower.
@@ -221,6 +243,7 @@ impl ClipConfig {
                 scales,
                 kernel,
                 surround,
+                tones: _,
             } => {
                 within("vision scales", scales.len(), 16)?;
                 // Sines are taken of single pixels.

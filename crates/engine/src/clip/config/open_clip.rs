@@ -1,6 +1,8 @@
 //! Reads and writes OpenCLIP's model configuration. Unknown fields are errors: most of them change what the
 //! model computes without changing the shape of its weights.
-use super::{Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, VisionConfig, VisionTower};
+use super::{
+    Activation, BlockConfig, ClipConfig, EndToken, Normalization, TextConfig, Tones, VisionConfig, VisionTower,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -48,6 +50,8 @@ enum Layers {
         kernel: usize,
         #[serde(default = "nothing_around")]
         surround: usize,
+        #[serde(default, skip_serializing_if = "Tones::is_default")]
+        tones: Tones,
     },
 }
 
@@ -132,10 +136,12 @@ pub(super) fn parse(mut value: Value) -> Result<ClipConfig, String> {
             scales,
             kernel,
             surround,
+            tones,
         } => VisionTower::Statistics {
             scales,
             kernel,
             surround,
+            tones,
         },
     };
     let text = model.text_cfg;
@@ -178,11 +184,13 @@ pub(super) fn write(config: &ClipConfig) -> Result<String, String> {
             scales,
             kernel,
             surround,
+            tones,
         } => {
             let layers = Layers::Statistics {
                 scales: scales.clone(),
                 kernel: *kernel,
                 surround: *surround,
+                tones: *tones,
             };
             (layers, None, default_head_width(), None)
         }

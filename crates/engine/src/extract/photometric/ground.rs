@@ -10,33 +10,56 @@ const SHARE: f32 = 0.5;
 const CLEAN: f32 = 0.002;
 
 /// The picture with its ground made white; `None` where its border is not of one colour, or is white or black already.
-pub(super) fn whitened(picture: &Picture) -> Option<Picture> {
-    let border = border(picture);
-    let colour: [f32; 3] = std::array::from_fn(|c| median(border.iter().map(|p| p[c]).collect()));
-    let distance = |pixel: &[f32; 3]| {
-        let differences = pixel.iter().zip(colour).map(|(v, c)| (v - c).abs());
-        differences.fold(0.0, f32::max)
-    };
-    let of_ground = border.iter().filter(|p| distance(p) <= DISTANCE[0]).count();
-    if border.is_empty() || (of_ground as f32) < SHARE * border.len() as f32 {
-        return None;
-    }
-    let clean = |level: f32| {
-        let off = |pixel: &[f32; 3]| pixel.iter().any(|v| (v - level).abs() > CLEAN);
-        border.iter().filter(|p| distance(p) <= DISTANCE[0]).all(|p| !off(p))
-    };
-    if clean(0.0) || clean(1.0) {
-        return None;
-    }
+pub(in crate::extract) fn whitened(picture: &Picture) -> Option<Picture> {
+    colour(picture).map(|ground| whitened_from(picture, ground))
+}
+
+/// The picture with all of that colour made white.
+pub(in crate::extract) fn whitened_from(picture: &Picture, ground: [f32; 3]) -> Picture {
     let [near, far] = DISTANCE;
     let pixels = picture.pixels.as_chunks::<3>().0.iter().flat_map(|pixel| {
-        let scene = ((distance(pixel) - near) / (far - near)).clamp(0.0, 1.0);
+        let scene = ((distance(pixel, ground) - near) / (far - near)).clamp(0.0, 1.0);
         pixel.map(|v| v * scene + (1.0 - scene))
     });
-    Some(Picture {
+    Picture {
         pixels: pixels.collect(),
         ..*picture
-    })
+    }
+}
+
+/// The colour of the ground; `None` where the border is not of one colour, or is white or black already.
+pub(in crate::extract) fn colour(picture: &Picture) -> Option<[f32; 3]> {
+    let ground = seen(picture)?;
+    let border = border(picture);
+    let mut of_ground = border.iter().filter(|pixel| is_near(pixel, ground));
+    let clean = of_ground.all(|pixel| is_clean(*pixel));
+    (!clean).then_some(ground)
+}
+
+/// The colour of the ground, whatever it is; `None` where the border is not of one colour.
+pub(in crate::extract) fn seen(picture: &Picture) -> Option<[f32; 3]> {
+    let border = border(picture);
+    let colour: [f32; 3] = std::array::from_fn(|c| median(border.iter().map(|p| p[c]).collect()));
+    let count = border.iter().filter(|pixel| is_near(pixel, colour)).count();
+    (!border.is_empty() && count as f32 >= SHARE * border.len() as f32).then_some(colour)
+}
+
+/// Whether a pixel may be of a ground of this colour.
+pub(in crate::extract) fn is_near(pixel: &[f32; 3], ground: [f32; 3]) -> bool {
+    distance(pixel, ground) <= DISTANCE[0]
+}
+
+/// Whether a colour is black or white.
+pub(in crate::extract) fn is_clean(colour: [f32; 3]) -> bool {
+    [0.0, 1.0]
+        .iter()
+        .any(|level| colour.iter().all(|v| (v - level).abs() <= CLEAN))
+}
+
+/// How far a pixel is from a colour.
+fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
+    let differences = pixel.iter().zip(colour).map(|(v, c)| (v - c).abs());
+    differences.fold(0.0, f32::max)
 }
 
 /// The outermost pixels.

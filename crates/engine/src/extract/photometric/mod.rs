@@ -1,13 +1,16 @@
 //! Photometric corrections: what may have been done to the tones of a picture, each undone and read.
 //!
-//! The shipped CLIP reads exact colours: a picture that was brightened by a twentieth reads as another one. What was done
-//! is not known, so much is tried. Logits do not tell which correction is right (a smooth unmarked surface has large ones,
-//! too): the message that is claimed does, **and every correction is another chance to match it, which a claim must
-//! count**.
-mod ground;
+//! A tower of sines reads exact colours: a picture that was brightened by a twentieth reads as another one. What was done
+//! is not known. Either much is tried ([`corrections`]), and the message that is claimed tells what is right: **every
+//! correction is another chance to match it, which a claim must count**. Or it is estimated without that message, from the
+//! picture and the key (`super::blind`), as a [`ToneChange`]: then one reading is counted.
+mod change;
+pub(super) mod ground;
 mod tone;
 
 use guardsplat_codeword::PhotometricCorrection;
+
+pub(super) use change::{COORDINATES, ToneChange};
 
 use super::{Engine, Extractor};
 use crate::error::Result;
@@ -43,7 +46,8 @@ pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f3
 /// The picture before that was done to it, over white where its background is seen.
 fn corrected(correction: PhotometricCorrection, picture: &Picture) -> Picture {
     let toned = match correction {
-        PhotometricCorrection::None => return picture.clone(),
+        // What was estimated is undone where it was found.
+        PhotometricCorrection::None | PhotometricCorrection::Estimated => return picture.clone(),
         PhotometricCorrection::WhiteBackground => None,
         PhotometricCorrection::Tone(tone) => Some(tone::undone(tone, picture)),
     };

@@ -4,7 +4,7 @@ use guardsplat_codeword::Tone;
 use crate::picture::Picture;
 
 /// Weights of red, green and blue in a pixel's grey (ITU-R BT.601).
-const GREY: [f32; 3] = [0.299, 0.587, 0.114];
+pub(super) const GREY: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// A kind of tone that is looked for.
 struct Sought {
@@ -66,7 +66,8 @@ fn each(picture: &Picture, change: impl Fn(f32) -> f32) -> Vec<f32> {
     picture.pixels.iter().map(|v| change(*v).clamp(0.0, 1.0)).collect()
 }
 
-fn grey(pixel: &[f32; 3]) -> f32 {
+/// The grey of a pixel.
+pub(super) fn grey(pixel: &[f32; 3]) -> f32 {
     pixel.iter().zip(GREY).map(|(v, w)| v * w).sum()
 }
 

@@ -1,0 +1,192 @@
+//! All candidates for what was done to one picture, over its parts and changes of tones, as the search goes on.
+use super::parts::Part;
+use super::sample::Sample;
+use super::score::{self, Spread};
+use super::search::{self, Read};
+use super::{BATCH, Candidate, joint};
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::extract::photometric::{ToneChange, ground};
+use crate::picture::Picture;
+
+/// Changes that looked best on a sample, and are tried on all of a part.
+const CHECKED: usize = 16;
+
+/// A search over the parts of a picture.
+pub(super) struct Search<'a> {
+    engine: &'a Engine,
+    /// The whole, at the side that the extractor takes in: contrast is changed about its mean.
+    whole: &'a Picture,
+    parts: &'a [(Part, Picture)],
+    found: Vec<Candidate>,
+    /// Candidates from which a refinement has begun.
+    refined: Vec<Candidate>,
+    /// How scores of wrong candidates are spread.
+    spread: Option<Spread>,
+}
+
+impl<'a> Search<'a> {
+    /// Begins with all parts as they are.
+    ///
+    /// # Errors
+    /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
+    pub fn of_parts(engine: &'a Engine, whole: &'a Picture, parts: &'a [(Part, Picture)]) -> Result<Self> {
+        let mut found = Vec::with_capacity(parts.len());
+        for chunk in parts.chunks(BATCH) {
+            let pictures: Vec<Picture> = chunk.iter().map(|(_, small)| small.clone()).collect();
+            for ((part, _), logits) in chunk.iter().zip(engine.read_logits(&pictures)?) {
+                let score = score::of_logits(&logits);
+                found.extend(score.is_finite().then(|| Candidate {
+                    part: *part,
+                    white: false,
+                    change: ToneChange::default(),
+                    score: score - part.cost(),
+                    logits,
+                }));
+            }
+        }
+        Ok(Self {
+            engine,
+            whole,
+            parts,
+            found,
+            refined: Vec::new(),
+            spread: None,
+        })
+    }
+
+    /// Tries changes of the tones of a part: many on a sample of it, if the extractor reads such, and the best of them on all
+    /// of it.
+    ///
+    /// # Errors
+    /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
+    pub fn sweep(&mut self, place: usize, hints: &[ToneChange]) -> Result<()> {
+        let ((part, small), whole) = (&self.parts[place], self.whole);
+        let ground = ground::colour(small);
+        let anchor = ground.map(|ground| move |change: ToneChange| change.with_white(ground, whole));
+        let anchor = anchor
+            .as_ref()
+            .map(|anchor| anchor as &dyn Fn(ToneChange) -> ToneChange);
+        let mut changes = search::lines(anchor);
+        let square = self.engine.extractor.square();
+        if let Some(sample) = square.and_then(|side| Sample::of(small, side)) {
+            changes.extend(search::tinted());
+            let undone = |change: &ToneChange| sample.undone(change, whole);
+            let mut rough = search::tried(&mut reader(self.engine, undone, Engine::read_square_logits), &changes)?;
+            self.spread = Spread::of(rough.iter().map(|read| read.score));
+            rough.sort_by(|a, b| b.score.total_cmp(&a.score));
+            changes = vec![ToneChange::default()];
+            changes.extend(rough.iter().take(CHECKED).map(|read| read.change));
+        }
+        changes.extend_from_slice(hints);
+        let found = search::tried(&mut self.reader(small), &changes)?;
+        if square.is_none() || self.spread.is_none() {
+            self.spread = Spread::of(found.iter().map(|read| read.score));
+        }
+        self.add(*part, found);
+        Ok(())
+    }
+
+    /// Refines the best candidates that lie apart, so many of them, until one is clear.
+    ///
+    /// # Errors
+    /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
+    pub fn refine(&mut self, starts: usize) -> Result<()> {
+        for _ in 0..starts {
+            let apart = |a: &Candidate, b: &Candidate| a.part != b.part || search::apart(&a.change, &b.change);
+            let new = |candidate: &&Candidate| self.refined.iter().all(|start| apart(candidate, start));
+            let best = self.found.iter().filter(new).max_by(|a, b| a.score.total_cmp(&b.score));
+            let Some(best) = best.cloned() else { break };
+            let Some((part, small)) = self.parts.iter().find(|(part, _)| *part == best.part) else {
+                break;
+            };
+            let start = Read {
+                change: best.change,
+                logits: best.logits.clone(),
+                score: best.score + part.cost(),
+            };
+            self.refined.push(best);
+            let found = search::refined(&mut self.reader(small), start)?;
+            self.add(*part, found);
+            if self.is_clear() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the best candidate stands out.
+    pub fn is_clear(&self) -> bool {
+        let best = self
+            .found
+            .iter()
+            .map(|candidate| candidate.score)
+            .fold(f64::NEG_INFINITY, f64::max);
+        self.spread.is_some_and(|spread| spread.is_clear(best))
+    }
+
+    /// The place of the part whose tones are worth a search besides the first's: the best as it is, if it is better than
+    /// that.
+    pub fn promising(&self) -> Option<usize> {
+        let as_it_is = |part: &Part| {
+            let mut found = self
+                .found
+                .iter()
+                .filter(|c| c.part == *part && c.change == ToneChange::default());
+            found.next().map_or(f64::NEG_INFINITY, |candidate| candidate.score)
+        };
+        let scores: Vec<f64> = self.parts.iter().map(|(part, _)| as_it_is(part)).collect();
+        let best = (1..scores.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
+        (scores[best] > scores[0]).then_some(best)
+    }
+
+    /// The best candidates, best first.
+    pub fn best(mut self) -> Vec<Candidate> {
+        self.found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        self.found.dedup_by(|a, b| a.part == b.part && a.change == b.change);
+        self.found.truncate(joint::MOST);
+        self.found
+    }
+
+    fn add(&mut self, part: Part, found: Vec<Read>) {
+        self.found.extend(found.into_iter().map(|read| Candidate {
+            part,
+            white: true,
+            change: read.change,
+            score: read.score - part.cost(),
+            logits: read.logits,
+        }));
+    }
+
+    /// Reads a part with changes undone, and its ground made white where it shows one.
+    fn reader<'b>(
+        &self,
+        small: &'b Picture,
+    ) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, 'b> {
+        let whole = self.whole;
+        let undone = move |change: &ToneChange| {
+            let undone = change.undone(small, whole)?;
+            Some(ground::whitened(&undone).unwrap_or(undone))
+        };
+        reader(self.engine, undone, Engine::read_logits)
+    }
+}
+
+/// Reads pictures with changes undone, those that can have been done.
+fn reader<'a, U: Fn(&ToneChange) -> Option<Picture> + Send + Sync>(
+    engine: &'a Engine,
+    undone: U,
+    read: fn(&Engine, &[Picture]) -> Result<Vec<Vec<f32>>>,
+) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, U> {
+    move |changes| {
+        let mut logits = Vec::with_capacity(changes.len());
+        // Not all at once: a thousand pictures are a gigabyte.
+        for chunk in changes.chunks(4 * BATCH) {
+            let before = engine.each(chunk, |change| Ok(undone(change)))?;
+            let possible: Vec<Picture> = before.iter().flatten().cloned().collect();
+            let mut read = read(engine, &possible)?.into_iter();
+            logits.extend(before.iter().map(|before| before.as_ref().and_then(|_| read.next())));
+        }
+        Ok(logits)
+    }
+}

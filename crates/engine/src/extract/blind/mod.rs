@@ -1,0 +1,98 @@
+//! The blind choice: what was done to a picture, and which part of it shows the scene, estimated from the picture and the
+//! key alone.
+//!
+//! Whatever is claimed, the same reading is chosen. So under the null hypothesis the claimed word is independent of it,
+//! and one reading is paid for, however many were looked at. A mark makes the logits of the right reading large ([`score`]),
+//! and pictures of one scene carry the same message, so that the right readings of several agree ([`joint`]).
+mod candidates;
+mod joint;
+mod parts;
+mod sample;
+mod score;
+mod search;
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+use super::Engine;
+use super::photometric::ToneChange;
+use crate::error::Result;
+use crate::picture::Picture;
+use candidates::Search;
+pub(super) use joint::chosen;
+use parts::{Part, parts};
+
+/// Corrected pictures that are read together.
+const BATCH: usize = 16;
+/// Places from which a search is refined, unless one is clear before.
+const STARTS: usize = 2;
+/// Pictures read before whose changes are tried, the last ones.
+const HINTS: usize = 8;
+
+/// What may have been done to a picture, and what is read once it is undone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    part: Part,
+    white: bool,
+    change: ToneChange,
+    logits: Vec<f32>,
+    score: f64,
+}
+
+/// A picture as given, and the best candidates for what was done to it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BlindReading {
+    pub as_given: Vec<f32>,
+    candidates: Vec<Candidate>,
+}
+
+impl Candidate {
+    /// Logits of the picture once this is undone.
+    pub fn logits(&self) -> &[f32] {
+        &self.logits
+    }
+}
+
+/// In words.
+impl fmt::Display for Candidate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.change)?;
+        if self.white {
+            f.write_str(", ground made white")?;
+        }
+        match self.part {
+            Part::Whole => Ok(()),
+            Part::Trimmed => f.write_str(", without borders"),
+            Part::Window(window) => write!(f, ", {window}"),
+        }
+    }
+}
+
+impl BlindReading {
+    /// Reads a picture, and looks for what was done to it. What was done to `others` of the same suspect is tried, too.
+    ///
+    /// # Errors
+    /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
+    pub fn read(engine: &Engine, picture: &Picture, others: &[&Self]) -> Result<Self> {
+        let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
+        let whole = engine.resized(picture)?;
+        let parts = parts(engine, picture, &whole)?;
+        let mut search = Search::of_parts(engine, &whole, &parts)?;
+        let hints = others.iter().rev().filter_map(|other| other.candidates.first());
+        let hints: Vec<ToneChange> = hints.take(HINTS).map(|candidate| candidate.change).collect();
+        // The whole, or what is within its borders.
+        search.sweep(0, &hints)?;
+        search.refine(STARTS)?;
+        if let Some(window) = search.promising()
+            && !search.is_clear()
+        {
+            search.sweep(window, &hints)?;
+            search.refine(1)?;
+        }
+        Ok(Self {
+            as_given,
+            candidates: search.best(),
+        })
+    }
+}

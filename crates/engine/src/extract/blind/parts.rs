@@ -1,0 +1,46 @@
+//! Parts of a picture that may be all that shows the scene.
+use guardsplat_codeword::Window;
+
+use crate::error::Result;
+use crate::extract::window::{crop, windows_of};
+use crate::extract::{Engine, without_borders};
+use crate::picture::Picture;
+
+/// How much better a window must look than the whole, as the logarithm of the size of logits.
+const BETTER: f64 = 0.1;
+
+/// Which part of a picture is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Part {
+    /// All of it.
+    Whole,
+    /// All but borders of one colour.
+    Trimmed,
+    /// A window.
+    Window(Window),
+}
+
+impl Part {
+    /// What a part must gain to be believed: there are many, and any shows some colours.
+    pub(super) fn cost(&self) -> f64 {
+        match self {
+            Self::Whole | Self::Trimmed => 0.0,
+            Self::Window(_) => BETTER,
+        }
+    }
+}
+
+/// All parts at the side that the extractor takes in, `whole` being the picture so. First comes what is within its
+/// borders, or the whole if it has none.
+pub(super) fn parts(engine: &Engine, picture: &Picture, whole: &Picture) -> Result<Vec<(Part, Picture)>> {
+    let mut parts = Vec::new();
+    if let Some(trimmed) = without_borders(picture) {
+        parts.push((Part::Trimmed, engine.resized(&trimmed)?));
+    }
+    parts.push((Part::Whole, whole.clone()));
+    for window in windows_of(picture) {
+        // Made small one by one: a large picture need not fit in memory many times.
+        parts.push((Part::Window(window), engine.resized(&crop(window, picture))?));
+    }
+    Ok(parts)
+}

@@ -1,0 +1,68 @@
+//! How much logits look like those of a mark, whatever it says.
+//!
+//! A mark pushes all bits of a picture away from 0, about equally far. Logits of an unmarked picture, or of one whose tones
+//! are wrong, spread around 0: fewer are large, and some are small. Nothing here knows a message, so that a reading may be
+//! chosen by it without being paid for.
+use crate::extract::photometric::ToneChange;
+
+/// A change of a coordinate, as a logarithm, that costs half as much as the largest.
+const SMALL: f32 = 0.1;
+/// What the largest change of a coordinate must gain to be believed, in logarithms of the size of logits. The size of
+/// logits is largest a little beside the truth, and most people change one thing or nothing.
+const COST: f64 = 0.06;
+/// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
+/// times reaches two to three.
+const CLEAR: f64 = 3.0;
+
+/// The logarithm of the size of logits: of the mean of their roots, squared, which is largest where all are alike. Not finite
+/// where one isn't.
+pub(super) fn of_logits(logits: &[f32]) -> f64 {
+    let roots: f64 = logits.iter().map(|v| f64::from(v.abs()).sqrt()).sum();
+    2.0 * (roots / logits.len().max(1) as f64).ln()
+}
+
+/// What a change must gain to be believed. A tint is what channels differ by from the middle one.
+pub(super) fn cost(change: &ToneChange) -> f64 {
+    let [mut gains @ .., gamma, saturation, contrast] = change.logs;
+    gains.sort_by(f32::total_cmp);
+    let [low, brightness, high] = gains;
+    let done = [
+        brightness,
+        low - brightness,
+        high - brightness,
+        gamma,
+        saturation,
+        contrast,
+    ];
+    let share = |v: f32| f64::from(v.abs() / (v.abs() + SMALL));
+    COST * done.map(share).iter().sum::<f64>()
+}
+
+/// How scores of readings are spread that are nearly all wrong.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spread {
+    middle: f64,
+    deviation: f64,
+}
+
+impl Spread {
+    /// That of these; `None` of too few.
+    pub fn of(scores: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut scores: Vec<f64> = scores.collect();
+        if scores.len() < 20 {
+            return None;
+        }
+        scores.sort_by(f64::total_cmp);
+        let at = |share: f64| scores[(share * (scores.len() - 1) as f64) as usize];
+        Some(Self {
+            middle: at(0.5),
+            // The middle half of a normal distribution is 1.349 deviations wide.
+            deviation: (at(0.75) - at(0.25)) / 1.349,
+        })
+    }
+
+    /// Whether a score is so far above that it is hardly one of these.
+    pub fn is_clear(&self, score: f64) -> bool {
+        score > self.middle + CLEAR * self.deviation
+    }
+}

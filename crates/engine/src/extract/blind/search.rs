@@ -1,0 +1,164 @@
+//! The search for what was done to the tones of one part of a picture: sweeps, and a refinement of the best of them.
+use super::score;
+use crate::error::Result;
+use crate::extract::photometric::{COORDINATES, ToneChange};
+
+/// What is swept, a coordinate or several at once, from where to where, and in what steps; logarithms. A step moves colours
+/// by about a hundredth. First what is common to all channels.
+const SWEPT: [Sweep; 7] = [
+    sweep([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [-0.7, 0.5], 0.02),
+    sweep([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], [-0.36, 0.36], 0.03),
+    sweep([0.0, 0.0, 0.0, 0.0, 1.0, 0.0], [-0.36, 0.36], 0.04),
+    sweep([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [-0.36, 0.36], 0.03),
+    sweep([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [-0.08, 0.08], 0.02),
+    sweep([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], [-0.08, 0.08], 0.02),
+    sweep([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [-0.08, 0.08], 0.02),
+];
+/// Steps of sweeps along each coordinate.
+const STEPS: [f32; COORDINATES] = [0.02, 0.02, 0.02, 0.03, 0.04, 0.03];
+/// How far from each other starts lie at least, in such steps.
+const APART: f32 = 2.5;
+/// Step of the gains that are tried together, and how many steps a tint goes either way.
+const GRID: f32 = 0.04;
+const TINTS: i32 = 2;
+/// Rounds of a refinement.
+const ROUNDS: usize = 5;
+/// How often steps may shrink because nothing was better.
+const SHRUNK: usize = 3;
+
+/// A direction in which what was done may lie.
+#[derive(Clone, Copy)]
+struct Sweep {
+    direction: [f32; COORDINATES],
+    reach: [f32; 2],
+    step: f32,
+}
+
+const fn sweep(direction: [f32; COORDINATES], reach: [f32; 2], step: f32) -> Sweep {
+    Sweep { direction, reach, step }
+}
+
+impl Sweep {
+    /// All steps from a change but itself.
+    fn from(&self, start: ToneChange) -> impl Iterator<Item = ToneChange> {
+        let Self { direction, reach, step } = *self;
+        let [first, last] = reach.map(|end| (end / step).round() as i32);
+        let steps = (first..=last).filter(|i| *i != 0);
+        steps.map(move |i| start.moved(&direction, i as f32 * step))
+    }
+}
+
+/// A change of tones, and what is read once it is undone.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Read {
+    pub change: ToneChange,
+    pub logits: Vec<f32>,
+    pub score: f64,
+}
+
+/// Logits of a picture with each of these changes undone; `None` where one can't have been done to it.
+pub(super) type Reader<'a> = dyn FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + 'a;
+
+/// Changes along each coordinate, nothing done first. `anchor` makes a change fit a ground that had been white, if there
+/// is one that is not.
+pub(super) fn lines(anchor: Option<&dyn Fn(ToneChange) -> ToneChange>) -> Vec<ToneChange> {
+    let none = ToneChange::default();
+    let mut changes = vec![none];
+    changes.extend(SWEPT.iter().flat_map(|sweep| sweep.from(none)));
+    if let Some(anchor) = anchor {
+        changes.push(anchor(none));
+        changes.extend(SWEPT[1..4].iter().flat_map(|sweep| sweep.from(none)).map(anchor));
+    }
+    changes
+}
+
+/// Brightness with every tint, which lines miss: [`lines`] find a change of one kind only.
+pub(super) fn tinted() -> Vec<ToneChange> {
+    let [first, last] = SWEPT[0].reach.map(|end| (end / GRID).round() as i32);
+    let tints = |brightness: i32| {
+        (-TINTS..=TINTS)
+            .flat_map(move |red| (-TINTS..=TINTS).map(move |blue| [brightness + red, brightness, brightness + blue]))
+    };
+    let change = |[red, green, blue]: [i32; 3]| ToneChange {
+        logs: [
+            red as f32 * GRID,
+            green as f32 * GRID,
+            blue as f32 * GRID,
+            0.0,
+            0.0,
+            0.0,
+        ],
+    };
+    (first..=last).flat_map(tints).map(change).collect()
+}
+
+/// Changes that could have been done, read.
+///
+/// # Errors
+/// Those of the reader.
+pub(super) fn tried(read: &mut Reader<'_>, changes: &[ToneChange]) -> Result<Vec<Read>> {
+    let logits = read(changes)?;
+    let scored = changes.iter().zip(logits).filter_map(|(change, logits)| {
+        let logits = logits?;
+        let score = score::of_logits(&logits) - score::cost(change);
+        score.is_finite().then_some(Read {
+            change: *change,
+            logits,
+            score,
+        })
+    });
+    Ok(scored.collect())
+}
+
+/// Whether two changes are so far from each other that a refinement of one would not find the other.
+pub(super) fn apart(a: &ToneChange, b: &ToneChange) -> bool {
+    let pairs = a.logs.iter().zip(b.logs).zip(STEPS);
+    let squares: f32 = pairs.map(|((a, b), step)| ((a - b) / step).powi(2)).sum();
+    squares > APART * APART
+}
+
+/// All that is read on the way from a start to where no step is better.
+///
+/// # Errors
+/// Those of the reader.
+pub(super) fn refined(read: &mut Reader<'_>, start: Read) -> Result<Vec<Read>> {
+    let mut best = start;
+    let (mut scale, mut shrunk) = (1.0, 0);
+    let mut all = Vec::new();
+    for _ in 0..ROUNDS {
+        let sides: Vec<ToneChange> = SWEPT
+            .iter()
+            .flat_map(|sweep| [-1.0, 1.0].map(|side| best.change.moved(&sweep.direction, side * scale * sweep.step)))
+            .collect();
+        let mut found = tried(read, &sides)?;
+        // Where a parabola through three points of each direction is highest: all at once, half and a quarter of the way.
+        let mut vertex = ToneChange::default();
+        for (sweep, sides) in SWEPT.iter().zip(sides.as_chunks::<2>().0) {
+            let at = |side: ToneChange| found.iter().find(|read| read.change == side).map(|read| read.score);
+            let top = at(sides[0])
+                .zip(at(sides[1]))
+                .map_or(0.0, |(low, high)| top(low, best.score, high));
+            vertex = vertex.moved(&sweep.direction, top * scale * sweep.step);
+        }
+        let jumps = [1.0, 0.5, 0.25].map(|share| best.change.moved(&vertex.logs, share));
+        found.extend(tried(read, &jumps)?);
+        let better = found.iter().filter(|read| read.score > best.score);
+        match better.max_by(|a, b| a.score.total_cmp(&b.score)) {
+            Some(better) => best = better.clone(),
+            None if shrunk == SHRUNK => break,
+            None => (scale, shrunk) = (scale / 2.0, shrunk + 1),
+        }
+        all.extend(found);
+    }
+    Ok(all)
+}
+
+/// Where a parabola through these values at -1, 0 and 1 is highest, within a step and a half.
+fn top(low: f64, middle: f64, high: f64) -> f32 {
+    let (slope, bend) = ((high - low) / 2.0, low - 2.0 * middle + high);
+    let top = match bend < 0.0 {
+        true => -slope / bend,
+        false => slope.signum(),
+    };
+    top.clamp(-1.5, 1.5) as f32
+}
