@@ -1,5 +1,6 @@
-//! The project's own CLIPs, which are part of the program: two that new keys are made for, and the one of before, so that its
-//! marks are read for ever. `docs/clip.md` tells how they came about.
+//! The project's own CLIPs, which are part of the program. `docs/clip.md` tells how they came about.
+//!
+//! One that is replaced stays here under its name and hash, so that marks are read for ever.
 use std::path::Path;
 
 use burn::module::Module;
@@ -23,44 +24,35 @@ struct Shipped {
     name: &'static str,
     config: &'static str,
     weights: &'static [u8],
-    /// Hash of the file that keys were bound to, where only its image tower is kept.
-    hash: Option<&'static str>,
 }
 
 macro_rules! shipped {
-    ($name:expr, $folder:literal, $hash:expr) => {
+    ($name:expr, $folder:literal) => {
         Shipped {
             name: $name,
             config: include_str!(concat!("../../models/", $folder, "/config.json")),
             weights: include_bytes!(concat!("../../models/", $folder, "/model.safetensors")),
-            hash: $hash,
         }
     };
 }
 
-/// Those of a name that keys are made for come before those of before.
-static ALL: [Shipped; 3] = [
-    shipped!(STANDARD, "guardsplat-clip", None),
-    shipped!(ROBUST, "guardsplat-clip-robust", None),
-    shipped!(
-        STANDARD,
-        "guardsplat-clip-v1",
-        Some("e24e926482d51d0867cb74de92595c5155954c00dcedf253004cf53148bf04c5")
-    ),
+/// Of one name, that which keys are made for comes first.
+static ALL: [Shipped; 2] = [
+    shipped!(STANDARD, "guardsplat-clip"),
+    shipped!(ROBUST, "guardsplat-clip-robust"),
 ];
 
 impl Shipped {
     fn hash(&self) -> Result<String> {
-        match (self.hash, self.replacement()) {
-            (Some(hash), _) => Ok(hash.to_owned()),
-            (None, Some(dir)) => TensorFile::open(&weights_path(Path::new(&dir))?)?.sha256(),
-            (None, None) => TensorFile::from_bytes(self.name, self.weights)?.sha256(),
+        match self.replacement() {
+            Some(dir) => TensorFile::open(&weights_path(Path::new(&dir))?)?.sha256(),
+            None => TensorFile::from_bytes(self.name, self.weights)?.sha256(),
         }
     }
 
     /// The folder that `$GUARDSPLAT_CLIP` names instead of the first.
     fn replacement(&self) -> Option<std::ffi::OsString> {
-        std::env::var_os("GUARDSPLAT_CLIP").filter(|_| self.name == STANDARD && self.hash.is_none())
+        std::env::var_os("GUARDSPLAT_CLIP").filter(|_| self.name == STANDARD)
     }
 
     fn load(&self, device: &Device, parts: Parts) -> Result<Clip> {
@@ -72,7 +64,7 @@ impl Shipped {
         let model = ClipModel::new(&config, parts, device).load(&mut file)?;
         Ok(Clip {
             config,
-            hash: self.hash.map_or_else(|| file.sha256(), |hash| Ok(hash.to_owned()))?,
+            hash: file.sha256()?,
             model: model.freeze(),
         })
     }
@@ -126,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_is_found_by_name_and_hash_and_the_image_tower_of_before_is_there() {
+    fn each_is_found_by_name_and_hash() {
         let device = Device::flex();
         let hashes = Clip::shipped_hashes().unwrap();
         for (shipped, hash) in ALL.iter().zip(&hashes) {

@@ -36,6 +36,7 @@ pub use preset::Preset;
 pub use progress::{Check, LossTerms, Progress, Step};
 pub use resources::{measure_view, measure_view_on_cpu, predict_memory};
 pub use settings::{EarlyStop, LossWeights, Ring, Settings, Verify};
+pub use shared_views::SharedViews;
 pub use target::Target;
 pub use trainable::TrainableCoefficients;
 pub use verify::{Verification, verify};

@@ -7,6 +7,7 @@ use super::loss_weight_controller::{LossWeightControl, TargetRelaxation};
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgdOptions;
 use super::settings::{EarlyStop, LossWeights, Settings, Verify};
+use super::shared_views::SharedViews;
 use super::target::Target;
 use crate::error::{Error, Result};
 
@@ -120,7 +121,7 @@ impl Preset {
                 ..Ranges::default()
             },
             distorted_size: 640,
-            shared_views: 0.5,
+            shared_views: SharedViews::NONE,
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
@@ -169,7 +170,10 @@ impl Preset {
             // little more.
             Self::Robust => Settings {
                 steps: 320,
-                shared_views: 0.75,
+                shared_views: SharedViews {
+                    share: 0.5,
+                    quality: [10, 60],
+                },
                 balance: standard.balance.map(|balance| LossWeightControl {
                     target_psnr_db: 39.2,
                     target_ssim: Some(0.9925),
@@ -193,7 +197,7 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 distorted_size: 224,
-                shared_views: 0.0,
+                shared_views: SharedViews::NONE,
                 robust_to: RobustTo::none(),
                 lambda: LossWeights {
                     l1: 0.8,
@@ -229,7 +233,7 @@ mod tests {
                 settings.robust_to.contains(DistortionKind::ShTruncation),
                 preset != Preset::Paper
             );
-            assert_eq!(settings.shared_views > 0.5, preset == Preset::Robust);
+            assert_eq!(settings.shared_views.quality[0] < 20, preset == Preset::Robust);
         }
     }
 }

@@ -7,11 +7,48 @@ use guardsplat_distortion::{ReducedJpeg, reduced_jpeg};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
+use super::settings::within;
+use crate::error::Result;
 use crate::ground::with_ground;
 
-/// Qualities of JPEG, drawn alike on a logarithmic scale.
-const QUALITY: [f32; 2] = [10.0, 70.0];
+/// How many views are read so, and how strongly they are compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SharedViews {
+    /// Share of the views of a step.
+    pub share: f32,
+    /// Qualities of JPEG, drawn alike on a logarithmic scale. Where nothing can be read any more there is nothing to
+    /// learn: the weakest compression that takes a mark away should be left out.
+    pub quality: [u8; 2],
+}
+
+impl SharedViews {
+    /// None.
+    pub const NONE: Self = Self {
+        share: 0.0,
+        quality: [30, 85],
+    };
+
+    pub(super) fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        within("shared_views.share", f64::from(self.share), 0.0, 1.0)?;
+        let [low, high] = self.quality.map(f64::from);
+        within("shared_views.quality", low, 1.0, high)?;
+        within("shared_views.quality", high, low, 100.0)
+    }
+}
+
+impl Default for SharedViews {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
 /// Largest deviation of noise: that of 0.12 in pictures of five times the side.
 const NOISE: f32 = 0.024;
 /// Largest error of an estimated brightness, and of the tint of a channel.
@@ -29,11 +66,11 @@ enum Shared {
 /// Half of what happens is compression.
 const HAPPENS: [Shared; 4] = [Shared::Jpeg, Shared::Jpeg, Shared::Noise, Shared::Tone];
 
-/// Pictures `[b, 3, h, w]` in [0, 1], a `share` of them as shared pictures are, at places drawn from `rng`; differentiable.
+/// Pictures `[b, 3, h, w]` in [0, 1], a share of them as shared pictures are, at places drawn from `rng`; differentiable.
 /// The ground stays where it is.
-pub(super) fn shared(pictures: Tensor<4>, share: f32, rng: &mut ChaCha8Rng) -> Tensor<4> {
+pub(super) fn shared(pictures: Tensor<4>, views: SharedViews, rng: &mut ChaCha8Rng) -> Tensor<4> {
     let count = pictures.dims()[0];
-    let some = (share * count as f32).round() as usize;
+    let some = (views.share * count as f32).round() as usize;
     if some == 0 {
         return pictures;
     }
@@ -54,7 +91,7 @@ pub(super) fn shared(pictures: Tensor<4>, share: f32, rng: &mut ChaCha8Rng) -> T
     for (which, places) in groups.iter().enumerate().filter(|(_, places)| !places.is_empty()) {
         let before = pictures.clone().select(0, indices(places, &pictures));
         let after = match which {
-            0 => compressed(before.clone(), rng),
+            0 => compressed(before.clone(), views.quality, rng),
             1 => noisy(before.clone(), rng),
             2 => toned(before.clone(), rng),
             _ => before.clone(),
@@ -78,8 +115,8 @@ fn indices(places: &[usize], like: &Tensor<4>) -> Tensor<1, Int> {
     Tensor::from_data(TensorData::new(places, [count]), &like.device())
 }
 
-fn compressed(pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Tensor<4> {
-    let [low, high] = QUALITY;
+fn compressed(pictures: Tensor<4>, quality: [u8; 2], rng: &mut ChaCha8Rng) -> Tensor<4> {
+    let [low, high] = quality.map(f32::from);
     let each: Vec<ReducedJpeg> = (0..pictures.dims()[0])
         .map(|_| ReducedJpeg {
             quality: (low * (high / low).powf(rng.random::<f32>())) as u8,
@@ -139,6 +176,13 @@ mod tests {
         Tensor::from_data(TensorData::new(values, [8, 3, 16, 16]), &Device::flex())
     }
 
+    fn views(share: f32) -> SharedViews {
+        SharedViews {
+            share,
+            quality: [10, 70],
+        }
+    }
+
     fn read(tensor: Tensor<4>) -> Vec<f32> {
         tensor.try_into_vec_as::<f32>().unwrap()
     }
@@ -149,7 +193,7 @@ mod tests {
         for (share, most) in [(0.0, 0), (0.5, 4), (1.0, 8)] {
             let mut changed = 0;
             for seed in 0..6 {
-                let after = read(shared(pictures(), share, &mut ChaCha8Rng::seed_from_u64(seed)));
+                let after = read(shared(pictures(), views(share), &mut ChaCha8Rng::seed_from_u64(seed)));
                 let rows = before.chunks_exact(3 * 256).zip(after.chunks_exact(3 * 256));
                 let differ = rows.filter(|(b, a)| b != a).count();
                 assert!(differ <= most, "{share}");
@@ -167,12 +211,12 @@ mod tests {
 
     #[test]
     fn one_seed_does_the_same_and_gradients_pass() {
-        let run = |seed| read(shared(pictures(), 0.5, &mut ChaCha8Rng::seed_from_u64(seed)));
+        let run = |seed| read(shared(pictures(), views(0.5), &mut ChaCha8Rng::seed_from_u64(seed)));
         assert_eq!(run(1), run(1));
         assert_ne!(run(1), run(2));
         let device = Device::flex().autodiff();
         let leaf = Tensor::from_inner(pictures()).to_device(&device).require_grad();
-        let done = shared(leaf.clone(), 1.0, &mut ChaCha8Rng::seed_from_u64(4));
+        let done = shared(leaf.clone(), views(1.0), &mut ChaCha8Rng::seed_from_u64(4));
         let gradient: Vec<f32> = leaf.grad(&done.sum().backward()).unwrap().try_into_vec_as().unwrap();
         assert!(gradient.iter().all(|g| (g - 1.0).abs() < 0.05), "{gradient:?}");
     }

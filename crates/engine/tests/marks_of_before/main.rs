@@ -1,4 +1,4 @@
-//! Marks of towers that were shipped before are read for ever: keys and pictures that these made.
+//! Marks are read for ever: keys and pictures of marks that shipped CLIPs made.
 use std::path::PathBuf;
 
 use guardsplat_engine::clip::{Clip, Parts};
@@ -7,9 +7,9 @@ use guardsplat_engine::extract::{Engine, read_pictures};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::read_picture;
 
-/// A sample scene that was marked with c0ffee42 by `models/guardsplat-clip-v1`, two views of 200 pixels, and its key.
+/// A sample scene that was marked with c0ffee42 by `guardsplat` of November 2026, two views of 200 pixels, and its key.
 #[test]
-fn a_mark_of_version_1_is_read() {
+fn a_mark_of_november_2026_is_read() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/marks_of_before/v1");
     let key = Key::read(&folder.join("mark.key")).unwrap();
     let compute = open(DeviceChoice::Cpu).unwrap();
