@@ -36,7 +36,7 @@ pub use combined::Combined;
 pub use crop::Crop;
 pub use draw::Draw;
 pub use error::{Error, Result};
-pub use jpeg::{Chroma, Jpeg, ReducedJpeg, reduced_jpeg};
+pub use jpeg::{Chroma, Jpeg};
 pub use kind::DistortionKind;
 pub use layer::Layer;
 pub use mask::{MAX_RECTANGLES, Rectangle};

@@ -4,12 +4,9 @@
 //! divided by the table, rounded with the gradient of the identity, and all of it is undone. What is left out is that
 //! codecs hold halved chroma and decoded values in 8 bits and approximate the transform.
 mod blocks;
-mod reduced;
 mod tables;
 #[cfg(test)]
 mod tests;
-
-pub use reduced::{ReducedJpeg, reduced_jpeg};
 
 use std::collections::BTreeMap;
 

@@ -9,7 +9,6 @@ use super::image_augmentation::ImageAugmentation;
 use super::loss_weight_controller::LossWeightFactors;
 use super::progress::LossTerms;
 use super::settings::Settings;
-use super::shared_views::shared;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
@@ -84,7 +83,6 @@ impl<'a> Loss<'a> {
             None => None,
         };
         let seen = self.settings.augmentation.apply(marked, rng);
-        let seen = shared(seen, self.settings.shared_views, rng);
         let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);

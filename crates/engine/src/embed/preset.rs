@@ -7,7 +7,6 @@ use super::loss_weight_controller::{LossWeightControl, TargetRelaxation};
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgdOptions;
 use super::settings::{EarlyStop, LossWeights, Settings, Verify};
-use super::shared_views::SharedViews;
 use super::target::Target;
 use crate::error::{Error, Result};
 
@@ -121,7 +120,6 @@ impl Preset {
                 ..Ranges::default()
             },
             distorted_size: 640,
-            shared_views: SharedViews::NONE,
             early_stop: Some(EarlyStop {
                 every: 25,
                 views: 8,
@@ -166,14 +164,10 @@ impl Preset {
                 },
                 ..standard
             },
-            // For keys of up to 16 bits, whose CLIP stands strong compression: more of it in training, and a mark that shows a
-            // little more.
+            // For keys of up to 16 bits, whose CLIP stands strong compression: more steps, and a mark that shows a little more.
+            // Views that are compressed or noisy in training bring nothing there (docs/clip.md).
             Self::Robust => Settings {
                 steps: 320,
-                shared_views: SharedViews {
-                    share: 0.5,
-                    quality: [10, 60],
-                },
                 balance: standard.balance.map(|balance| LossWeightControl {
                     target_psnr_db: 39.2,
                     target_ssim: Some(0.9925),
@@ -197,7 +191,6 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 distorted_size: 224,
-                shared_views: SharedViews::NONE,
                 robust_to: RobustTo::none(),
                 lambda: LossWeights {
                     l1: 0.8,
@@ -233,7 +226,6 @@ mod tests {
                 settings.robust_to.contains(DistortionKind::ShTruncation),
                 preset != Preset::Paper
             );
-            assert_eq!(settings.shared_views.quality[0] < 20, preset == Preset::Robust);
         }
     }
 }

@@ -6,7 +6,6 @@ use super::augment::Augmentation;
 use super::loss_weight_controller::LossWeightControl;
 use super::optimizer::{Optimizer, accept_names};
 use super::preconditioned_sgd::PreconditionedSgdOptions;
-use super::shared_views::SharedViews;
 use super::target::Target;
 use crate::error::{Error, Result};
 
@@ -133,11 +132,6 @@ pub struct Settings {
     /// Side in pixels to which a training view is enlarged before its picture is distorted, where that is more than its
     /// own: squares of JPEG and grains of noise are as large, against the scene, as in pictures of that side.
     pub distorted_size: u32,
-    /// Share of the views of a step that are read as shared pictures are: compressed, with noise, or with tones that were
-    /// estimated a little wrongly.
-    // Left out of JSON where there are none, as above.
-    #[serde(default, skip_serializing_if = "SharedViews::is_none")]
-    pub shared_views: SharedViews,
     /// When to stop before the last step.
     pub early_stop: Option<EarlyStop>,
     /// How the result is verified.
@@ -210,7 +204,6 @@ impl Settings {
         if let Some(ring) = &self.ring {
             within("ring.elevation", f64::from(ring.elevation), -80.0, 80.0)?;
         }
-        self.shared_views.check()?;
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         let l = &self.lambda;
