@@ -173,6 +173,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         luma: options.luma,
         steered: options.steered,
         roughness: options.roughness,
+        compression: options.compression,
         steering: trained.steering,
         retrieval: trained.retrieval,
         sha256: TensorFile::open(weights)?.sha256()?,
