@@ -5,8 +5,10 @@
 use crate::extract::photometric::{ToneChange, ground};
 use crate::picture::Picture;
 
-/// Squares a side: a quarter of a picture of 160 pixels, for squares of four.
-const SQUARES: usize = 20;
+/// Side of a sample, as a share of the picture's: a quarter of its pixels are read.
+const SHARE: f32 = 0.5;
+/// Fewest squares a side.
+const LEAST: usize = 5;
 
 /// Squares of a picture that show the scene.
 pub(super) struct Sample {
@@ -28,8 +30,9 @@ impl Sample {
                 ground.is_none_or(|ground| pixels.any(|pixel| !ground::is_near(pixel, ground)))
             })
             .collect();
-        let count = SQUARES.min(scene.len().isqrt());
-        if count * 4 < SQUARES {
+        let most = (SHARE * width.min(height) as f32 / side as f32) as usize;
+        let count = most.min(scene.len().isqrt());
+        if count < LEAST {
             return None;
         }
         let chosen: Vec<_> = (0..count * count)

@@ -160,8 +160,8 @@ fn changed_tones_are_found_and_the_work_is_bounded() {
         assert!(passes <= 400, "{passes}");
         let estimate = estimates(std::slice::from_ref(&found))[0].unwrap();
         assert_eq!(right(estimate.logits(), &message), BITS as u32, "{logs:?}: {estimate}");
-        // The colours of these patches are alike: less contrast moves them little.
-        if logs != [0.0; 6] && logs[5] == 0.0 {
+        // A little of the others leaves these patches readable.
+        if logs[0].abs().max(logs[3].abs()) > 0.2 {
             assert!(right(found.as_given(), &message) < BITS as u32, "{logs:?}");
         }
     }
