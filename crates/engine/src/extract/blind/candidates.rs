@@ -9,6 +9,9 @@ use crate::extract::Engine;
 use crate::extract::photometric::{ToneChange, ground};
 use crate::picture::Picture;
 
+/// Logits of each picture.
+type Rows = Vec<Vec<f32>>;
+
 /// Changes that looked best on a sample, and are tried on all of a part.
 const CHECKED: usize = 16;
 
@@ -176,7 +179,7 @@ impl<'a> Search<'a> {
 fn reader<'a, U: Fn(&ToneChange) -> Option<Picture> + Send + Sync>(
     engine: &'a Engine,
     undone: U,
-    read: fn(&Engine, &[Picture]) -> Result<Vec<Vec<f32>>>,
+    read: fn(&Engine, &[Picture]) -> Result<Rows>,
 ) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, U> {
     move |changes| {
         let mut logits = Vec::with_capacity(changes.len());

@@ -209,7 +209,7 @@ fn words_that_nobody_marked_match_an_estimate_as_often_as_chance_says() {
     let (engine, _, _) = engine();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (pictures, words) = (24, 2000);
-    let mut matched = vec![0_u32; BITS + 1];
+    let mut matched = [0_u32; BITS + 1];
     for _ in 0..pictures {
         let colours: Vec<[f32; 3]> = (0..BITS)
             .map(|_| std::array::from_fn(|_| rng.random_range(0.0..1.0)))
