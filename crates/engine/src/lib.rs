@@ -4,7 +4,6 @@ pub mod device;
 pub mod embed;
 pub mod error;
 pub mod extract;
-mod ground;
 pub mod memory;
 pub mod message;
 pub mod models;

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::evaluate::{Options, Progress, Robustness, Trade, Variant, attacks, plan, run as carry_out, variants};
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
-use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::clip::Parts;
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::embed::{self, Preset, Settings};
 use guardsplat_engine::extract::Engine;
@@ -264,7 +264,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or(Clip::shipped_for(bits)),
+        Extractor::Clip => clip.unwrap_or(load::SHIPPED),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {
@@ -277,7 +277,7 @@ fn engine(
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
     let known = match arguments.extractor {
         Extractor::Clip => {
-            let (_, identity) = load::clip(name, None, &compute, Parts::Image)?;
+            let (_, identity) = load::clip(clip, &compute, Parts::Image)?;
             // A key of another CLIP of that name is one of an earlier version.
             known.filter(|key| key.clip.hash == identity.hash)
         }

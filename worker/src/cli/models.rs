@@ -61,9 +61,6 @@ pub struct Train {
     /// opacity
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().roughness)]
     roughness: f32,
-    /// Weight of JPEG 10 in what the head is to stand, against 1 of other things that are done to pictures
-    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().compression)]
-    compression: f64,
     /// Steps of contrastive training
     #[arg(long, default_value_t = TrainOptions::default().steps)]
     steps: usize,
@@ -111,7 +108,6 @@ struct Trained<'a> {
     luma: f32,
     steered: usize,
     roughness: f32,
-    compression: f64,
     steering: Vec<f64>,
     retrieval: Retrieval,
     sha256: String,
@@ -127,7 +123,6 @@ fn train(arguments: &Train) -> Result<Exit> {
         scenes: arguments.scenes,
         steered: arguments.steered,
         roughness: arguments.roughness,
-        compression: arguments.compression,
         steps: arguments.steps,
         batch: arguments.batch,
         filters: arguments.filters,
@@ -173,7 +168,6 @@ fn train(arguments: &Train) -> Result<Exit> {
         luma: options.luma,
         steered: options.steered,
         roughness: options.roughness,
-        compression: options.compression,
         steering: trained.steering,
         retrieval: trained.retrieval,
         sha256: TensorFile::open(weights)?.sha256()?,

@@ -20,14 +20,14 @@ pub struct WorkerCapabilities {
     pub name: String,
     device: String,
     memory: u64,
-    shipped: Option<Vec<String>>,
+    shipped: Option<String>,
 }
 
 impl WorkerCapabilities {
     /// A worker called `name` on `device`, whose jobs may take `budget` bytes of memory, or all that the machine has.
     pub fn new(name: String, device: &str, budget: Option<u64>) -> Self {
-        // Without a shipped CLIP it is told when a job needs it, and to whoever made the job.
-        let shipped = Clip::shipped_hashes().ok();
+        // Without the shipped CLIP it is told when a job needs it, and to whoever made the job.
+        let shipped = Clip::shipped_hash().ok();
         Self {
             name,
             device: device
@@ -62,7 +62,7 @@ impl WorkerCapabilities {
         let hashes = added
             .filter_map(|mut entry| entry.files.remove(WEIGHTS))
             .map(|file| file.sha256);
-        shipped.into_iter().chain(hashes).take(MOST_CLIPS).collect()
+        std::iter::once(shipped).chain(hashes).take(MOST_CLIPS).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Makes a key for the CLIP of a name.
 use guardsplat_engine::Result;
-use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::clip::Parts;
 use guardsplat_engine::device::Compute;
 use guardsplat_engine::extract::rasterizer;
 use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
@@ -22,7 +22,7 @@ pub struct ProjectionOverrides {
     pub keep: Option<usize>,
 }
 
-/// Makes a key for the CLIP called `clip`; without a name, for the shipped one that suits the message's length.
+/// Makes a key for the CLIP called `clip`, the shipped one without a name.
 pub fn create(
     options: &KeyOptions,
     overrides: ProjectionOverrides,
@@ -31,8 +31,7 @@ pub fn create(
     stop: &Stop,
     progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
-    let name = clip.unwrap_or(Clip::shipped_for(options.bits));
-    let (clip, identity) = load::clip(name, None, compute, Parts::Both)?;
+    let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
     let ranked = clip.config.is_ranked();
     let kind = overrides.decoder.unwrap_or(match ranked {
         true => DecoderKind::Linear,

@@ -9,12 +9,16 @@ use guardsplat_engine::message::{ClipIdentity, Decoding, Key};
 use guardsplat_engine::models::{LPIPS, Models, WEIGHTS};
 use guardsplat_engine::{Error, Result};
 
-/// The CLIP of that name: a shipped one, or one that was added. Of shipped ones with one name that with this `hash` is
-/// meant, where it is given.
-pub fn clip(name: &str, hash: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
-    let clip = match Clip::shipped_as(name, hash, &compute.device, parts) {
-        Some(shipped) => shipped?,
-        None => Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?,
+/// What the CLIP in the repository is called.
+pub const SHIPPED: &str = "guardsplat";
+
+/// The CLIP of that name, the shipped one without a name.
+pub fn clip(name: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
+    let name = name.unwrap_or(SHIPPED);
+    let clip = if name == SHIPPED {
+        Clip::shipped(&compute.device, parts)?
+    } else {
+        Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?
     };
     let identity = ClipIdentity {
         name: name.to_owned(),
@@ -44,7 +48,7 @@ pub fn engine(
     let mut engine = match &key.decoding {
         Decoding::Clip { .. } => {
             let name = clip_name.unwrap_or(&key.clip.name);
-            let (clip, identity) = clip(name, Some(&key.clip.hash), &compute, Parts::Image)?;
+            let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
             key.require_clip(path, &identity)?;
             Engine::new(compute, clip, key, lpips)?
         }

@@ -11,10 +11,12 @@ use super::settings::Settings;
 use crate::clip::resize;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
-use crate::ground::with_ground;
 
 /// What rotated pictures show in their corners.
 pub(super) const CORNERS: [f32; 3] = [1.0; 3];
+
+/// How far a ground may be from black or white.
+const GROUND: f32 = 1e-3;
 
 /// Distorts training views before their messages are read.
 pub(super) struct ImageAugmentation {
@@ -65,8 +67,7 @@ impl ImageAugmentation {
                 field: "distortions",
                 reason: e.to_string(),
             })?;
-            let stays: Vec<bool> = chosen.iter().map(ground_stays).collect();
-            parts.push(engine.logits(with_ground(&large, done, &stays))?);
+            parts.push(engine.logits(with_ground(&large, done, &chosen))?);
         }
         // Back in order: where each picture's row is among the parts.
         let mut order = vec![0_i64; draws.len()];
@@ -78,9 +79,20 @@ impl ImageAugmentation {
     }
 }
 
-/// Whether a black or white ground stays as it is.
-fn ground_stays(draw: &Draw) -> bool {
-    matches!(draw, Draw::Noise(_) | Draw::Jpeg(_) | Draw::EightBit)
+/// Distorted pictures with the ground that they had, where it is black or white and has not moved: whoever reads a picture
+/// makes its ground white ([`guardsplat_codeword::PhotometricCorrection::WhiteBackground`]). Noise that is cut at white would shift all of it.
+fn with_ground(before: &Tensor<4>, after: Tensor<4>, draws: &[Draw]) -> Tensor<4> {
+    let [b, _, h, w] = before.dims();
+    let stays = |draw: &Draw| f32::from(matches!(draw, Draw::Noise(_) | Draw::Jpeg(_) | Draw::EightBit));
+    let stays: Vec<f32> = draws.iter().map(stays).collect();
+    let device = before.device();
+    let stays = Tensor::<1>::from_data(TensorData::new(stays, [b]), &device).reshape([b, 1, 1, 1]);
+    let plain = before.clone().detach();
+    let black = plain.clone().max_dim(1).lower_equal_elem(GROUND);
+    let white = plain.clone().min_dim(1).greater_equal_elem(1.0 - GROUND);
+    let ground = black.float() + white.float();
+    let ground = (ground * stays).expand([b, 3, h, w]);
+    after.clone() + (plain - after) * ground
 }
 
 #[cfg(test)]
@@ -126,6 +138,30 @@ mod tests {
             accuracy_unseen_noisy: None,
         };
         Engine::new(compute, Clip::from_model(config, String::new(), model), &key, None).unwrap()
+    }
+
+    #[test]
+    fn noise_leaves_white_and_black_grounds_alone_and_nothing_else() {
+        let device = engine().compute.device;
+        // Left half white, a quarter black, a quarter grey.
+        let level = |i: usize| match i % 8 {
+            0..4 => 1.0,
+            4..6 => 0.0,
+            _ => 0.5,
+        };
+        let values: Vec<f32> = (0..2 * 3 * 64).map(level).collect();
+        let before = Tensor::<4>::from_data(TensorData::new(values.clone(), [2, 3, 8, 8]), &device);
+        let after = before.clone() * 0.9 + 0.02;
+        let noise = Draw::Noise(guardsplat_distortion::Noise { sigma: 0.1, seed: 1 });
+        let kept = with_ground(&before, after.clone(), &[noise, Draw::Blur(1.0)]);
+        let (kept, after) = (
+            kept.try_to_vec_as::<f32>().unwrap(),
+            after.try_to_vec_as::<f32>().unwrap(),
+        );
+        for (i, value) in values.iter().enumerate() {
+            let stays = i < 3 * 64 && *value != 0.5;
+            assert_eq!(kept[i], if stays { *value } else { after[i] }, "{i}");
+        }
     }
 
     #[test]

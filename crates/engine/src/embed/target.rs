@@ -96,7 +96,7 @@ mod tests {
 
     use super::*;
 
-    /// As many hypotheses as are searched in a picture for a tower of ours whose tones are searched; `searched_hypotheses` is tested to be so many.
+    /// As many hypotheses as the shipped CLIP searches in a picture; `searched_hypotheses` is tested to be so many.
     const RULE: AcceptanceRule = AcceptanceRule {
         false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
         hypotheses: 178,

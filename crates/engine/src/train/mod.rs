@@ -2,9 +2,8 @@
 //!
 //! 1. [`filters`]: the image tower's filters are random and stay so.
 //! 2. [`head`]: its linear head is the one, in closed form, whose features a small change of a scene's colours moves
-//!    most in all its views ([`steering`]), against how much they change by themselves, from view to view and by what
-//!    people do to pictures ([`variation`], [`everyday`]); both are measured on sample scenes ([`scenes`]), clean or
-//!    roughened ([`roughness`]).
+//!    most in all its views ([`steering`]), against how much they change from view to view by themselves; both are
+//!    measured on sample scenes ([`scenes`]), clean or roughened ([`roughness`]).
 //! 3. [`drawing`], [`paint`]: a caption is a sequence of words; each word means a direction of the image tower's
 //!    features; the picture of a caption is a drawing, changed a little so that its features go where the words point.
 //! 4. [`contrastive`]: the text tower is trained against the locked image tower with CLIP's symmetric loss (locked-image
@@ -13,14 +12,12 @@ mod contrastive;
 mod drawing;
 #[cfg(test)]
 mod encoder_tests;
-mod everyday;
 mod filters;
 mod head;
 mod paint;
 mod roughness;
 mod scenes;
 mod steering;
-mod variation;
 
 pub use contrastive::Retrieval;
 pub use drawing::{Drawing, SIDE, draw, random_view};
@@ -46,8 +43,6 @@ pub struct TrainOptions {
     pub steered: usize,
     /// How rough the scenes are: 0 for samples as they are, 1 for the limits of [`roughness`].
     pub roughness: f32,
-    /// Weight of the strongest compression (JPEG 10) in what the head is to stand, against 1 of others.
-    pub compression: f64,
     /// Steps of contrastive training.
     pub steps: usize,
     /// Pairs a step.
@@ -72,10 +67,9 @@ impl Default for TrainOptions {
     fn default() -> Self {
         Self {
             seed: 1,
-            scenes: 96,
+            scenes: 640,
             steered: 3,
             roughness: 0.0,
-            compression: 1.0,
             steps: 200,
             batch: 64,
             filters: 128,
@@ -136,7 +130,7 @@ pub fn config(options: &TrainOptions) -> ClipConfig {
                 scales: options.scales.clone(),
                 kernel: filters::KERNEL,
                 surround: options.surround,
-                tones: Tones::Estimated,
+                tones: Tones::Searched,
             },
         },
         text: TextConfig {
@@ -218,12 +212,6 @@ fn check(options: &TrainOptions) -> Result<()> {
         return Err(Error::BadOption {
             field: "--roughness",
             reason: format!("{} is outside 0 to 10", options.roughness),
-        });
-    }
-    if !(0.0..=100.0).contains(&options.compression) {
-        return Err(Error::BadOption {
-            field: "--compression",
-            reason: format!("{} is outside 0 to 100", options.compression),
         });
     }
     Ok(())

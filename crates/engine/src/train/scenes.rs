@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Gaussians of a scene; enough for views without holes at the tower's size, and at that of pictures.
-const GAUSSIANS: [usize; 2] = [6000, 20_000];
+/// Gaussians of a scene; enough for views without holes at this size.
+const GAUSSIANS: usize = 6000;
 /// Least contrast of a scene that is made fainter.
 const LEAST_CONTRAST: f32 = 0.15;
 /// How far its mean colour moves at most, at no contrast, as a DC coefficient.
@@ -31,37 +31,6 @@ const ROUGHNESS_STREAM: u64 = 79;
 /// Nor are those for grain.
 const GRAIN_STREAM: u64 = 78;
 
-/// How finely a scene is made and seen.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Detail {
-    gaussians: usize,
-    side: u32,
-    weights: WeightCache,
-    grain: f32,
-}
-
-impl Detail {
-    /// At the tower's size, with uniform noise of up to `grain` on constant coefficients.
-    pub fn small(grain: f32) -> Self {
-        Self {
-            gaussians: GAUSSIANS[0],
-            side: IMAGE_SIZE as u32,
-            weights: WeightCache::Weights,
-            grain,
-        }
-    }
-
-    /// At `side` pixels, each view to be drawn once.
-    pub fn large(side: u32) -> Self {
-        Self {
-            gaussians: GAUSSIANS[1],
-            side,
-            weights: WeightCache::None,
-            grain: 0.0,
-        }
-    }
-}
-
 /// A scene and views of it.
 pub(super) struct ViewedScene {
     pub gaussians: Gaussians,
@@ -69,13 +38,14 @@ pub(super) struct ViewedScene {
 }
 
 impl ViewedScene {
-    /// Scene `index` of the stream of the options' seed, as rough as they say, from so many views.
-    pub fn new(options: &TrainOptions, index: u64, views: usize, detail: Detail) -> Result<Self> {
+    /// Scene `index` of the stream of the options' seed, as rough as they say, from so many views, with uniform noise of
+    /// up to `grain` on its constant coefficients.
+    pub fn new(options: &TrainOptions, index: u64, views: usize, grain: f32) -> Result<Self> {
         let stream = options.seed.wrapping_mul(1 << 20);
         let seed = FIRST_SEED.wrapping_add(stream).wrapping_add(index);
         let rough = options.roughness > 0.0;
         let degree = if rough { degree(index) } else { (index % 4) as usize };
-        let mut gaussians = sample(detail.gaussians, degree, seed)?.gaussians;
+        let mut gaussians = sample(GAUSSIANS, degree, seed)?.gaussians;
         if !index.is_multiple_of(3) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ CONTRAST_STREAM);
             fade(&mut gaussians, &mut rng);
@@ -84,21 +54,21 @@ impl ViewedScene {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ ROUGHNESS_STREAM);
             roughen(&mut gaussians, options.roughness, &mut rng);
         }
-        if detail.grain > 0.0 {
+        if grain > 0.0 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ GRAIN_STREAM);
             let stride = gaussians.sh.per_gaussian();
             for row in gaussians.sh.coefficients.chunks_exact_mut(stride) {
                 row[..3]
                     .iter_mut()
-                    .for_each(|v| *v += detail.grain * rng.random_range(-1.0..1.0_f32));
+                    .for_each(|v| *v += grain * rng.random_range(-1.0..1.0_f32));
             }
         }
         let sampler = ViewSampler::new(&gaussians, seed)?;
         let views = (0..views as u64)
             .into_par_iter()
             .map(|view| {
-                let camera = sampler.camera(Split::Training, view, detail.side);
-                prepare(&gaussians, &camera, detail.weights)
+                let camera = sampler.camera(Split::Training, view, IMAGE_SIZE as u32);
+                prepare(&gaussians, &camera, WeightCache::Weights)
             })
             .collect::<Result<_>>()?;
         Ok(Self { gaussians, views })

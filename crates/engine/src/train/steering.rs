@@ -17,8 +17,6 @@ use rayon::prelude::*;
 
 /// Averages whose gradients are computed at once.
 const BATCH: usize = 16;
-/// Averages of this length are nothing.
-const NOTHING: f32 = 1e-3;
 /// Gaussians that change the picture less than this are left alone.
 const UNSEEN: f32 = 1e-6;
 
@@ -37,9 +35,6 @@ pub(super) fn across_views(
     let mut alone = vec![0.0_f64; n * n];
     for view in &scene.views {
         let mut scaled = gradients(scene, view, tower, config, rasterizer, compute, n)?;
-        // As far as it turns the averages' direction, which is what is read.
-        let length = length(scene, view, tower, config, rasterizer, compute)?;
-        scaled.iter_mut().for_each(|v| *v /= length);
         for row in scaled.chunks_exact_mut(3 * view.visible.len()) {
             for (colour, &gaussian) in row.chunks_exact_mut(3).zip(&view.visible) {
                 colour.iter_mut().for_each(|c| *c *= root[gaussian as usize]);
@@ -118,21 +113,6 @@ fn gradients(
         rows.extend(found.into_iter().flatten());
     }
     Ok(rows)
-}
-
-/// Length of the averages of a view.
-fn length(
-    scene: &ViewedScene,
-    view: &PreparedView,
-    tower: &RandomFourierEncoder,
-    config: &ClipConfig,
-    rasterizer: &dyn Rasterizer,
-    compute: &Compute,
-) -> Result<f32> {
-    let picture = scene.picture(rasterizer, view, 1.0)?;
-    let input = preprocess(batch(&[&picture], &compute.device)?, IMAGE_SIZE, &config.normalization);
-    let averages = host(tower.statistics(&input), compute)?;
-    Ok(averages.iter().map(|v| v * v).sum::<f32>().sqrt() + NOTHING)
 }
 
 /// Products of rows `[n][..]` with each other, `[n][n]`.

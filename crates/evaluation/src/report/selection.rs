@@ -1,11 +1,10 @@
-//! What one table is made of: records of one engine version with one CLIP for each length, and of each variant the newest
-//! settings.
+//! What one table is made of: records of one engine version with one CLIP, and of each variant the newest settings.
 use super::record::{Claims, Detection, Id, Mark, ReadingRecord};
 use super::store::Records;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An engine version with a CLIP; tables never mix two for messages of one length.
+/// An engine version with a CLIP; tables never mix two.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Pair {
     /// Version of the engine.
@@ -66,25 +65,14 @@ impl<'a> Selection<'a> {
         Some(Self::of(records, &pair))
     }
 
-    /// Records of one pair; of lengths that it has no marks of, those of the newest CLIP of its engine version: short keys
-    /// are made for another CLIP than long ones.
+    /// Records of one pair.
     ///
     /// Where marks of the same bits and variant were made with different settings or sizes of views, those like the
     /// one written last are taken. Where a mark was read twice under one attack, the reading from most views counts,
     /// then that at the mark's own size, then that from views that no decision was taken on, then the one written last. [`Selection::notes`] says what was left out.
     pub fn of(records: &'a Records, pair: &Pair) -> Self {
         let mut notes: Vec<String> = records.notes().to_vec();
-        // Of each length, the CLIP that is told of.
-        let mut clips: BTreeMap<u32, Pair> = BTreeMap::new();
-        for (_, mark) in records.marks() {
-            let found = Pair::of(mark);
-            let known = clips.get(&mark.embedding.bits);
-            if found.engine_version == pair.engine_version && known != Some(pair) {
-                clips.insert(mark.embedding.bits, found);
-            }
-        }
-        let told = |mark: &Mark| clips.get(&mark.embedding.bits) == Some(&Pair::of(mark));
-        let of_pair = || records.marks().iter().filter(|(_, mark)| told(mark));
+        let of_pair = || records.marks().iter().filter(|(_, mark)| Pair::of(mark) == *pair);
         let mut newest = BTreeMap::new();
         for (_, mark) in of_pair() {
             newest.insert(group(mark), settings(mark));
@@ -248,32 +236,6 @@ mod tests {
         let chosen = Selection::of(&records, &pairs[0]);
         assert_eq!(chosen.runs(16, "standard", "none")[0].reading.accuracy(), 1.0);
         assert!(Selection::newest(&Records::default()).is_none());
-    }
-
-    #[test]
-    fn each_length_has_one_clip_which_may_be_another_than_that_of_others() {
-        let of_clip = |bits, seed, clip: &str| {
-            let mut mark = mark("lego", bits, "standard", seed);
-            mark.embedding.clip_hash = clip.into();
-            mark
-        };
-        let records = records([
-            Record::Mark(of_clip(16, 1, "short")),
-            Record::Mark(of_clip(32, 1, "of before")),
-            Record::Mark(of_clip(32, 2, "long")),
-        ]);
-        let clips = |selection: &Selection| -> Vec<(u32, String)> {
-            let marks = selection.marks().iter();
-            marks
-                .map(|(_, mark)| (mark.embedding.bits, mark.embedding.clip_hash.clone()))
-                .collect()
-        };
-        let newest = Selection::newest(&records).unwrap();
-        assert_eq!(clips(&newest), [(16, "short".into()), (32, "long".into())]);
-        let pairs = Pair::all(&records);
-        let before = pairs.iter().find(|pair| pair.clip_hash == "of before").unwrap();
-        let before = Selection::of(&records, before);
-        assert_eq!(clips(&before), [(16, "short".into()), (32, "of before".into())]);
     }
 
     #[test]

@@ -75,6 +75,15 @@ impl Sample {
 mod tests {
     use super::*;
 
+    /// A square picture with these pixels.
+    fn square(side: usize, pixel: impl Fn(usize) -> [f32; 3]) -> Picture {
+        Picture {
+            width: side as u32,
+            height: side as u32,
+            pixels: (0..side * side).flat_map(pixel).collect(),
+        }
+    }
+
     #[test]
     fn squares_are_whole_and_of_the_scene() {
         // A scene whose pixels tell their places, on white.
@@ -86,11 +95,7 @@ mod tests {
                 false => [1.0; 3],
             }
         };
-        let picture = Picture {
-            width: side as u32,
-            height: side as u32,
-            pixels: (0..side * side).flat_map(pixel).collect(),
-        };
+        let picture = square(side, pixel);
         let sample = Sample::of(&picture, 4).unwrap();
         assert_eq!((sample.squares.width, sample.ground), (80, Some([1.0; 3])));
         let pixels = sample.squares.pixels.as_chunks::<3>().0;
@@ -114,11 +119,7 @@ mod tests {
             true => [0.2; 3],
             false => [0.8; 3],
         };
-        let picture = Picture {
-            width: side as u32,
-            height: side as u32,
-            pixels: (0..side * side).flat_map(pixel).collect(),
-        };
+        let picture = square(side, pixel);
         let sample = Sample::of(&picture, 4).unwrap();
         let darker = |factor: f32| {
             let mut change = ToneChange::default();
