@@ -29,6 +29,9 @@ pub enum PhotometricCorrection {
     None,
     /// Something that left its background neither black nor white, such as noise: what is seen of it is made white.
     WhiteBackground,
+    /// Its channels were multiplied, and with them a background that had been white and tells by how much. What it can't tell,
+    /// since it was cut at white, is this: factors of red, green and blue.
+    WhiteBalance([f32; 3]),
     /// Its tones were changed, and with them its background.
     Tone(Tone),
     /// Whatever was done to its tones, and whichever part of it shows the scene, was estimated from the picture and the
@@ -77,6 +80,7 @@ impl fmt::Display for Hypothesis {
         match self.correction {
             PhotometricCorrection::None => {}
             PhotometricCorrection::WhiteBackground => undone.push("ground made white".to_owned()),
+            PhotometricCorrection::WhiteBalance(beyond) => undone.push(white_balance(beyond)),
             PhotometricCorrection::Tone(tone) => undone.push(format!("{tone} undone")),
             PhotometricCorrection::Estimated => undone.push("tones and part estimated from each picture".into()),
         }
@@ -95,6 +99,16 @@ impl fmt::Display for Hypothesis {
             false => f.write_str(&undone.join(", ")),
         }
     }
+}
+
+fn white_balance(beyond: [f32; 3]) -> String {
+    let mut words = "white balance undone".to_owned();
+    for (channel, factor) in ["red", "green", "blue"].into_iter().zip(beyond) {
+        if factor != 1.0 {
+            words += &format!(", {channel} x {factor:.2}");
+        }
+    }
+    words
 }
 
 impl fmt::Display for Tone {

@@ -83,12 +83,11 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
         (&turned["asset"], turned["views"].as_u64()),
         (&asset.clone().into(), Some(12))
     );
-    // Seventy tones are guessed, nothing done and a ground made white; the plain background is a border, too, so that all
-    // of these are tried without it once more; and 34 parts. How pictures lie makes no difference to the shipped CLIP. All
-    // guesses are paid for, with each of two assets.
-    assert_eq!((&turned["framings"], &turned["hypotheses"]), (&178.into(), &356.into()));
+    // Not every picture's estimate is clear, so that guesses are tried besides, with borders and without, and parts; how
+    // pictures lie makes no difference to the shipped CLIP. All are paid for, with each of two assets.
+    assert_eq!((&turned["framings"], &turned["hypotheses"]), (&281.into(), &562.into()));
     let framing = turned["framing"].as_str().unwrap();
-    assert!(framing.starts_with("brightness x 0.8"), "{framing}");
+    assert!(framing.starts_with("tones and part estimated"), "{framing}");
 
     // The evidence stands without the server.
     service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);

@@ -8,11 +8,9 @@ use guardsplat_evaluation::report::names;
 use guardsplat_evaluation::report::record::{Id, ReadingRecord};
 use image::RgbImage;
 
-use super::guessed::cross_chosen;
 use super::view_readings::ViewReadings;
 use crate::error::{Error, Result};
-use guardsplat_engine::clip::config::Tones;
-use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, read_corrections};
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
 use guardsplat_engine::scene::Gaussians;
@@ -86,19 +84,16 @@ impl Views {
     }
 
     /// What is read of all views; of pictures that somebody else made, under what may have been done to them.
-    pub fn read(&self, engine: &Engine, message: &Message) -> Result<ViewReadings> {
+    pub fn read<'a>(&self, engine: &'a Engine, message: &Message) -> Result<ViewReadings<'a>> {
         // One at a time: large pictures of all views need not be there as floats.
         let pictures = self.images.iter().map(to_picture);
-        if self.processed && engine.extractor.tones() == Tones::Estimated {
+        if self.processed && engine.extractor.reads_exact_colours() {
             let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture, &[])?));
-            return Ok(ViewReadings::Estimated(read.collect::<Result<_>>()?));
+            return Ok(ViewReadings::Guessed(engine, read.collect::<Result<_>>()?, *message));
         }
         let mut logits = Vec::with_capacity(self.images.len());
         for picture in pictures {
-            match self.processed {
-                true => logits.push(cross_chosen(&read_corrections(engine, &picture)?, message)),
-                false => logits.extend(engine.read_logits(&[picture])?),
-            }
+            logits.extend(engine.read_logits(&[picture])?);
         }
         Ok(ViewReadings::Decided(PooledLogits::new(logits)?))
     }

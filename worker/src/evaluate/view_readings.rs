@@ -1,27 +1,29 @@
-//! What was read of views: logits that are decided for, or candidates for what was done to pictures, which are chosen among
-//! once it is known which pictures are read together.
-use guardsplat_engine::extract::{PictureLogits, PooledLogits, estimates};
+//! What was read of views: logits that are decided for, or readings of pictures that somebody changed, of which the right
+//! one depends on which pictures are read together.
+use guardsplat_codeword::Message;
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, hypotheses};
 
+use super::guessed::cross_chosen;
 use crate::error::Result;
 
 /// What was read of some views.
-pub(super) enum ViewReadings {
+pub(super) enum ViewReadings<'a> {
     /// Logits of each, whatever the others are.
     Decided(PooledLogits),
-    /// Candidates for what was done to each, which more views choose better.
-    Estimated(Vec<PictureLogits>),
+    /// Readings of each under what may have been done to it, and the message.
+    Guessed(&'a Engine, Vec<PictureLogits>, Message),
 }
 
-impl ViewReadings {
+impl ViewReadings<'_> {
     /// Each view read by itself.
     pub fn each(&self) -> Result<PooledLogits> {
         match self {
             Self::Decided(logits) => Ok(logits.clone()),
-            Self::Estimated(pictures) => {
+            Self::Guessed(engine, pictures, message) => {
                 let alone = pictures
                     .iter()
-                    .flat_map(|picture| estimated(std::slice::from_ref(picture)));
-                Ok(PooledLogits::new(alone.collect())?)
+                    .map(|picture| together(engine, std::slice::from_ref(picture), message));
+                Ok(PooledLogits::new(alone.collect::<Result<_>>()?)?)
             }
         }
     }
@@ -30,14 +32,17 @@ impl ViewReadings {
     pub fn of_first(&self, count: usize) -> Result<PooledLogits> {
         match self {
             Self::Decided(logits) => Ok(logits.of_first(count)?),
-            Self::Estimated(pictures) => Ok(PooledLogits::new(estimated(&pictures[..count.min(pictures.len())]))?),
+            Self::Guessed(engine, pictures, message) => {
+                let first = &pictures[..count.min(pictures.len())];
+                Ok(PooledLogits::new(vec![together(engine, first, message)?])?)
+            }
         }
     }
 }
 
-/// Logits of pictures, with the estimate of what was done to each undone.
-fn estimated(pictures: &[PictureLogits]) -> Vec<Vec<f32>> {
-    let chosen = estimates(pictures).into_iter().zip(pictures);
-    let logits = chosen.map(|(estimate, picture)| estimate.map_or(picture.as_given(), |estimate| estimate.logits()));
-    logits.map(<[f32]>::to_vec).collect()
+/// Logits of pictures together, each bit under what the others prefer of all that a claim would try.
+fn together(engine: &Engine, pictures: &[PictureLogits], message: &Message) -> Result<Vec<f32>> {
+    let read = hypotheses(engine, pictures)?;
+    let guesses: Vec<Vec<f32>> = read.into_iter().map(|(_, logits)| logits.summed).collect();
+    Ok(cross_chosen(&guesses, message))
 }

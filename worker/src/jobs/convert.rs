@@ -192,8 +192,13 @@ pub fn framed_reading(hypothesis: Hypothesis, logits: &PooledLogits) -> api::Fra
 
 fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
     use api::undone::Kind;
+    let mut channels = [0.0; 3];
     let (kind, factor) = match correction {
         PhotometricCorrection::None => return None,
+        PhotometricCorrection::WhiteBalance(beyond) => {
+            channels = beyond;
+            (Kind::WhiteBalance, 1.0)
+        }
         PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
         PhotometricCorrection::Estimated => (Kind::Estimated, 1.0),
         PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
@@ -201,9 +206,13 @@ fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
         PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),
         PhotometricCorrection::Tone(Tone::Saturation(factor)) => (Kind::Saturation, factor),
     };
+    let [red, green, blue] = channels;
     Some(api::Undone {
         kind: kind.into(),
         factor,
+        red,
+        green,
+        blue,
     })
 }
 

@@ -16,14 +16,14 @@ const TOLERANCE: f32 = 8.0 / 255.0;
 const LEAST_SIDE: u32 = 16;
 
 /// All hypotheses under which this extractor reads one picture that has borders and is large enough to be read in parts:
-/// the most that a claim about a picture pays for. Where what was done is estimated without the claimed message, they are
-/// two.
+/// the most that a claim about a picture pays for. Where what was done is estimated without the claimed message, a picture
+/// whose estimate is clear has the first two only.
 pub fn searched_hypotheses(extractor: &dyn Extractor) -> Vec<Hypothesis> {
-    if extractor.tones() == Tones::Estimated {
-        return vec![Hypothesis::default(), Hypothesis::estimated()];
-    }
+    let estimated = (extractor.tones() == Tones::Estimated).then(Hypothesis::estimated);
     let whole = [false, true].map(|trimmed| whole_hypotheses(extractor, trimmed));
-    whole.into_iter().flatten().chain(part_hypotheses(extractor)).collect()
+    let mut all: Vec<_> = whole.into_iter().flatten().chain(part_hypotheses(extractor)).collect();
+    all.splice(1..1, estimated);
+    all
 }
 
 /// Hypotheses under which a whole picture is read, nothing done first; with borders or `trimmed`. How a picture lies makes
@@ -264,13 +264,12 @@ mod tests {
     fn as_many_hypotheses_are_searched_as_claims_about_pictures_are_told_to_pay_for() {
         let of = |exact, tones| searched_hypotheses(&Fake { exact, tones });
         let exact = of(true, Tones::Searched);
-        // 72 tones with borders and without, and 34 parts (docs/verify.md).
-        assert_eq!(exact.len(), 178);
+        // 123 tones with borders and without, and 34 parts (docs/verify.md).
+        assert_eq!(exact.len(), 280);
         assert_eq!(of(false, Tones::Searched).len(), 16);
-        assert_eq!(
-            of(true, Tones::Estimated),
-            [Hypothesis::default(), Hypothesis::estimated()]
-        );
+        let estimated = of(true, Tones::Estimated);
+        assert_eq!(estimated[..2], [Hypothesis::default(), Hypothesis::estimated()]);
+        assert_eq!(estimated[2..], exact[1..]);
         assert_eq!(exact[0], Hypothesis::default());
         for (place, hypothesis) in exact.iter().enumerate() {
             assert!(!exact[..place].contains(hypothesis), "{hypothesis}");

@@ -2,7 +2,7 @@
 use guardsplat_codeword::Hypothesis;
 
 use super::blind::{BlindReading, Candidate, chosen};
-use super::hypothesis::{part_hypotheses, read_whole, searched_hypotheses, whole_hypotheses};
+use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
 use super::window::read_windows;
 use super::{Engine, PooledLogits, without_borders};
 use crate::clip::config::Tones;
@@ -11,12 +11,12 @@ use crate::picture::Picture;
 
 /// What was read of one picture under each hypothesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PictureLogits(Read);
-
-#[derive(Clone, Debug, PartialEq)]
-enum Read {
-    Searched(Searched),
-    Estimated(BlindReading),
+pub struct PictureLogits {
+    as_given: Vec<f32>,
+    /// With what was done undone as it is estimated, where it is.
+    blind: Option<BlindReading>,
+    /// Under every guess, unless the estimate is clear.
+    searched: Option<Searched>,
 }
 
 /// Under every guess.
@@ -31,24 +31,33 @@ struct Searched {
 
 impl PictureLogits {
     /// Reads a picture under every hypothesis that the engine searches. Where what was done is estimated, what was done to
-    /// `others` of the same suspect is tried, too.
+    /// `others` of the same suspect is tried, too, and guesses are read only if the estimate is not clear.
     ///
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
-        let others: Vec<_> = others.iter().filter_map(Self::estimated).collect();
-        Ok(Self(match engine.extractor.tones() {
-            Tones::Searched => Read::Searched(Searched::read(engine, picture)?),
-            Tones::Estimated => Read::Estimated(BlindReading::read(engine, picture, &others)?),
-        }))
+        let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
+        let blind = match engine.extractor.tones() {
+            Tones::Searched => None,
+            Tones::Estimated => {
+                let others: Vec<_> = others.iter().filter_map(|other| other.blind.as_ref()).collect();
+                Some(BlindReading::read(engine, picture, &others)?)
+            }
+        };
+        let searched = match &blind {
+            Some(blind) if blind.is_clear() => None,
+            _ => Some(Searched::read(engine, picture)?),
+        };
+        Ok(Self {
+            as_given,
+            blind,
+            searched,
+        })
     }
 
     /// Logits of the picture as it was given.
     pub fn as_given(&self) -> &[f32] {
-        match &self.0 {
-            Read::Searched(read) => read.as_given(),
-            Read::Estimated(read) => &read.as_given,
-        }
+        &self.as_given
     }
 }
 
@@ -64,91 +73,84 @@ impl Searched {
         };
         Ok(Self { whole, trimmed, parts })
     }
-
-    fn as_given(&self) -> &[f32] {
-        self.whole.first().map_or(&[], Vec::as_slice)
-    }
 }
 
 /// Logits of pictures of one suspect, pooled under each hypothesis, nothing done first. Those without borders are there
 /// only if some picture has any, and parts if some picture is large enough: others would be the same once more. All of
 /// them together are [`searched_hypotheses`](super::searched_hypotheses).
 ///
+/// Where what was done is estimated that is the second hypothesis, and the only other one if all estimates are clear. The
+/// message has no part in that, so that only what is here has to be paid for. A picture whose estimate is clear is read so
+/// under all guesses.
+///
 /// # Errors
 /// No pictures, or logits that are not finite.
 pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hypothesis, PooledLogits)>> {
+    let pooled = |hypothesis, logits: Vec<&[f32]>| -> Result<_> {
+        let logits = logits.into_iter().map(<[f32]>::to_vec).collect();
+        Ok((hypothesis, PooledLogits::new(logits)?))
+    };
+    let given = pictures.iter().map(PictureLogits::as_given).collect();
+    let mut readings = vec![pooled(Hypothesis::default(), given)?];
+    let estimated: Vec<&[f32]> = estimates(pictures)
+        .into_iter()
+        .zip(pictures)
+        .map(|(estimate, picture)| estimate.map_or(picture.as_given(), |estimate| estimate.logits()))
+        .collect();
     if engine.extractor.tones() == Tones::Estimated {
-        return estimated_hypotheses(engine, pictures);
+        readings.push(pooled(Hypothesis::estimated(), estimated.clone())?);
     }
     let extractor = engine.extractor.as_ref();
-    let pictures: Vec<&Searched> = pictures.iter().filter_map(PictureLogits::searched).collect();
-    let borders = pictures.iter().any(|picture| picture.trimmed.is_some());
-    let mut readings = Vec::new();
-    for trimmed in [false, true].into_iter().filter(|trimmed| borders || !trimmed) {
-        for (place, hypothesis) in whole_hypotheses(extractor, trimmed).into_iter().enumerate() {
-            let of_picture = |picture: &&Searched| match (&picture.trimmed, trimmed) {
-                (Some(logits), true) => logits[place].clone(),
-                _ => picture.whole[place].clone(),
-            };
-            readings.push((
-                hypothesis,
-                PooledLogits::new(pictures.iter().map(of_picture).collect())?,
-            ));
+    let under = |read: fn(&Searched, usize) -> &[f32], place: usize| {
+        let pictures = pictures.iter().zip(&estimated);
+        pictures
+            .map(|(picture, estimated)| {
+                picture
+                    .searched
+                    .as_ref()
+                    .map_or(*estimated, |searched| read(searched, place))
+            })
+            .collect()
+    };
+    let searched = || pictures.iter().filter_map(|picture| picture.searched.as_ref());
+    if searched().next().is_some() {
+        let whole = whole_hypotheses(extractor, false).into_iter().enumerate().skip(1);
+        for (place, hypothesis) in whole {
+            readings.push(pooled(hypothesis, under(Searched::whole, place))?);
         }
     }
-    if pictures.iter().any(|picture| picture.parts.is_some()) {
+    if searched().any(|picture| picture.trimmed.is_some()) {
+        for (place, hypothesis) in whole_hypotheses(extractor, true).into_iter().enumerate() {
+            readings.push(pooled(hypothesis, under(Searched::trimmed, place))?);
+        }
+    }
+    if searched().any(|picture| picture.parts.is_some()) {
         for (place, hypothesis) in part_hypotheses(extractor).enumerate() {
-            let of_picture = |picture: &&Searched| match &picture.parts {
-                Some(logits) => logits[place].clone(),
-                None => picture.as_given().to_vec(),
-            };
-            readings.push((
-                hypothesis,
-                PooledLogits::new(pictures.iter().map(of_picture).collect())?,
-            ));
+            readings.push(pooled(hypothesis, under(Searched::part, place))?);
         }
     }
     Ok(readings)
 }
 
-/// As given, and with each picture's own estimate undone.
-fn estimated_hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hypothesis, PooledLogits)>> {
-    let given = pictures.iter().map(|picture| picture.as_given().to_vec());
-    let estimated = estimates(pictures)
-        .into_iter()
-        .zip(pictures)
-        .map(|(estimate, picture)| {
-            estimate
-                .map_or(picture.as_given(), |estimate| estimate.logits())
-                .to_vec()
-        });
-    let readings = [given.collect(), estimated.collect()].map(PooledLogits::new);
-    searched_hypotheses(engine.extractor.as_ref())
-        .into_iter()
-        .zip(readings)
-        .map(|(hypothesis, logits)| Ok((hypothesis, logits?)))
-        .collect()
+impl Searched {
+    fn whole(&self, place: usize) -> &[f32] {
+        &self.whole[place]
+    }
+
+    fn trimmed(&self, place: usize) -> &[f32] {
+        self.trimmed
+            .as_ref()
+            .map_or(&self.whole[place], |logits| &logits[place])
+    }
+
+    fn part(&self, place: usize) -> &[f32] {
+        self.parts.as_ref().map_or(&self.whole[0], |logits| &logits[place])
+    }
 }
 
 /// What is estimated to have been done to each of the pictures of one suspect, chosen so that they agree; `None` where
-/// nothing could be estimated, or every guess is read.
+/// nothing could be estimated, or nothing is.
 pub fn estimates(pictures: &[PictureLogits]) -> Vec<Option<&Candidate>> {
-    let blind: Option<Vec<&BlindReading>> = pictures.iter().map(PictureLogits::estimated).collect();
+    let blind: Option<Vec<&BlindReading>> = pictures.iter().map(|picture| picture.blind.as_ref()).collect();
     blind.map_or_else(|| vec![None; pictures.len()], |blind| chosen(&blind))
-}
-
-impl PictureLogits {
-    fn searched(&self) -> Option<&Searched> {
-        match &self.0 {
-            Read::Searched(read) => Some(read),
-            Read::Estimated(_) => None,
-        }
-    }
-
-    fn estimated(&self) -> Option<&BlindReading> {
-        match &self.0 {
-            Read::Searched(_) => None,
-            Read::Estimated(read) => Some(read),
-        }
-    }
 }

@@ -130,7 +130,7 @@ pub fn config(options: &TrainOptions) -> ClipConfig {
                 scales: options.scales.clone(),
                 kernel: filters::KERNEL,
                 surround: options.surround,
-                tones: Tones::Searched,
+                tones: Tones::Estimated,
             },
         },
         text: TextConfig {

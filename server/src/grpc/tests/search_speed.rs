@@ -16,7 +16,7 @@ use crate::service::rate_limit::Rates;
 /// Owners, with an asset each.
 const OWNERS: u32 = 10_000;
 /// Framings of pictures with borders: what a worker reads at most.
-const FRAMINGS: u32 = 178;
+const FRAMINGS: u32 = 281;
 
 /// What a scene without a mark reads, different in each framing; the same at every run.
 fn framing(number: u32, seed: u32) -> FramedReading {
@@ -33,6 +33,7 @@ fn framing(number: u32, seed: u32) -> FramedReading {
         undone: Some(Undone {
             kind: 2,
             factor: 1.0 + number as f32 / 100.0,
+            ..Undone::default()
         }),
         ..FramedReading::default()
     }

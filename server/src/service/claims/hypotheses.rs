@@ -5,13 +5,13 @@ use guardsplat_codeword::{
     Hypothesis, HypothesisReading, PhotometricCorrection, Tone, WINDOW_STEPS as TWELFTHS, Window,
 };
 use guardsplat_evidence as evidence;
-use guardsplat_proto::v1::FramedReading;
 use guardsplat_proto::v1::undone::Kind;
+use guardsplat_proto::v1::{FramedReading, Undone};
 
 use crate::error::Result;
 use crate::service::violations::Violations;
 
-/// Most readings. Workers try some seventy tones, with borders and without, and some thirty parts.
+/// Most readings. Workers try some hundred and thirty tones, with borders and without, and some thirty parts.
 const MOST: usize = 1024;
 
 /// What was read under each hypothesis, checked against the bits of the key.
@@ -36,6 +36,14 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
             problems.check(known, &field("undone.kind"), "must be given");
             let positive = undone.factor.is_finite() && undone.factor > 0.0;
             problems.check(positive, &field("undone.factor"), "must be above 0");
+            for (name, factor) in ["red", "green", "blue"].into_iter().zip(channels(undone)) {
+                let fits = match undone.kind() {
+                    Kind::WhiteBalance => factor.is_finite() && factor > 0.0,
+                    _ => factor == 0.0,
+                };
+                let reason = "must be above 0 of a white balance, and 0 of all others";
+                problems.check(fits, &field(&format!("undone.{name}")), reason);
+            }
         }
         if let Some(part) = &reading.part {
             let inside = |from: u32| from <= TWELFTHS && part.side_twelfths <= TWELFTHS - from;
@@ -45,7 +53,13 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
         let part = reading
             .part
             .map(|part| (part.left_twelfths, part.top_twelfths, part.side_twelfths));
-        let undone = reading.undone.map(|undone| (undone.kind, undone.factor.to_bits()));
+        let undone = reading.undone.map(|undone| {
+            (
+                undone.kind,
+                undone.factor.to_bits(),
+                channels(&undone).map(f32::to_bits),
+            )
+        });
         if !seen.insert((turns, reading.mirrored, reading.trimmed, undone, part)) {
             problems.add(format!("readings[{i}]"), "is in the same framing as another one");
         }
@@ -62,6 +76,7 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
 /// What is undone, as a worker tells it.
 fn hypothesis(reading: &FramedReading) -> Hypothesis {
     let correction = reading.undone.map(|undone| (undone.kind(), undone.factor));
+    let channels = reading.undone.as_ref().map_or([1.0; 3], channels);
     Hypothesis {
         quarter_turns: reading.quarter_turns as u8, // below 4, or refused
         mirrored: reading.mirrored,
@@ -69,6 +84,7 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
         correction: match correction {
             None | Some((Kind::Unspecified, _)) => PhotometricCorrection::None, // refused
             Some((Kind::Ground, _)) => PhotometricCorrection::WhiteBackground,
+            Some((Kind::WhiteBalance, _)) => PhotometricCorrection::WhiteBalance(channels),
             Some((Kind::Estimated, _)) => PhotometricCorrection::Estimated,
             Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),
             Some((Kind::Gamma, exponent)) => PhotometricCorrection::Tone(Tone::Gamma(exponent)),
@@ -81,6 +97,11 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
             side: part.side_twelfths,
         }),
     }
+}
+
+/// What red, green and blue were multiplied by, of a white balance.
+fn channels(undone: &Undone) -> [f32; 3] {
+    [undone.red, undone.green, undone.blue]
 }
 
 /// Hypotheses by kinds, for the report: as much as was done counts under what changes most.
@@ -107,7 +128,7 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::HypothesisGroup> {
 mod tests {
     use super::*;
     use crate::error::Error;
-    use guardsplat_proto::v1::{PicturePart, Undone};
+    use guardsplat_proto::v1::PicturePart;
 
     fn reading(quarter_turns: u32, mirrored: bool, trimmed: bool) -> FramedReading {
         FramedReading {
@@ -137,6 +158,7 @@ mod tests {
             undone: Some(Undone {
                 kind: Kind::Brightness.into(),
                 factor,
+                ..Undone::default()
             }),
             ..reading(0, false, false)
         }
@@ -169,11 +191,34 @@ mod tests {
     }
 
     #[test]
+    fn white_balances_are_told_by_channel() {
+        let balanced = |red: f32| FramedReading {
+            undone: Some(Undone {
+                kind: Kind::WhiteBalance.into(),
+                factor: 1.0,
+                red,
+                green: 1.0,
+                blue: 1.04,
+            }),
+            ..reading(0, false, false)
+        };
+        let readings = [reading(0, false, false), balanced(1.0), balanced(1.02)];
+        let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
+        assert_eq!(names[1], "white balance undone, blue x 1.04");
+        assert_eq!(names[2], "white balance undone, red x 1.02, blue x 1.04");
+        assert!(checked(&[balanced(1.0), balanced(1.0)], 64).is_err() && checked(&[balanced(0.0)], 64).is_err());
+        let mut brightness = brightened(0.9);
+        brightness.undone.as_mut().unwrap().red = 1.0;
+        assert!(checked(&[brightness], 64).is_err());
+    }
+
+    #[test]
     fn an_estimate_is_one_framing_whatever_it_took() {
         let mut estimated = brightened(1.0);
         estimated.undone = Some(Undone {
             kind: Kind::Estimated.into(),
             factor: 1.0,
+            ..Undone::default()
         });
         let readings = [reading(0, false, false), estimated];
         let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();

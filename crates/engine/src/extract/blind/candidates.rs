@@ -120,12 +120,17 @@ impl<'a> Search<'a> {
 
     /// Whether the best candidate stands out.
     pub fn is_clear(&self) -> bool {
-        let best = self
-            .found
-            .iter()
-            .map(|candidate| candidate.score)
-            .fold(f64::NEG_INFINITY, f64::max);
-        self.spread.is_some_and(|spread| spread.is_clear(best))
+        self.spread.is_some_and(|spread| spread.is_clear(self.best_score()))
+    }
+
+    /// Whether it does so without a doubt.
+    pub fn is_certain(&self) -> bool {
+        self.spread.is_some_and(|spread| spread.is_certain(self.best_score()))
+    }
+
+    fn best_score(&self) -> f64 {
+        let scores = self.found.iter().map(|candidate| candidate.score);
+        scores.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The place of the part whose tones are worth a search besides the first's: the best as it is, if it is better than

@@ -10,7 +10,7 @@ const ROUNDS: usize = 3;
 /// makes the sum over all pictures look most like a mark, whatever that says.
 pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Option<&'a Candidate>> {
     let mut places = vec![0; pictures.len()];
-    let mut sum = vec![0.0_f32; pictures.iter().map(|picture| picture.as_given.len()).max().unwrap_or(0)];
+    let mut sum = vec![0.0_f32; pictures.iter().map(|picture| picture.bits).max().unwrap_or(0)];
     let add = |sum: &mut [f32], picture: usize, place: usize, sign: f32| {
         let candidate = pictures[picture].candidates.get(place);
         for (sum, v) in sum.iter_mut().zip(candidate.map_or(&[][..], |c| &c.logits)) {

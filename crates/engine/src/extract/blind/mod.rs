@@ -7,6 +7,7 @@
 mod candidates;
 mod joint;
 mod parts;
+mod plain;
 mod sample;
 mod score;
 mod search;
@@ -22,6 +23,7 @@ use crate::picture::Picture;
 use candidates::Search;
 pub(super) use joint::chosen;
 use parts::{Part, parts};
+use plain::without_plain_areas;
 
 /// Corrected pictures that are read together.
 const BATCH: usize = 16;
@@ -40,11 +42,12 @@ pub struct Candidate {
     score: f64,
 }
 
-/// A picture as given, and the best candidates for what was done to it.
+/// The best candidates for what was done to a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BlindReading {
-    pub as_given: Vec<f32>,
+    bits: usize,
     candidates: Vec<Candidate>,
+    is_clear: bool,
 }
 
 impl Candidate {
@@ -75,7 +78,8 @@ impl BlindReading {
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture, others: &[&Self]) -> Result<Self> {
-        let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
+        let drawn = without_plain_areas(picture);
+        let picture = drawn.as_ref().unwrap_or(picture);
         let whole = engine.resized(picture)?;
         let parts = parts(engine, picture, &whole)?;
         let mut search = Search::of_parts(engine, &whole, &parts)?;
@@ -91,8 +95,14 @@ impl BlindReading {
             search.refine(1)?;
         }
         Ok(Self {
-            as_given,
+            bits: engine.bits,
+            is_clear: search.is_certain(),
             candidates: search.best(),
         })
+    }
+
+    /// Whether the best candidate is one that wrong ones never come near to: then what was done need not be guessed.
+    pub fn is_clear(&self) -> bool {
+        self.is_clear
     }
 }

@@ -13,12 +13,20 @@ const COST: f64 = 0.06;
 /// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
 /// times reaches two to three.
 const CLEAR: f64 = 3.0;
+/// Deviations from which on it is certain.
+const CERTAIN: f64 = 4.5;
 
-/// The logarithm of the size of logits: of the mean of their roots, squared, which is largest where all are alike. Not finite
-/// where one isn't.
+/// How much it counts that all logits are of one size, besides what that size is. Plain colours make large logits, too.
+const EVEN: f64 = 1.0;
+
+/// The logarithm of the size of logits: of the mean of their roots, squared, which is largest where all are alike; and of
+/// its ratio to their root mean square. Not finite where one isn't.
 pub(super) fn of_logits(logits: &[f32]) -> f64 {
+    let count = logits.len().max(1) as f64;
     let roots: f64 = logits.iter().map(|v| f64::from(v.abs()).sqrt()).sum();
-    2.0 * (roots / logits.len().max(1) as f64).ln()
+    let squares: f64 = logits.iter().map(|v| f64::from(*v).powi(2)).sum();
+    let size = 2.0 * (roots / count).ln();
+    size + EVEN * (size - 0.5 * (squares / count).ln())
 }
 
 /// What a change must gain to be believed. A tint is what channels differ by from the middle one.
@@ -64,5 +72,10 @@ impl Spread {
     /// Whether a score is so far above that it is hardly one of these.
     pub fn is_clear(&self, score: f64) -> bool {
         score > self.middle + CLEAR * self.deviation
+    }
+
+    /// Whether it is so far above that the best of all that was tried and refined would not be.
+    pub fn is_certain(&self, score: f64) -> bool {
+        score > self.middle + CERTAIN * self.deviation
     }
 }

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::tensor::{Tensor, TensorData};
-use guardsplat_codeword::{Message, Reading, chance};
+use guardsplat_codeword::{Hypothesis, Message, Reading, chance};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -142,6 +142,7 @@ fn random_message(rng: &mut ChaCha8Rng) -> Message {
 fn changed_tones_are_found_and_the_work_is_bounded() {
     let (engine, patches, read) = engine();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut seen_clear = [false; 2];
     for logs in [
         [0.0; 6],
         [-0.5, -0.5, -0.5, 0.0, 0.0, 0.0],
@@ -157,7 +158,10 @@ fn changed_tones_are_found_and_the_work_is_bounded() {
         read.store(0, Ordering::Relaxed);
         let found = PictureLogits::read(&engine, &changed, &[]).unwrap();
         let passes = read.load(Ordering::Relaxed);
-        assert!(passes <= 400, "{passes}");
+        // Guesses are read only where the estimate is not clear.
+        let clear = hypotheses(&engine, std::slice::from_ref(&found)).unwrap().len() == 2;
+        seen_clear[usize::from(clear)] = true;
+        assert!(passes <= if clear { 400 } else { 560 }, "{passes}");
         let estimate = estimates(std::slice::from_ref(&found))[0].unwrap();
         assert_eq!(right(estimate.logits(), &message), BITS as u32, "{logs:?}: {estimate}");
         // A little of the others leaves these patches readable.
@@ -165,6 +169,7 @@ fn changed_tones_are_found_and_the_work_is_bounded() {
             assert!(right(found.as_given(), &message) < BITS as u32, "{logs:?}");
         }
     }
+    assert_eq!(seen_clear, [true; 2]);
 }
 
 #[test]
@@ -191,7 +196,7 @@ fn pictures_of_one_message_with_tones_of_their_own_are_read_together() {
         .map(|p| PictureLogits::read(&engine, p, &[]).unwrap())
         .collect();
     let readings = hypotheses(&engine, &read).unwrap();
-    assert_eq!(readings.len(), 2);
+    assert_eq!(readings[1].0, Hypothesis::estimated());
     assert_eq!(right(&readings[1].1.summed, &message), BITS as u32);
     assert!(readings[1].1.views.iter().all(|view| right(view, &message) >= 31));
     let words: Vec<String> = estimates(&read)

@@ -56,6 +56,11 @@ pub(in crate::extract) fn is_clean(colour: [f32; 3]) -> bool {
         .any(|level| colour.iter().all(|v| (v - level).abs() <= CLEAN))
 }
 
+/// Whether a channel of a ground is white, or was cut there.
+pub(super) fn is_white(value: f32) -> bool {
+    value >= 1.0 - CLEAN
+}
+
 /// How far a pixel is from a colour.
 fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
     let differences = pixel.iter().zip(colour).map(|(v, c)| (v - c).abs());

@@ -7,8 +7,9 @@
 mod change;
 pub(super) mod ground;
 mod tone;
+mod white_balance;
 
-use guardsplat_codeword::PhotometricCorrection;
+use guardsplat_codeword::{PhotometricCorrection, Tone};
 
 pub(super) use change::{COORDINATES, ToneChange};
 
@@ -24,6 +25,7 @@ pub fn corrections(extractor: &dyn Extractor) -> Vec<PhotometricCorrection> {
     let mut all = vec![PhotometricCorrection::None];
     if extractor.reads_exact_colours() {
         all.push(PhotometricCorrection::WhiteBackground);
+        all.extend(white_balance::all().map(PhotometricCorrection::WhiteBalance));
         all.extend(tone::all().into_iter().map(PhotometricCorrection::Tone));
     }
     all
@@ -34,23 +36,63 @@ pub fn corrections(extractor: &dyn Extractor) -> Vec<PhotometricCorrection> {
 /// # Errors
 /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f32>>> {
-    let mut logits = engine.read_logits(std::slice::from_ref(picture))?;
+    let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
     let small = engine.resized(picture)?;
-    for chunk in corrections(engine.extractor.as_ref())[1..].chunks(BATCH) {
-        let pictures: Vec<Picture> = chunk.iter().map(|correction| corrected(*correction, &small)).collect();
-        logits.extend(engine.read_logits(&pictures)?);
+    let corrections = corrections(engine.extractor.as_ref());
+    let undone: Vec<Undo> = corrections
+        .iter()
+        .map(|correction| Undo::of(*correction, &small))
+        .collect();
+    // Many a correction does the same to this picture as another one.
+    let mut different: Vec<Undo> = Vec::new();
+    for undo in &undone {
+        if *undo != Undo::Nothing && !different.contains(undo) {
+            different.push(*undo);
+        }
     }
-    Ok(logits)
+    let mut read = Vec::with_capacity(different.len());
+    for chunk in different.chunks(BATCH) {
+        let pictures: Vec<Picture> = chunk.iter().map(|undo| undo.applied(&small)).collect();
+        read.extend(engine.read_logits(&pictures)?);
+    }
+    let logits = |undo: &Undo| match different.iter().position(|other| other == undo) {
+        Some(place) => read[place].clone(),
+        None => as_given.clone(),
+    };
+    Ok(undone.iter().map(logits).collect())
 }
 
-/// The picture before that was done to it, over white where its background is seen.
-fn corrected(correction: PhotometricCorrection, picture: &Picture) -> Picture {
-    let toned = match correction {
-        // What was estimated is undone where it was found.
-        PhotometricCorrection::None | PhotometricCorrection::Estimated => return picture.clone(),
-        PhotometricCorrection::WhiteBackground => None,
-        PhotometricCorrection::Tone(tone) => Some(tone::undone(tone, picture)),
-    };
-    let toned = toned.as_ref().unwrap_or(picture);
-    ground::whitened(toned).unwrap_or_else(|| toned.clone())
+/// What a correction does to one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Undo {
+    Nothing,
+    Ground,
+    Gains([f32; 3]),
+    Tone(Tone),
+}
+
+impl Undo {
+    fn of(correction: PhotometricCorrection, picture: &Picture) -> Self {
+        match correction {
+            // What was estimated is undone where it was found.
+            PhotometricCorrection::None | PhotometricCorrection::Estimated => Self::Nothing,
+            PhotometricCorrection::WhiteBackground => Self::Ground,
+            PhotometricCorrection::WhiteBalance(beyond) => {
+                white_balance::gains(picture, beyond).map_or(Self::Nothing, Self::Gains)
+            }
+            PhotometricCorrection::Tone(tone) => Self::Tone(tone),
+        }
+    }
+
+    /// The picture before that was done to it, over white where its ground is seen.
+    fn applied(&self, picture: &Picture) -> Picture {
+        let toned = match self {
+            Self::Nothing => return picture.clone(),
+            Self::Ground => None,
+            Self::Gains(gains) => Some(white_balance::undone(*gains, picture)),
+            Self::Tone(tone) => Some(tone::undone(*tone, picture)),
+        };
+        let toned = toned.as_ref().unwrap_or(picture);
+        ground::whitened(toned).unwrap_or_else(|| toned.clone())
+    }
 }

@@ -12,9 +12,13 @@ struct Sought {
     tone: fn(f32) -> Tone,
     /// How far factors reach, either way.
     reach: f32,
-    /// The ratio of one to the next: a mark is read when the factor is right to a twentieth.
+    /// The ratio of one to the next: most marks are read when the factor is right to a twentieth, those of smooth scenes when
+    /// it is to a fiftieth.
     ratio: f32,
 }
+
+/// How far from 1 people go most often; there factors lie twice as near to each other.
+const OFTEN: f32 = 1.3;
 
 const SOUGHT: [Sought; 4] = [
     sought(Tone::Brightness, 2.2, 1.07),
@@ -56,8 +60,10 @@ pub(super) fn undone(tone: Tone, picture: &Picture) -> Picture {
 pub(super) fn all() -> Vec<Tone> {
     let mut all = Vec::new();
     for Sought { tone, reach, ratio } in SOUGHT {
-        let steps = (reach.ln() / ratio.ln()).ceil() as i32;
-        all.extend((-steps..=steps).filter(|i| *i != 0).map(|i| tone(ratio.powi(i))));
+        let steps = 2 * (reach.ln() / ratio.ln()).ceil() as i32;
+        let factor = |half: i32| ratio.powf(0.5 * half as f32);
+        let is_tried = |half: &i32| *half != 0 && (half % 2 == 0 || factor(half.abs()) <= OFTEN);
+        all.extend((-steps..=steps).filter(is_tried).map(|half| tone(factor(half))));
     }
     all
 }
