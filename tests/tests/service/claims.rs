@@ -83,11 +83,16 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
         (&turned["asset"], turned["views"].as_u64()),
         (&asset.clone().into(), Some(12))
     );
-    // Not every picture's estimate is clear, so that guesses are tried besides, with borders and without, and parts; how
-    // pictures lie makes no difference to the shipped CLIP. All are paid for, with each of two assets.
-    assert_eq!((&turned["framings"], &turned["hypotheses"]), (&281.into(), &562.into()));
+    // Where not every picture's estimate is clear, which is so of most words that an asset may have, guesses are tried
+    // besides, with borders and without, and parts; how pictures lie makes no difference to the shipped CLIP. All are paid
+    // for, with each of two assets.
+    let framings = turned["framings"].as_u64().unwrap();
+    assert!([2, 281].contains(&framings), "{turned}");
+    assert_eq!(turned["hypotheses"], 2 * framings);
+    // Which of those that undo the darkening is best differs by word, too.
     let framing = turned["framing"].as_str().unwrap();
-    assert!(framing.starts_with("tones and part estimated"), "{framing}");
+    let right = ["tones and part estimated", "white balance", "brightness x 0.8"];
+    assert!(right.iter().any(|start| framing.starts_with(start)), "{framing}");
 
     // The evidence stands without the server.
     service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);
@@ -166,9 +171,8 @@ fn a_real_scene_is_marked_as_a_user_would_and_found_on_a_page() {
     let found = service.json("verify pages --key site --search", 0);
     println!("{found}");
     assert_eq!(found["asset"], asset);
-    assert!(
-        found["framing"].as_str().unwrap().contains(" % of its sides from "),
-        "{found}"
-    );
+    let framing = found["framing"].as_str().unwrap();
+    let right = ["part estimated", " % of its sides from "];
+    assert!(right.iter().any(|words| framing.contains(words)), "{found}");
     service.json("verify in.ply --key site --search", 2);
 }
