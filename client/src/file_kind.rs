@@ -39,6 +39,8 @@ impl FileKind {
                 Err(bad(format!("not a PNG, JPEG or WebP picture, and {reason}")))
             }
             Err(SceneError::Io { source, .. }) => Err(Error::io(path)(source)),
+            // Of a file that is not read, but looked at.
+            Err(error @ SceneError::DoesNotFit { .. }) => Err(bad(error.to_string())),
         }
     }
 }

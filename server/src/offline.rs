@@ -13,7 +13,9 @@ use crate::access::{self, DEFAULT_PROJECT, Scope, Scopes, check_project};
 use crate::backup;
 use crate::error::{Error, Result};
 use crate::ledger::{NewToken, TokenLedger, TokenRow};
-use crate::run::{ledger, startup};
+use crate::notary::Notary;
+use crate::run::{DataFolder, ledger, startup, store};
+use crate::secrets;
 use crate::service::{clock, text};
 use crate::settings::Settings;
 
@@ -26,6 +28,9 @@ pub enum Command {
     /// Tokens: who may call, for which project, and what
     #[command(subcommand)]
     Token(Token),
+    /// The store of artifacts: whose it is
+    #[command(subcommand)]
+    Store(Store),
     /// Copies all that the server keeps to a folder, also while it runs; the master key only if that is asked for
     Backup {
         /// A folder that is empty or not there yet
@@ -62,6 +67,14 @@ pub enum Token {
     },
 }
 
+/// What there is to do with the store of artifacts.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Store {
+    /// Takes the store for this ledger, though it went on with another copy of it. What came to it since is deleted as
+    /// bytes that nothing points at, so first stop whatever else uses it
+    TakeOver,
+}
+
 /// Arguments of `token create`.
 #[derive(Clone, Debug, Args)]
 pub struct Create {
@@ -94,6 +107,7 @@ pub async fn run(settings: &Settings, command: Command) -> Result<Said> {
         Command::Token(command) => command,
         Command::Backup { to, with_master_key } => return backup::take(settings, &to, with_master_key).await,
         Command::Restore { from } => return backup::restore(settings, &from).await,
+        Command::Store(Store::TakeOver) => return take_over(settings).await,
     };
     let folder = &settings.data_dir;
     let failed = |error: std::io::Error| Error::Startup(format!("data_dir {}: {error}", folder.display()));
@@ -113,6 +127,25 @@ pub async fn run(settings: &Settings, command: Command) -> Result<Said> {
     };
     ledger.close().await;
     said
+}
+
+/// Needs the data folder, so no server may be running on it.
+async fn take_over(settings: &Settings) -> Result<Said> {
+    let folder = DataFolder::open(&settings.data_dir)?;
+    let master = secrets::load(settings.key_source(), folder.path()).map_err(startup)?;
+    let store = store::open(settings, folder.path()).await?;
+    let ledger = ledger::open(settings, folder.path()).await.map_err(startup)?;
+    let taken = async {
+        let notary = Notary::open(&*ledger, &master, clock::now()).await.map_err(startup)?;
+        store::take_over(&store, &notary, &*ledger, clock::now()).await
+    };
+    let taken = taken.await;
+    ledger.close().await;
+    taken?;
+    Ok(Said {
+        out: vec![format!("{} is this ledger's", store.place())],
+        err: Vec::new(),
+    })
 }
 
 async fn create(ledger: &dyn TokenLedger, arguments: Create) -> Result<Said> {

@@ -2,7 +2,7 @@
 mod folder;
 mod health;
 pub(crate) mod ledger;
-mod store;
+pub(crate) mod store;
 
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -28,7 +28,7 @@ use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::metrics::{self, Page};
 use crate::notary::Notary;
-use crate::secrets::{self, KeySource};
+use crate::secrets;
 use crate::service::rate_limit::Rates;
 use crate::service::retention::RetentionPolicy;
 use crate::service::{Limits, Service, clock};
@@ -79,12 +79,7 @@ impl Server {
     /// Opens the data folder, the master key, the store, the ledger and the listener.
     pub async fn open(settings: Settings) -> Result<Self> {
         let folder = DataFolder::open(&settings.data_dir)?;
-        let source = match (&settings.master_key, &settings.master_key_file) {
-            (Some(digits), _) => KeySource::Environment(digits),
-            (None, Some(file)) => KeySource::File(file),
-            (None, None) => KeySource::DataFolder,
-        };
-        let master = secrets::load(source, folder.path()).map_err(startup)?;
+        let master = secrets::load(settings.key_source(), folder.path()).map_err(startup)?;
         let store = store::open(&settings, folder.path()).await?;
         let ledger = ledger::open(&settings, folder.path()).await.map_err(startup)?;
         let listener = TcpListener::bind(settings.listen)
@@ -94,7 +89,7 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, clock::now())
             .await
             .map_err(startup)?;
-        store::claim(&store, &notary).await?;
+        store::claim(&store, &notary, &*ledger, clock::now()).await?;
         let traces = Traces::from_environment()?;
         let api = Service::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
         let poster = poster(&settings)?;

@@ -1,6 +1,8 @@
 //! Everything that can go wrong in the engine, by what happened.
 use std::path::PathBuf;
 
+use crate::memory::Bytes;
+
 /// Result of engine operations.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -110,6 +112,13 @@ impl From<guardsplat_scene::Error> for Error {
         match error {
             Scene::Io { path, source } => Self::Io { path, source },
             Scene::BadScene { path, reason } => Self::BadScene { path, reason },
+            // Without the path, which may be a worker's own.
+            Scene::DoesNotFit { memory, .. } => Self::DoesNotFit {
+                reason: format!(
+                    "what is in its file takes more than the {} that are left for it",
+                    Bytes(memory)
+                ),
+            },
         }
     }
 }

@@ -23,6 +23,14 @@ pub enum Error {
         /// What is wrong, with the field, the row and the limit.
         reason: String,
     },
+    /// What is in the file does not fit into the memory that there is for it.
+    #[error("{}: takes more than the {memory} bytes of memory that there are for it", path.display())]
+    DoesNotFit {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that there are for it.
+        memory: u64,
+    },
 }
 
 impl Error {

@@ -48,13 +48,23 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::read`]; [`Error::BadScene`] where no row is left.
     pub fn read_with(path: &Path, bad_rows: BadRows) -> Result<Scene> {
+        Scene::read_within(path, bad_rows, u64::MAX)
+    }
+
+    /// Reads a scene as [`Scene::read_with`], and stops before it takes more than `memory` bytes, where the head of the
+    /// file does not tell how many it will take: that is so of SOG. Of all other formats
+    /// [`summary`](crate::summary()) tells before anything is read.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read_with`]; [`Error::DoesNotFit`].
+    pub fn read_within(path: &Path, bad_rows: BadRows, memory: u64) -> Result<Scene> {
         let file = File::open(path).map_err(Error::io(path))?;
         let metadata = file.metadata().map_err(Error::io(path))?;
         if !metadata.is_file() {
             return Err(bad(path, "not a regular file".to_string()));
         }
         let mut source = BufReader::with_capacity(1 << 16, file);
-        Scene::read_from(path, &mut source, metadata.len(), bad_rows)
+        Scene::read_from(path, &mut source, metadata.len(), bad_rows, memory)
     }
 
     /// Reads a scene from memory; `name` is for messages.
@@ -70,17 +80,23 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::read_with`].
     pub fn parse_with(name: &Path, bytes: &[u8], bad_rows: BadRows) -> Result<Scene> {
-        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64, bad_rows)
+        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64, bad_rows, u64::MAX)
     }
 
-    /// Reads a scene of `size` bytes; `path` is for messages.
-    fn read_from(path: &Path, source: &mut BufReader<impl Read>, size: u64, bad_rows: BadRows) -> Result<Scene> {
+    /// Reads a scene of `size` bytes within `memory` bytes; `path` is for messages.
+    fn read_from(
+        path: &Path,
+        source: &mut BufReader<impl Read>,
+        size: u64,
+        bad_rows: BadRows,
+        memory: u64,
+    ) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
         let first = source.fill_buf().map_err(Error::io(path))?;
         let (gaussians, source) = match announced(first) {
             Some(Format::Ply | Format::CompressedPly) => ply::read(path, source, size, bad_rows)?,
             Some(Format::Spz) => spz::read(path, source, size)?,
-            Some(Format::Sog) => sog::read(path, source, size, bad_rows)?,
+            Some(Format::Sog) => sog::read(path, source, size, bad_rows, memory)?,
             _ => splat::read(path, source, size, bad_rows)?,
         };
         if let Some(ignored) = source.ignored().filter(|_| gaussians.is_empty()) {

@@ -19,6 +19,8 @@ const ADMIN: Need = AnyOf(&[Admin]);
 const WORKER: Need = AnyOf(&[Worker]);
 /// Both kinds of work; `CreateJob` and `CancelJob` look at the job too.
 const WORK: Need = AnyOf(&[Embed, Verify]);
+/// Deleting artifacts; `DeleteArtifact` looks at what is deleted too.
+const DELETE: Need = LOOK;
 /// Looking at what the project has.
 const LOOK: Need = AnyOf(&[Embed, Verify, Admin]);
 /// Workers read the inputs of running jobs in this way, and nothing else.
@@ -39,7 +41,7 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.ArtifactService/DownloadArtifact", READ),
     ("/guardsplat.v1.ArtifactService/GetDownloadUrl", READ),
     ("/guardsplat.v1.ArtifactService/GetArtifact", WORK),
-    ("/guardsplat.v1.ArtifactService/DeleteArtifact", WORK),
+    ("/guardsplat.v1.ArtifactService/DeleteArtifact", DELETE),
     ("/guardsplat.v1.KeyService/GetKey", LOOK),
     ("/guardsplat.v1.KeyService/ListKeys", LOOK),
     ("/guardsplat.v1.KeyService/UpdateKeyState", ADMIN),

@@ -7,6 +7,7 @@
 //! ledger's business; the store only knows paths, and those are made of ids.
 mod check;
 mod error;
+mod generation;
 mod list;
 mod local;
 mod path;

@@ -92,7 +92,7 @@ impl ArtifactStore {
         }
     }
 
-    async fn read_small(&self, path: &Path) -> object_store::Result<Vec<u8>> {
+    pub(super) async fn read_small(&self, path: &Path) -> object_store::Result<Vec<u8>> {
         Ok(self.objects().get(path).await?.bytes().await?.to_vec())
     }
 

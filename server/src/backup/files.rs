@@ -29,6 +29,13 @@ pub fn hash(path: &Path) -> io::Result<Copied> {
     pour(&mut File::open(path)?, |_| Ok(()))
 }
 
+/// The same of a file that somebody else wrote, whose bytes are on disk when this returns.
+pub fn hash_durably(path: &Path) -> io::Result<Copied> {
+    let mut file = File::open(path)?;
+    file.sync_all()?;
+    pour(&mut file, |_| Ok(()))
+}
+
 /// Writes a new file, for its owner alone.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = new_file(path)?;

@@ -55,7 +55,8 @@ pub async fn take(settings: &Settings, to: &Path, with_master_key: bool) -> Resu
     let manifest = Manifest {
         version: VERSION,
         time,
-        ledger_sha256: files::hash(&target).map_err(failed(&target))?.sha256,
+        // SQLite leaves what `VACUUM INTO` wrote to the system. All other files were synced when they were copied.
+        ledger_sha256: files::hash_durably(&target).map_err(failed(&target))?.sha256,
         artifacts,
         artifact_bytes: bytes,
         master_key,

@@ -89,11 +89,15 @@ impl ArtifactService for Service {
 
     async fn delete_artifact(&self, request: Request<DeleteArtifactRequest>) -> Result<Response<()>, Status> {
         let id = ResourceKind::Artifact.parse("name", &request.get_ref().name)?;
-        let row = self.owned_artifact(&caller(&request)?.project, id).await?;
+        let caller = caller(&request)?;
+        let row = self.owned_artifact(&caller.project, id).await?;
+        self.may_delete(&caller, &row).await?;
         self.ledger()
             .delete_artifact(row.id, clock::now())
             .await
             .map_err(Error::from)?;
+        let (evidence, name) = (row.evidence, row.display_name.as_str());
+        tracing::info!(artifact = %row.id, project = row.project, evidence, name, by = ?caller.token, "artifact deleted");
         // It is gone for everybody from here on. What is left of it is collected later if this fails.
         if let Err(error) = self.remove_bytes(&row).await {
             tracing::warn!(artifact = %row.id, error = %chain(&error), "the bytes of a deleted artifact are left for later");

@@ -27,6 +27,9 @@ pub trait ArtifactLedger: Send + Sync + 'static {
     /// Whether a running job reads this artifact.
     async fn is_being_read(&self, artifact: ArtifactId) -> Result<bool>;
 
+    /// Whether an asset was registered from this artifact.
+    async fn is_original(&self, artifact: ArtifactId) -> Result<bool>;
+
     /// Hides an artifact for good. Its bytes may go now; until `forget_artifact` it is among the abandoned ones.
     ///
     /// # Errors
@@ -35,8 +38,11 @@ pub trait ArtifactLedger: Send + Sync + 'static {
 
     /// Marks as deleted, and returns with those already deleted, artifacts that nobody can want any more: uploads that
     /// never became ready, and outputs of attempts that are over, created before `older_than`. Delete the bytes, then
-    /// forget the row.
+    /// forget the row; or put it off, if they can't be.
     async fn abandoned_artifacts(&self, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>>;
+
+    /// Puts a deleted artifact, whose bytes could not be deleted, behind all others that are to be.
+    async fn put_off_artifact(&self, id: ArtifactId, now: i64) -> Result<()>;
 
     /// Removes the row of a deleted artifact whose bytes are gone.
     async fn forget_artifact(&self, id: ArtifactId) -> Result<()>;

@@ -179,6 +179,18 @@ pub struct DeliveryFilter {
     pub state: Option<DeliveryState>,
 }
 
+/// Most deliveries of a project that wait. Those of jobs that end while there are as many are dead at once.
+pub const MOST_WAITING: i64 = 10_000;
+
+/// Who has as many messages under way as they may.
+#[derive(Clone, Debug, Default)]
+pub struct Busy {
+    /// These hooks.
+    pub hooks: Vec<HookId>,
+    /// All hooks of these projects.
+    pub projects: Vec<String>,
+}
+
 /// The right to one attempt to send a delivery, and what is needed for it.
 #[derive(Clone)]
 pub struct Sending {
@@ -190,6 +202,8 @@ pub struct Sending {
     pub job: Option<JobRow>,
     /// What the caller called the request for that job.
     pub asked_id: Option<Uuid>,
+    /// What is sent, if there was an attempt before.
+    pub body: Option<Vec<u8>>,
     /// The secret that goes with what came of the attempt. Only its hash is kept.
     pub token: String,
 }
@@ -238,9 +252,12 @@ pub trait HookLedger: Send + Sync + 'static {
     /// `NotFound`.
     async fn redeliver(&self, id: DeliveryId, now: i64) -> Result<DeliveryRow>;
 
-    /// Gives out the delivery that has been due for longest, but none to `except`, and counts the attempt. Nobody else
-    /// is given it before `now + lease`.
-    async fn claim_delivery(&self, except: &[HookId], lease: Duration, now: i64) -> Result<Option<Sending>>;
+    /// Gives out the delivery that has been due for longest, but none of whoever is `busy`, and counts the attempt.
+    /// Nobody else is given it before `now + lease`.
+    async fn claim_delivery(&self, busy: &Busy, lease: Duration, now: i64) -> Result<Option<Sending>>;
+
+    /// Keeps what is sent, from the first attempt on. `false` where the lease is lost, and nothing changed.
+    async fn keep_delivery_body(&self, id: DeliveryId, token: &str, body: &[u8]) -> Result<bool>;
 
     /// A delivery was acknowledged. `false` where the lease is lost, and nothing changed.
     async fn delivered(&self, id: DeliveryId, token: &str, now: i64) -> Result<bool>;

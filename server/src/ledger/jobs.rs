@@ -75,7 +75,7 @@ pub trait JobStore: Send + Sync + 'static {
     async fn peek_job(&self, id: JobId) -> Result<Option<JobRow>>;
 
     /// Jobs of a project in one of `states` (in any, when empty), newest first; those after `before` (the `create_time`
-    /// and id of the last job of the page before).
+    /// and id of the last job of the page before). Without their positions in the queue.
     async fn list_jobs(
         &self,
         project: &str,

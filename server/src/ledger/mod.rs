@@ -21,6 +21,7 @@ mod commitments;
 pub mod conformance;
 mod discriminants;
 mod error;
+mod generation;
 pub mod hooks;
 mod idempotency;
 mod jobs;
@@ -45,8 +46,10 @@ use tokio::sync::broadcast;
 pub use artifacts::ArtifactLedger;
 pub use commitments::{CommitmentLog, SealedSigningKey};
 pub use error::{LedgerError, Result};
+pub use generation::{Generation, GenerationLedger};
 pub use hooks::{
-    DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
+    Busy, DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, MOST_WAITING, NewHook,
+    Sending, Topics,
 };
 pub use jobs::{AttemptRow, JobStore, Outcome};
 pub use keys::KeyLedger;
@@ -75,6 +78,7 @@ pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPr
 pub trait Ledger:
     ArtifactLedger
     + CommitmentLog
+    + GenerationLedger
     + HookLedger
     + JobQueue
     + JobStore

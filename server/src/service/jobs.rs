@@ -111,10 +111,11 @@ impl Service {
         };
         let before = page::position(query, &request.page_token)?;
         // One more than asked for tells whether there is another page.
-        let rows = match reasons.is_empty() {
+        let mut rows = match reasons.is_empty() {
             true => self.ledger().list_jobs(project, &states, before, size + 1).await?,
             false => self.ledger().list_failed(project, &reasons, before, size + 1).await?,
         };
+        self.place(&mut rows).await?;
         let (count, mut bytes) = (rows.len(), 0);
         let mut jobs = Vec::with_capacity(count.min(size as usize));
         let mut last = None;

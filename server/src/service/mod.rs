@@ -40,6 +40,7 @@ pub mod rate_limit;
 pub(crate) mod registry;
 pub mod retention;
 pub(crate) mod stages;
+pub(crate) mod store_generation;
 pub(crate) mod submission;
 pub mod text;
 pub(crate) mod to_proto;

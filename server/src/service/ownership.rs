@@ -1,7 +1,7 @@
 //! What a caller may see: what is of their own project. What is another's is not there, in the same words.
 use guardsplat_commitment::Signed;
 use sha2::{Digest, Sha256};
-use uuid::{Builder, Uuid};
+use uuid::{Builder, Uuid, Version};
 
 use crate::access::{Caller, DEFAULT_PROJECT, Scope};
 use crate::error::{Error, Result};
@@ -42,6 +42,24 @@ impl Service {
         Err(ResourceKind::Artifact.not_found(id))
     }
 
+    /// Refuses whoever may not delete an artifact: signed evidence, and the original of an asset, need an admin; what jobs
+    /// made, the right to make it; and what was uploaded, the right to upload.
+    pub(crate) async fn may_delete(&self, caller: &Caller, artifact: &ArtifactRow) -> Result<()> {
+        if caller.scopes.has(Scope::Admin) {
+            return Ok(());
+        }
+        if artifact.evidence || self.ledger().is_original(artifact.id).await? {
+            return caller.must(Scope::Admin);
+        }
+        match artifact.job {
+            Some(job) => match self.ledger().peek_job(job).await? {
+                Some(job) => caller.must(scope_of(job.kind())),
+                None => Ok(()),
+            },
+            None => Ok(()),
+        }
+    }
+
     pub(crate) async fn owned_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {
         let row = self.ledger().get_key(id).await?;
         let own = row.filter(|row| row.project == project);
@@ -79,8 +97,9 @@ pub(crate) fn scope_of(kind: JobKind) -> Scope {
 
 /// The name that a request of a project has in the ledger, so that nobody's requests are in the way of anybody else's.
 pub(crate) fn request(project: &str, id: Uuid) -> Uuid {
-    if project == DEFAULT_PROJECT {
-        // As before there were projects, so that requests of then are known.
+    // As before there were projects, so that requests of then are known. But not an id that looks as if it were made
+    // below: whoever guesses those of another project could take them before it does.
+    if project == DEFAULT_PROJECT && id.get_version() != Some(Version::Custom) {
         return id;
     }
     let mut hash = Sha256::new_with_prefix(b"guardsplat request id\0");
@@ -112,6 +131,10 @@ mod tests {
             assert!(!names[..i].contains(name));
         }
         assert_eq!(request("a", id), names[0]);
+        // What another project's request is known by can't be asked for.
+        for taken in &names[..3] {
+            assert_ne!(request(DEFAULT_PROJECT, *taken), *taken);
+        }
         let told = as_asked(LedgerError::RequestIdReused(names[0]), Some(id)).to_string();
         assert!(told.contains(&id.to_string()), "{told}");
     }

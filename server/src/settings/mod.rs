@@ -12,6 +12,8 @@ use std::time::Duration;
 use secrecy::SecretString;
 use serde::{Deserialize, Serialize};
 
+use crate::secrets::KeySource;
+
 pub use database::{DATABASE_VARIABLE, DatabaseUrl};
 pub use error::SettingsError;
 pub use flags::{Arguments, Flags};
@@ -202,6 +204,15 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// What says which master key is used.
+    pub fn key_source(&self) -> KeySource<'_> {
+        match (&self.master_key, &self.master_key_file) {
+            (Some(digits), _) => KeySource::Environment(digits),
+            (None, Some(file)) => KeySource::File(file),
+            (None, None) => KeySource::DataFolder,
+        }
+    }
+
     /// Bytes of memory that a job may take, where that is limited.
     pub fn max_job_memory(&self) -> Option<u64> {
         Some(self.max_job_memory_mebibytes << 20).filter(|bytes| *bytes > 0)

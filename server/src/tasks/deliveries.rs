@@ -9,7 +9,7 @@ use tokio::time::{Instant, interval, timeout};
 
 use crate::error::{Error, chain};
 use crate::hooks::{PostError, Poster, event, next_attempt, signature};
-use crate::ledger::{HookId, Sending};
+use crate::ledger::{Busy, HookId, Sending};
 use crate::service::{Service, clock, text};
 
 /// How often what is due is looked for.
@@ -18,6 +18,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 const AT_ONCE: usize = 32;
 /// Those of them to one hook, so that one that answers slowly does not hold up the others.
 const OF_ONE_HOOK: usize = 4;
+/// Those of them to all hooks of a project, so that many that answer slowly do not hold up those of others.
+const OF_ONE_PROJECT: usize = 8;
 /// When another server may send what this one was to: longer than any message takes.
 const LEASE: Duration = Duration::from_secs(60);
 /// What is on its way gets so long to arrive when the server stops. What does not is sent again.
@@ -36,6 +38,9 @@ enum Failed {
     /// There is nothing left to tell of.
     #[error("the job is gone")]
     JobGone,
+    /// Another server has it.
+    #[error("the delivery was given to another server")]
+    Lost,
     /// The receiver was not reached, or did not acknowledge.
     #[error(transparent)]
     Post(#[from] PostError),
@@ -50,22 +55,24 @@ pub async fn deliveries(api: Service, poster: Poster) {
     let mut ticks = interval(LOOK_EVERY);
     let mut forgot: Option<Instant> = None;
     let mut sending = JoinSet::new();
-    let mut hooks: HashMap<Id, HookId> = HashMap::new();
+    let mut under_way: HashMap<Id, (HookId, String)> = HashMap::new();
     loop {
         tokio::select! {
             () = stopping.stopped() => break,
             Some(done) = sending.join_next_with_id() => {
                 let id = done.map_or_else(|failed| failed.id(), |(id, ())| id);
-                hooks.remove(&id);
+                under_way.remove(&id);
             }
             _ = ticks.tick() => {}
         }
-        while hooks.len() < AT_ONCE {
-            match api.ledger().claim_delivery(&busy(&hooks), LEASE, clock::now()).await {
+        while under_way.len() < AT_ONCE {
+            let busy = busy(under_way.values());
+            match api.ledger().claim_delivery(&busy, LEASE, clock::now()).await {
                 Ok(Some(claimed)) => {
-                    let (api, poster, hook) = (api.clone(), poster.clone(), claimed.hook.id);
+                    let (api, poster) = (api.clone(), poster.clone());
+                    let whose = (claimed.hook.id, claimed.hook.project.clone());
                     let task = sending.spawn(async move { api.deliver(&poster, claimed, clock::now()).await });
-                    hooks.insert(task.id(), hook);
+                    under_way.insert(task.id(), whose);
                 }
                 Ok(None) => break,
                 Err(error) => {
@@ -88,14 +95,20 @@ pub async fn deliveries(api: Service, poster: Poster) {
     }
 }
 
-/// Hooks that have as many messages on their way as they may.
-fn busy(sending: &HashMap<Id, HookId>) -> Vec<HookId> {
-    let mut counts: HashMap<HookId, usize> = HashMap::new();
-    for &hook in sending.values() {
-        *counts.entry(hook).or_default() += 1;
+/// Hooks and projects that have as many messages on their way as they may.
+fn busy<'a>(under_way: impl Iterator<Item = &'a (HookId, String)>) -> Busy {
+    let mut hooks: HashMap<HookId, usize> = HashMap::new();
+    let mut projects: HashMap<&str, usize> = HashMap::new();
+    for (hook, project) in under_way {
+        *hooks.entry(*hook).or_default() += 1;
+        *projects.entry(project).or_default() += 1;
     }
-    let full = counts.into_iter().filter(|&(_, count)| count >= OF_ONE_HOOK);
-    full.map(|(hook, _)| hook).collect()
+    let hooks = hooks.into_iter().filter(|&(_, count)| count >= OF_ONE_HOOK);
+    let projects = projects.into_iter().filter(|&(_, count)| count >= OF_ONE_PROJECT);
+    Busy {
+        hooks: hooks.map(|(hook, _)| hook).collect(),
+        projects: projects.map(|(project, _)| project.to_owned()).collect(),
+    }
 }
 
 impl Service {
@@ -132,8 +145,11 @@ impl Service {
         }
     }
 
-    async fn attempt(&self, poster: &Poster, sending: &Sending, now: i64) -> Result<(), Failed> {
-        let Sending { delivery, hook, .. } = sending;
+    /// What is sent: at every attempt what was sent at the first, whatever has become of the job and its artifacts since.
+    async fn event_of(&self, sending: &Sending) -> Result<Vec<u8>, Failed> {
+        if let Some(body) = &sending.body {
+            return Ok(body.clone());
+        }
         let job = sending.job.as_ref().ok_or(Failed::JobGone)?;
         let mut artifacts = Vec::new();
         for (role, artifact) in event::outputs(job) {
@@ -142,7 +158,20 @@ impl Service {
                 artifacts.push((role, row));
             }
         }
-        let body = event::body(delivery, job, sending.asked_id, artifacts);
+        let body = event::body(&sending.delivery, job, sending.asked_id, artifacts);
+        let kept = self
+            .ledger()
+            .keep_delivery_body(sending.delivery.id, &sending.token, &body);
+        match kept.await.map_err(Error::from)? {
+            true => Ok(body),
+            // Whoever has it now keeps another text, perhaps.
+            false => Err(Failed::Lost),
+        }
+    }
+
+    async fn attempt(&self, poster: &Poster, sending: &Sending, now: i64) -> Result<(), Failed> {
+        let Sending { delivery, hook, .. } = sending;
+        let body = self.event_of(sending).await?;
         let secret = self
             .master()
             .open(&crate::hooks::secret_context(hook.id), &hook.sealed_secret);

@@ -4,8 +4,9 @@ use std::time::Duration;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use crate::artifacts::ArtifactPath;
-use crate::error::{Result, chain};
+use crate::error::{Error, Result, chain};
 use crate::ledger::{ArtifactRow, JobId};
+use crate::service::store_generation::{self, CONTESTED, Standing};
 use crate::service::{Service, clock};
 
 /// How late an expired lease may be noticed.
@@ -16,6 +17,8 @@ const ABSENCE: Duration = Duration::from_secs(3);
 const COLLECT_EVERY: Duration = Duration::from_secs(10);
 /// How often what is too old is looked for, at most.
 const EXPIRE_EVERY: Duration = Duration::from_secs(60);
+/// How often is asked whether the store is still this ledger's, at most.
+const STANDING_EVERY: Duration = Duration::from_secs(60);
 /// How often all that lies in the store is looked at, at least.
 const ORPHANS_EVERY: Duration = Duration::from_secs(6 * 60 * 60);
 /// Artifacts deleted at one go.
@@ -34,18 +37,45 @@ pub async fn housekeeping(api: Service) {
 
 async fn look_after_leases(api: &Service) {
     let mut ticks = interval(REAP_EVERY);
-    // When leases were last looked after; never, as far as this server knows.
-    let mut looked: Option<Instant> = None;
+    // Never yet, as far as this server knows.
+    let mut looked: Option<Looked> = None;
     let absence = ABSENCE.max(api.limits().lease / 2);
     loop {
         ticks.tick().await;
+        let now = Looked::now();
         match api
-            .look_after_leases(looked.is_none_or(|at| at.elapsed() > absence))
+            .look_after_leases(looked.is_none_or(|last| now.since(last) > absence))
             .await
         {
-            Ok(()) => looked = Some(Instant::now()),
+            Ok(()) => looked = Some(now),
             Err(error) => tracing::error!(error = %chain(&error), "expired leases could not be ended"),
         }
+    }
+}
+
+/// When leases were looked after, by two clocks.
+#[derive(Clone, Copy, Debug)]
+struct Looked {
+    /// Stands still while a virtual machine is paused, and goes on while the clock on the wall is set back.
+    awake: Instant,
+    /// What leases end by: microseconds since 1970. It has moved on when a machine wakes up.
+    wall: i64,
+}
+
+impl Looked {
+    fn now() -> Self {
+        Self {
+            awake: Instant::now(),
+            wall: clock::now(),
+        }
+    }
+
+    /// How long ago `last` was, by the clock that says the most.
+    fn since(self, last: Self) -> Duration {
+        let wall = u64::try_from(self.wall.saturating_sub(last.wall)).unwrap_or(0);
+        self.awake
+            .saturating_duration_since(last.awake)
+            .max(Duration::from_micros(wall))
     }
 }
 
@@ -56,6 +86,7 @@ async fn delete(api: &Service) {
     let expire_every = EXPIRE_EVERY.min(abandoned_after);
     let orphans_every = (abandoned_after / 4).clamp(COLLECT_EVERY, ORPHANS_EVERY);
     let mut expired: Option<Instant> = None;
+    let mut stood: Option<(Instant, bool)> = None;
     // Not at the start: listing all there is takes a store's time, and orphans can wait.
     let mut searched = Instant::now();
     loop {
@@ -65,6 +96,12 @@ async fn delete(api: &Service) {
             if let Err(error) = api.expire().await {
                 tracing::error!(error = %chain(&error), "what is too old could not be deleted");
             }
+        }
+        if stood.is_none_or(|(at, _)| at.elapsed() >= STANDING_EVERY) {
+            stood = Some((Instant::now(), api.is_ours().await));
+        }
+        if !stood.is_some_and(|(_, ours)| ours) {
+            continue;
         }
         // Not since this task began: calls may have been taken before it, and their bytes may still be arriving.
         if let Err(error) = api.collect(api.opened()).await {
@@ -119,6 +156,29 @@ impl Service {
         }
     }
 
+    /// Whether the store is this ledger's to delete from, as far as is known.
+    pub(crate) async fn is_ours(&self) -> bool {
+        let standing = match store_generation::standing(self.ledger(), self.store(), clock::now()).await {
+            Ok(Standing::Behind) => {
+                // Whoever it went on with is to hear of it before it deletes what came here meanwhile.
+                let contested = self.store().contest().await.map_err(Error::from);
+                contested.map(|()| Standing::Contested)
+            }
+            other => other,
+        };
+        match standing {
+            Ok(Standing::Ours) => true,
+            Ok(_) => {
+                tracing::error!(place = %self.store().place(), "{CONTESTED}");
+                false
+            }
+            Err(error) => {
+                tracing::error!(error = %chain(&error), "whose the artifacts are can't be seen, so nothing is deleted");
+                false
+            }
+        }
+    }
+
     /// Deletes what uploads and attempts left behind. What was begun before this server was `started` is nobody's any
     /// more, unless the ledger has other servers; what was begun since, or by them, may still be arriving for as long as
     /// that is allowed.
@@ -133,8 +193,11 @@ impl Service {
         for artifact in &abandoned {
             match self.remove_bytes(artifact).await {
                 Ok(()) => tracing::info!(artifact = %artifact.id, "deleted what was abandoned"),
-                // The others are not to wait for this one.
-                Err(error) => tracing::error!(artifact = %artifact.id, error = %chain(&error), "could not be deleted"),
+                // The others are not to wait for this one, the next time either.
+                Err(error) => {
+                    tracing::error!(artifact = %artifact.id, error = %chain(&error), "could not be deleted");
+                    self.ledger().put_off_artifact(artifact.id, clock::now()).await?;
+                }
             }
         }
         Ok(())
@@ -144,5 +207,25 @@ impl Service {
     pub(crate) async fn remove_bytes(&self, artifact: &ArtifactRow) -> Result<()> {
         self.store().delete(&ArtifactPath::parse(&artifact.path)?).await?;
         Ok(self.ledger().forget_artifact(artifact.id).await?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_that_was_paused_was_absent() {
+        let last = Looked::now();
+        let hour = Duration::from_secs(3600);
+        let later = |awake: Duration, wall: i64| Looked {
+            awake: last.awake + awake,
+            wall: last.wall + wall,
+        };
+        assert_eq!(later(REAP_EVERY, 1_000_000).since(last), REAP_EVERY);
+        // It woke up an hour later, and counted a second.
+        assert_eq!(later(REAP_EVERY, 3_600_000_000).since(last), hour);
+        // Somebody set the clock back.
+        assert_eq!(later(hour, -3_600_000_000).since(last), hour);
     }
 }

@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     admission::admit_reading(&arguments.scene, &limits, rest)?;
     let head = admission::summary_of(&arguments.scene);
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_with(&arguments.scene, bad_rows)?;
+    let scene = Scene::read_within(&arguments.scene, bad_rows, limits.left(&rest))?;
     let gaussians = &scene.gaussians;
     let size = SceneSize::of(&scene);
     let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));

@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let limits = Limits::of_machine(arguments.budget.bytes());
     admission::admit_reading(&arguments.input, &limits, rest)?;
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_with(&arguments.input, bad_rows)?;
+    let scene = Scene::read_within(&arguments.input, bad_rows, limits.left(&rest))?;
     let ignored = scene.ignored().cloned();
     limits.admit(&rendering_requirements(SceneSize::of(&scene), rest.pictures))?;
     let scene = scene.into_gaussians();

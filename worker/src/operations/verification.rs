@@ -75,7 +75,7 @@ fn read_scenes(
             ..MemoryRequirements::of_program()
         };
         admission::admit_reading(path, &engine.limits, rest)?;
-        let scene = Scene::read_with(path, views.bad_rows)?;
+        let scene = Scene::read_within(path, views.bad_rows, engine.limits.left(&rest))?;
         ignored.extend(scene.ignored().cloned());
         let gaussians = scene.into_gaussians();
         let before = logits.len();

@@ -79,7 +79,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         ..MemoryRequirements::of_program()
     };
     admission::admit_marking(job.input, &engine.limits, rest)?;
-    let scene = Scene::read_with(job.input, job.bad_rows)?;
+    let scene = Scene::read_within(job.input, job.bad_rows, engine.limits.left(&rest))?;
     stop.check()?;
     let memory = admit(engine, &scene, settings)?;
     let aside = reserve(job, &scene)?;

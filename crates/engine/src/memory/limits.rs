@@ -51,6 +51,11 @@ impl Limits {
         })
     }
 
+    /// Bytes that are left beside `memory`.
+    pub fn left(&self, memory: &MemoryRequirements) -> u64 {
+        self.memory.saturating_sub(memory.total())
+    }
+
     /// Whether the GPU can hold `bytes` in one buffer.
     ///
     /// # Errors

@@ -60,30 +60,41 @@ fn loose(first: &[u8]) -> bool {
     first.trim_ascii_start().starts_with(b"{") && (has(b"\"means\"") || has(b"\"lodLevels\""))
 }
 
-/// Reads a SOG of `size` bytes from its first byte; `path` is for messages.
+/// Reads a SOG of `size` bytes from its first byte, with `memory` bytes for it and what is in it; `path` is for messages.
 pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
     size: u64,
     bad_rows: BadRows,
+    memory: u64,
 ) -> Result<(Gaussians, Arc<dyn Container>)> {
+    let does_not_fit = || Error::DoesNotFit {
+        path: path.into(),
+        memory,
+    };
+    if size > memory {
+        return Err(does_not_fit());
+    }
     let mut file = Vec::new();
     usize::try_from(size)
         .ok()
         .and_then(|size| file.try_reserve_exact(size).ok())
         .ok_or_else(|| bad(path, format!("{size} bytes do not fit in memory")))?;
     source.take(size).read_to_end(&mut file).map_err(Error::io(path))?;
-    let (gaussians, sog) = parse(file, bad_rows).map_err(|reason| bad(path, reason))?;
+    let mut budget = Budget::within(file.len() as u64, memory);
+    let (gaussians, sog) = parse(file, bad_rows, &mut budget).map_err(|reason| match budget.lacks_memory() {
+        true => does_not_fit(),
+        false => bad(path, reason),
+    })?;
     Ok((gaussians, Arc::new(sog)))
 }
 
-fn parse(file: Vec<u8>, bad_rows: BadRows) -> Result<(Gaussians, Sog), String> {
+fn parse(file: Vec<u8>, bad_rows: BadRows, budget: &mut Budget) -> Result<(Gaussians, Sog), String> {
     if !file.starts_with(ZIP) {
         return Err("the meta.json of an SOG without its pictures; bundle the folder into one .sog file first".into());
     }
-    let mut budget = Budget::new(file.len() as u64);
     let mut archive = Archive::open(&file)?;
-    let meta = archive.unpack("meta.json", "meta.json", MAX_META, &mut budget)?;
+    let meta = archive.unpack("meta.json", "meta.json", MAX_META, budget)?;
     let meta = meta::parse(&meta).map_err(|reason| format!("meta.json: {reason}"))?;
     let mut sieve = RowFilter::new(bad_rows);
     let mut size = None;
@@ -100,8 +111,8 @@ fn parse(file: Vec<u8>, bad_rows: BadRows) -> Result<(Gaussians, Sog), String> {
     let palette = match &meta.rest {
         None => None,
         Some(rest) => {
-            let labels = picture(Role::Labels, &rest.labels, &mut budget)?;
-            let centroids = picture(Role::Centroids, &rest.centroids, &mut budget)?;
+            let labels = picture(Role::Labels, &rest.labels, budget)?;
+            let centroids = picture(Role::Centroids, &rest.centroids, budget)?;
             Palette::decode(rest, &labels, &centroids, meta.count as usize, &mut sieve)?
         }
     };
@@ -109,16 +120,16 @@ fn parse(file: Vec<u8>, bad_rows: BadRows) -> Result<(Gaussians, Sog), String> {
     budget.spend(meta.count.saturating_mul(decode::bytes_per_gaussian(degree)))?;
     let count = meta.count as usize;
     let positions = decode::positions(
-        &picture(Role::Lower, &meta.lower, &mut budget)?,
-        &picture(Role::Upper, &meta.upper, &mut budget)?,
+        &picture(Role::Lower, &meta.lower, budget)?,
+        &picture(Role::Upper, &meta.upper, budget)?,
         &meta.ranges,
         count,
     );
-    let quats = picture(Role::Quats, &meta.quats, &mut budget)?;
+    let quats = picture(Role::Quats, &meta.quats, budget)?;
     let rotations = decode::rotations(&quats, count, &mut sieve)?;
-    let scales = picture(Role::Scales, &meta.scales, &mut budget)?;
+    let scales = picture(Role::Scales, &meta.scales, budget)?;
     let log_scales = decode::log_scales(&scales, &meta.sizes, count, &mut sieve)?;
-    let colours = picture(Role::Sh0, &meta.sh0, &mut budget)?;
+    let colours = picture(Role::Sh0, &meta.sh0, budget)?;
     let mut gaussians = Gaussians {
         positions,
         rotations,

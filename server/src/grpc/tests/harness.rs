@@ -212,6 +212,10 @@ impl Server {
         self.ledger.clone()
     }
 
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// All files of artifacts there are, staged ones too.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();

@@ -27,7 +27,7 @@ use crate::access::Scope;
 use crate::hooks::tests::{Received, Receiver, loose, poster};
 use crate::hooks::{Poster, Rules, signature};
 use crate::ledger::postgres::tests::Place;
-use crate::ledger::{Ledger, SqliteLedger};
+use crate::ledger::{Busy, Ledger, SqliteLedger};
 use crate::service::clock::now;
 use crate::service::{Limits, clock};
 use crate::tasks::deliveries::deliveries;
@@ -72,7 +72,12 @@ async fn listed(server: &Server, state: State) -> Vec<Delivery> {
 /// Sends all that is due at a time, and says how many that were.
 async fn send_due(server: &Server, poster: &Poster, now: i64) -> usize {
     let mut count = 0;
-    while let Some(sending) = server.ledger().claim_delivery(&[], LEASE, now).await.unwrap() {
+    while let Some(sending) = server
+        .ledger()
+        .claim_delivery(&Busy::default(), LEASE, now)
+        .await
+        .unwrap()
+    {
         server.api.deliver(poster, sending, now).await;
         count += 1;
     }

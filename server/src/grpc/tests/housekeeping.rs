@@ -128,3 +128,42 @@ async fn outputs_of_attempts_that_are_over_are_collected() {
     server.worker.clone().release_job(request).await.unwrap();
     soon("its removal", async || server.files().is_empty()).await;
 }
+
+/// Bytes that can't be deleted are tried again, and keep nothing else from being deleted.
+#[tokio::test]
+async fn what_cannot_be_deleted_does_not_block_the_rest() {
+    let server = Server::start().await;
+    let (ledger, folder) = (server.ledger(), server.folder().join("artifacts"));
+    let abandoned = async |created: i64| {
+        let id = uuid::Uuid::now_v7();
+        let path = crate::artifacts::ArtifactPath::upload(id);
+        let new = NewArtifact {
+            id,
+            display_name: "left.ply".into(),
+            size: 4,
+            sha256: super::harness::sha256(b"left"),
+            origin: Origin::Upload {
+                project: "default".into(),
+            },
+            secret: false,
+            evidence: false,
+            path: path.to_string(),
+        };
+        ledger.create_artifact(new, created).await.unwrap();
+        (id, folder.join(path.to_string()))
+    };
+    // As many as are tried at one go, and older than the one that can go.
+    for created in 0..100 {
+        let (_, path) = abandoned(created).await;
+        std::fs::create_dir_all(path.join("in the way")).unwrap();
+    }
+    let (id, path) = abandoned(1000).await;
+    std::fs::write(path, b"left").unwrap();
+    for _ in 0..2 {
+        server.api.collect(clock::now()).await.unwrap();
+    }
+    assert_eq!(ledger.get_any_artifact(id).await.unwrap(), None);
+    // The others are still to go.
+    let left = ledger.abandoned_artifacts(0, 200).await.unwrap();
+    assert_eq!(left.len(), 100);
+}

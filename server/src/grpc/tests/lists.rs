@@ -99,3 +99,25 @@ async fn tokens_belong_to_their_query() {
     };
     assert_eq!(invalid(server.keys.clone().list_keys(request).await), ["page_token"]);
 }
+
+/// However many lists are asked for, the queue is not walked for each.
+#[tokio::test]
+async fn lists_share_one_count_of_the_queue() {
+    let server = Server::start().await;
+    let first = server.create(key_spec(8)).await.name;
+    for _ in 0..9 {
+        server.create(key_spec(8)).await;
+    }
+    let begun = std::time::Instant::now();
+    let before = server.api.positions_counted().await;
+    for _ in 0..100 {
+        let page = list(&server, 0, "", &[]).await.unwrap();
+        assert_eq!(page.jobs.len(), 10);
+        let oldest = page.jobs.last().unwrap();
+        assert_eq!((oldest.name.as_str(), oldest.queue_position), (first.as_str(), Some(0)));
+    }
+    let counted = server.api.positions_counted().await - before;
+    // Twice a second, however long it took.
+    let most = 2 + begun.elapsed().as_millis() as u64 / 500;
+    assert!((1..=most).contains(&counted), "{counted} of at most {most}");
+}

@@ -25,7 +25,7 @@ const JOBS_VARIABLE: &str = "GUARDSPLAT_STORE_JOBS";
 /// Jobs that are under way at the same time.
 const AT_ONCE: usize = 8;
 
-fn bucket(endpoint: &Endpoint) -> ArtifactStore {
+pub fn bucket(endpoint: &Endpoint) -> ArtifactStore {
     let place = Place::parse(&format!("s3://{BUCKET}/artifacts")).unwrap();
     let abandoned = Duration::from_secs(60);
     ArtifactStore::open_at(&place, endpoint.environment(), abandoned, MAX_ARTIFACT_BYTES).unwrap()

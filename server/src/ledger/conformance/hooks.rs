@@ -5,8 +5,8 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::super::{
-    DeliveryFilter, DeliveryRow, DeliveryState, HookId, HookRow, JobId, JobKind, JobState, Ledger, LedgerError,
-    NewHook, NewJob, Sending, Topics,
+    Busy, DeliveryFilter, DeliveryRow, DeliveryState, HookId, HookRow, JobId, JobKind, JobState, Ledger, LedgerError,
+    MOST_WAITING, NewHook, NewJob, Sending, Topics,
 };
 use super::Factory;
 use super::fixture::*;
@@ -35,7 +35,7 @@ async fn deliveries(ledger: &dyn Ledger) -> Vec<DeliveryRow> {
 }
 
 async fn claim_delivery(ledger: &dyn Ledger, now: i64) -> Option<Sending> {
-    let claimed = ledger.claim_delivery(&[], LEASE, now).await;
+    let claimed = ledger.claim_delivery(&Busy::default(), LEASE, now).await;
     claimed.expect("the ledger can be claimed from")
 }
 
@@ -193,8 +193,17 @@ pub async fn a_delivery_is_sent_until_it_is_acknowledged(factory: &dyn Factory) 
     let id = ledger.create_job(new, at(0)).await.unwrap().id;
     ledger.cancel_job(id, at(1)).await.unwrap();
     assert!(claim_delivery(&*ledger, at(0)).await.is_none(), "not due yet");
-    let except = ledger.claim_delivery(&[Uuid::new_v4(), hook], LEASE, at(2)).await;
-    assert!(except.unwrap().is_none(), "the hook is busy");
+    for (busy, what) in [
+        (vec![Uuid::new_v4(), hook], vec![]),
+        (vec![], vec!["nobody".to_owned(), OURS.to_owned()]),
+    ] {
+        let busy = Busy {
+            hooks: busy,
+            projects: what,
+        };
+        let claimed = ledger.claim_delivery(&busy, LEASE, at(2)).await;
+        assert!(claimed.unwrap().is_none(), "{busy:?}");
+    }
 
     let first = claim_delivery(&*ledger, at(2)).await.expect("it is due");
     assert_eq!((first.hook.id, first.delivery.attempts), (hook, 1));
@@ -205,6 +214,16 @@ pub async fn a_delivery_is_sent_until_it_is_acknowledged(factory: &dyn Factory) 
     assert_eq!(first.asked_id, Some(asked));
     assert!(claim_delivery(&*ledger, at(3)).await.is_none(), "it is leased");
     let name = first.delivery.id;
+    // The first text is kept, whoever has another.
+    assert_eq!(first.body, None);
+    for (token, body, kept) in [
+        ("another", "no", false),
+        (&first.token, "once", true),
+        (&first.token, "twice", true),
+    ] {
+        let done = ledger.keep_delivery_body(name, token, body.as_bytes()).await;
+        assert_eq!(done.unwrap(), kept, "{body}");
+    }
     let next = Some(at(50));
     assert!(!ledger.not_delivered(name, "another", "no", next, at(4)).await.unwrap());
     assert!(
@@ -224,6 +243,7 @@ pub async fn a_delivery_is_sent_until_it_is_acknowledged(factory: &dyn Factory) 
     assert!(claim_delivery(&*ledger, at(49)).await.is_none());
     let second = claim_delivery(&*ledger, at(50)).await.expect("it is due again");
     assert_eq!((second.delivery.id, second.delivery.attempts), (name, 2));
+    assert_eq!(second.body.as_deref(), Some(&b"once"[..]));
     assert!(ledger.delivered(name, &second.token, at(51)).await.unwrap());
     let done = ledger.get_delivery(name).await.unwrap().unwrap();
     assert_eq!((done.state, done.end_time), (DeliveryState::Delivered, Some(at(51))));
@@ -368,4 +388,35 @@ pub async fn a_hook_may_go_while_its_jobs_end(factory: &dyn Factory) {
         assert_eq!(ended.await.unwrap().unwrap().state, JobState::Cancelled);
         assert_eq!(deliveries(&*one).await, []);
     }
+}
+
+/// Who floods their own hooks fills up neither the table nor the way of others.
+pub async fn a_project_has_so_many_deliveries_waiting_and_no_more(factory: &dyn Factory) {
+    let ledger = factory.open().await;
+    // Each end of a job makes a delivery for every hook; a few hooks keep the number of jobs small.
+    let hooks = 500;
+    for _ in 0..hooks {
+        hook(&*ledger, Topics::default()).await;
+    }
+    for job in 0..=MOST_WAITING / hooks {
+        over(&*ledger, at(job)).await;
+    }
+    let count = async |state| {
+        let filter = DeliveryFilter {
+            hook: None,
+            state: Some(state),
+        };
+        let all = ledger.list_deliveries(OURS, filter, None, 1 << 20).await.unwrap();
+        (all.len() as i64, all)
+    };
+    assert_eq!(count(DeliveryState::Pending).await.0, MOST_WAITING);
+    let (dead, all) = count(DeliveryState::Dead).await;
+    assert_eq!(dead, hooks);
+    assert!(
+        all.iter()
+            .all(|row| row.last_error.contains("10000") && row.end_time.is_some())
+    );
+    // They can still be asked for.
+    let again = ledger.redeliver(all[0].id, at(100)).await.unwrap();
+    assert_eq!(again.state, DeliveryState::Pending);
 }

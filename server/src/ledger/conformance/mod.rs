@@ -7,6 +7,7 @@ mod attempts;
 mod cancelling;
 mod fencing;
 pub(crate) mod fixture;
+mod generation;
 mod hooks;
 pub mod model;
 mod operations;
@@ -26,6 +27,7 @@ pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
+pub(crate) use generation::*;
 pub(crate) use hooks::*;
 pub(crate) use operations::*;
 pub(crate) use outputs::*;
@@ -127,6 +129,7 @@ macro_rules! conformance_suite {
             what_is_queued_once_more_needs_its_inputs
             jobs_are_counted_by_kind_state_and_reason
             a_job_keeps_the_trace_it_is_a_part_of
+            a_generation_follows_another
             a_hook_is_kept_listed_and_deleted
             every_end_of_a_job_makes_one_delivery
             a_hook_is_told_of_what_it_wants_only
@@ -136,6 +139,7 @@ macro_rules! conformance_suite {
             servers_never_share_a_delivery
             deliveries_come_in_pages_and_are_forgotten
             a_hook_may_go_while_its_jobs_end
+            a_project_has_so_many_deliveries_waiting_and_no_more
             nothing_goes_by_itself
             uploads_go_when_they_were_not_used_for_long
             jobs_go_with_what_they_made

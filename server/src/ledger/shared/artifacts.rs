@@ -31,12 +31,20 @@ impl ArtifactLedger for DbLedger {
         self.read(with!([] db => is_being_read(db, artifact))).await
     }
 
+    async fn is_original(&self, artifact: ArtifactId) -> Result<bool> {
+        self.read(with!([] db => is_original(db, artifact))).await
+    }
+
     async fn delete_artifact(&self, id: ArtifactId, now: i64) -> Result<()> {
         self.change(with!([] db => delete(db, id, now))).await
     }
 
     async fn abandoned_artifacts(&self, older_than: i64, limit: u32) -> Result<Vec<ArtifactRow>> {
         self.change(with!([] db => abandoned(db, older_than, limit))).await
+    }
+
+    async fn put_off_artifact(&self, id: ArtifactId, now: i64) -> Result<()> {
+        self.change(with!([] db => put_off(db, id, now))).await
     }
 
     async fn forget_artifact(&self, id: ArtifactId) -> Result<()> {
@@ -193,9 +201,15 @@ pub(super) async fn abandoned(db: &mut DbConnection, older_than: i64, limit: u32
     .bind(i64::from(limit))
     .execute(&mut *db)
     .await?;
-    let deleted = sqlx::query("SELECT * FROM artifacts WHERE state = 4 ORDER BY create_time LIMIT $1");
+    let deleted = sqlx::query("SELECT * FROM artifacts WHERE state = 4 ORDER BY update_time, id LIMIT $1");
     let deleted = deleted.bind(i64::from(limit)).fetch_all(db).await?;
     deleted.iter().map(rows::artifact).collect()
+}
+
+async fn put_off(db: &mut DbConnection, id: ArtifactId, now: i64) -> Result<()> {
+    let query = sqlx::query("UPDATE artifacts SET update_time = $2 WHERE id = $1 AND state = 4");
+    query.bind(id).bind(now).execute(db).await?;
+    Ok(())
 }
 
 pub(super) async fn forget(db: &mut DbConnection, id: ArtifactId) -> Result<()> {
@@ -208,5 +222,10 @@ async fn is_being_read(db: &mut DbConnection, artifact: ArtifactId) -> Result<bo
     let query = sqlx::query(
         "SELECT 1 FROM job_inputs i JOIN jobs j ON j.id = i.job_id WHERE i.artifact_id = $1 AND j.state = 2 LIMIT 1",
     );
+    Ok(query.bind(artifact).fetch_optional(db).await?.is_some())
+}
+
+async fn is_original(db: &mut DbConnection, artifact: ArtifactId) -> Result<bool> {
+    let query = sqlx::query("SELECT 1 FROM assets WHERE artifact_id = $1 LIMIT 1");
     Ok(query.bind(artifact).fetch_optional(db).await?.is_some())
 }

@@ -5,8 +5,8 @@ use sqlx::Row;
 use uuid::Uuid;
 
 use super::super::hooks::{
-    DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
-    kind_bit, state_bit,
+    Busy, DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, MOST_WAITING, NewHook,
+    Sending, Topics, kind_bit, state_bit,
 };
 use super::super::types::JobRow;
 use super::super::{LedgerError, Result, discriminants, token};
@@ -25,6 +25,13 @@ pub(super) const OF_PROJECT: &str = "SELECT * FROM deliveries \
 pub(super) const OF_HOOK: &str = "SELECT * FROM deliveries \
     WHERE hook_id = $4 AND ($5 IS NULL OR state = $5) AND (create_time, id) < ($1, $2) \
     ORDER BY create_time DESC, id DESC LIMIT $3";
+
+/// How many of a project's wait; no more are counted than there may be.
+pub(super) const WAITING: &str =
+    "SELECT count(*) FROM (SELECT 1 FROM deliveries WHERE project = $1 AND state = 1 LIMIT $2) AS waiting";
+
+/// Why a delivery was never tried.
+const TOO_MANY: &str = "never sent: 10000 others of the project were waiting";
 
 #[async_trait::async_trait]
 impl HookLedger for DbLedger {
@@ -66,8 +73,14 @@ impl HookLedger for DbLedger {
         self.change(with!([] db => redeliver(db, id, now))).await
     }
 
-    async fn claim_delivery(&self, except: &[HookId], lease: Duration, now: i64) -> Result<Option<Sending>> {
-        deliveries::claim(self, except, lease, now).await
+    async fn claim_delivery(&self, busy: &Busy, lease: Duration, now: i64) -> Result<Option<Sending>> {
+        deliveries::claim(self, busy, lease, now).await
+    }
+
+    async fn keep_delivery_body(&self, id: DeliveryId, token: &str, body: &[u8]) -> Result<bool> {
+        let (token, body) = (token::hash(token), body.to_vec());
+        self.change(with!([token, body] db => keep_body(db, id, &token, &body)))
+            .await
     }
 
     async fn delivered(&self, id: DeliveryId, token: &str, now: i64) -> Result<bool> {
@@ -106,10 +119,19 @@ pub(super) async fn announce(db: &mut DbConnection, job: &JobRow, now: i64) -> R
         .bind(state_bit(job.state))
         .fetch_all(&mut *db)
         .await?;
+    if wanting.is_empty() {
+        return Ok(());
+    }
+    let waiting: i64 = sqlx::query_scalar(WAITING)
+        .bind(&job.project)
+        .bind(MOST_WAITING)
+        .fetch_one(&mut *db)
+        .await?;
+    let full = waiting >= MOST_WAITING;
     for hook in wanting {
         let insert = sqlx::query(
-            "INSERT INTO deliveries (id, hook_id, project, job_id, job_state, create_time, since, next_time) \
-             VALUES ($1, $2, $3, $4, $5, $6, $6, $6)",
+            "INSERT INTO deliveries (id, hook_id, project, job_id, job_state, create_time, since, next_time, state, \
+             last_error, end_time) VALUES ($1, $2, $3, $4, $5, $6, $6, $6, $7, $8, $9)",
         );
         insert
             .bind(Uuid::now_v7())
@@ -118,10 +140,24 @@ pub(super) async fn announce(db: &mut DbConnection, job: &JobRow, now: i64) -> R
             .bind(job.id)
             .bind(job.state as i32)
             .bind(now)
+            .bind(if full {
+                DeliveryState::Dead
+            } else {
+                DeliveryState::Pending
+            } as i32)
+            .bind(if full { TOO_MANY } else { "" })
+            .bind(full.then_some(now))
             .execute(&mut *db)
             .await?;
     }
     Ok(())
+}
+
+/// Keeps what is sent, if nothing was kept before.
+async fn keep_body(db: &mut DbConnection, id: DeliveryId, token: &[u8], body: &[u8]) -> Result<bool> {
+    let update = sqlx::query("UPDATE deliveries SET body = coalesce(body, $3) WHERE id = $1 AND lease_token = $2");
+    let update = update.bind(id).bind(token).bind(body);
+    Ok(update.execute(db).await?.rows_affected() > 0)
 }
 
 async fn create(db: &mut DbConnection, new: &NewHook, now: i64) -> Result<HookRow> {
@@ -287,6 +323,7 @@ pub(super) async fn sending(db: &mut DbConnection, row: &DbRow, token: String) -
         hook,
         job: job.as_ref().map(rows::job).transpose()?,
         asked_id,
+        body: row.try_get("body")?,
         token,
     })
 }

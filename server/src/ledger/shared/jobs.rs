@@ -1,6 +1,4 @@
 //! Jobs as their owners see them: made, looked at, listed, cancelled.
-use std::collections::HashMap;
-
 use sqlx::{Connection as _, Row};
 use uuid::Uuid;
 
@@ -172,20 +170,8 @@ pub(super) async fn list(
     }
     jobs.sort_by_key(|job| std::cmp::Reverse((job.create_time, job.id)));
     jobs.truncate(usize::try_from(limit).unwrap_or(usize::MAX));
-    if jobs.iter().any(|job| job.state == JobState::Queued) {
-        let positions = positions(&mut db).await?;
-        for job in &mut jobs {
-            job.queue_position = positions.get(&job.id).copied();
-        }
-    }
     db.commit().await?;
     Ok(jobs)
-}
-
-/// The whole queue, read once: counting for each job of a page would read it for each.
-async fn positions(db: &mut DbConnection) -> Result<HashMap<JobId, i64>> {
-    let queue = queue::all(db).await?;
-    Ok((0..).zip(queue).map(|(ahead, id)| (id, ahead)).collect())
 }
 
 pub(super) async fn cancel(db: &mut DbConnection, id: JobId, now: i64) -> Result<JobRow> {

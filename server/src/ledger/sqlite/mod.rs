@@ -67,6 +67,8 @@ mod writer;
 mod artifacts;
 #[path = "../shared/commitments.rs"]
 mod commitments;
+#[path = "../shared/generation.rs"]
+mod generation;
 #[path = "../shared/hooks.rs"]
 mod hooks;
 #[path = "../shared/jobs.rs"]

@@ -1,6 +1,7 @@
 //! Small files that ask for much memory get none.
 use super::round_trips::find;
 use super::*;
+use crate::BadRows;
 
 /// A lossless picture of one colour, which takes next to no bytes.
 fn flat(width: u32, height: u32, texel: [u8; 4]) -> Vec<u8> {
@@ -123,4 +124,28 @@ fn zip64_is_refused() {
     locator.resize(20, 0);
     bytes.splice(end..end, locator);
     assert_eq!(refused(&bytes), "a ZIP64; a SOG is a ZIP without that extension");
+}
+
+/// What a job may take is no more than its machine has for it, whatever a file of that size may ask for.
+#[test]
+fn no_more_memory_is_taken_than_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("equal.sog");
+    let bytes = equal(100, 50, 5000);
+    std::fs::write(&path, &bytes).unwrap();
+    let within = |memory| Scene::read_within(&path, BadRows::Refuse, memory);
+    let size = bytes.len() as u64;
+    // Five pictures of the Gaussians, the palette's two, and 23 numbers a Gaussian of one band.
+    let enough = size + (1 << 20);
+    assert_eq!(within(enough).unwrap().gaussians.len(), 5000);
+    // Of the file itself, of its pictures, and of its numbers.
+    for memory in [0, size - 1, size, size + 20_000, size + 300_000] {
+        match within(memory) {
+            Err(Error::DoesNotFit { memory: told, .. }) => assert_eq!(told, memory),
+            other => panic!("{memory}: {:?}", other.map(|scene| scene.gaussians.len())),
+        }
+    }
+    // What no machine would be allowed to unpack is the file's fault.
+    std::fs::write(&path, equal(16000, 16000, 256_000_000)).unwrap();
+    assert!(matches!(within(8 << 30), Err(Error::BadScene { .. })));
 }

@@ -125,7 +125,11 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (statistics::USAGE, "artifacts_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
         (hooks::HOOKS, "hooks_by_project", page),
-        (deliveries::CLAIM, "deliveries_due", "bigint, uuid[], bytea, bigint"),
+        (
+            deliveries::CLAIM,
+            "deliveries_due",
+            "bigint, uuid[], bytea, bigint, text[]",
+        ),
         (
             hooks::OF_PROJECT,
             "deliveries_by_project",
