@@ -54,6 +54,7 @@ done
 stage formatting cargo fmt --all --check
 stage protos bash deploy/check-api.sh
 stage queries check_queries
+stage dependencies bash deploy/check-dependencies.sh
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests

@@ -264,11 +264,15 @@ fn limits(settings: &Settings) -> Limits {
         max_queued: settings.max_queued_jobs,
         max_priority: settings.max_priority,
         max_job_memory: settings.max_job_memory(),
+        max_job_gigapixels: settings.max_job_gigapixels,
+        progress_stall: Duration::from_secs(settings.progress_stall_seconds),
         upload_idle: settings.upload_timeout(),
         watch_stall: settings.watch_stall(),
         max_watches: settings.max_watches_per_caller,
         false_positive_rate: settings.false_positive_rate,
         max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),
+        // Without tokens there is one project, whose the whole queue is.
+        fair_shares: settings.access == Access::Tokens,
         max_bytes_of_project: Some(settings.max_artifact_bytes_per_project).filter(|&limit| limit > 0),
         rates: Rates {
             submissions: settings.max_submissions_per_minute,

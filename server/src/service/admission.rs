@@ -20,14 +20,20 @@ impl Service {
     pub(crate) async fn admit(&self, project: &str, submission: &Submission) -> Result<ResourceRequirements> {
         let limits = self.limits();
         let limit = limits.max_queued;
-        let full = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0) >= limit;
+        let depth = u64::try_from(self.ledger().queue_depth().await?).unwrap_or(0);
+        let full = depth >= limit;
+        // With a queue that is not half full nobody can have more than is left.
+        let shared = limits.fair_shares && depth.saturating_mul(2) > limit;
         let quotas = [limits.max_queued_of_project, limits.max_bytes_of_project];
-        let unlimited = !full && limits.max_job_memory.is_none() && quotas == [None, None];
+        let unlimited = !full && !shared && limits.max_job_memory.is_none() && quotas == [None, None];
         if !unlimited {
             if self.is_known(project, submission).await? {
                 return Ok(ResourceRequirements::default());
             }
             self.room_for_job(project, submission.spec.kind()).await?;
+            if shared && !full {
+                self.room_beside_others(project, limit - depth).await?;
+            }
         }
         if full {
             return Err(Error::QueueFull {

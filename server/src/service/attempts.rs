@@ -32,6 +32,9 @@ impl Service {
             return Ok(job.cancel_requested);
         };
         let changed = progress.is_some();
+        if !changed {
+            self.end_if_stalled(id, &token).await?;
+        }
         let cancel_requested = self.ledger().report(id, &token, progress, lease, clock::now()).await?;
         self.progress_throttle().written(id, &token, now);
         self.heard(id, stage);
@@ -39,6 +42,26 @@ impl Service {
             self.changes().job(id);
         }
         Ok(cancel_requested)
+    }
+
+    /// Ends the attempt of a worker that reports, and whose engine does nothing.
+    async fn end_if_stalled(&self, id: ledger::JobId, token: &str) -> Result<()> {
+        let job = self.ledger().leased_job(id, token).await?;
+        let (stall, now) = (self.limits().progress_stall, clock::now());
+        // It moves with every progress that is new, and when the attempt begins.
+        if now.saturating_sub(job.update_time) < clock::micros(stall) {
+            return Ok(());
+        }
+        let failure = ledger::Failure {
+            reason: FailureReason::WorkerLost,
+            message: format!("no progress for {} s, though the worker reported", stall.as_secs_f32()),
+        };
+        tracing::warn!(job = %id, "an attempt makes no progress, and is ended");
+        let ended = self.ledger().fail(id, token, Some(failure), true, false, now).await?;
+        self.attempt_over(&ended);
+        Err(Error::LeaseLost {
+            name: ResourceKind::Job.name(id),
+        })
     }
 
     /// Tells those who wait that an attempt has ended, however it did: the job may be queued again.

@@ -8,7 +8,9 @@ use crate::error::{Error, Result};
 use crate::ledger::{JobKind, NewJob};
 use crate::service::rate_limit::{Class, payer};
 use crate::service::submission::{self, Submission};
-use crate::service::{Service, clock, fingerprint, keys, message, operations, ownership, page, to_proto};
+use crate::service::{
+    Service, clock, fingerprint, keys, message, operations, ownership, page, predicted_cost, to_proto,
+};
 
 /// A page ends early rather than come near the largest message that clients read by default.
 const MAX_PAGE_BYTES: usize = 2 << 20;
@@ -37,6 +39,7 @@ impl Service {
     ) -> Result<Job> {
         let submission = submission::check(request)?;
         caller.must(ownership::scope_of(submission.spec.kind()))?;
+        predicted_cost::check(&submission.spec, self.limits().max_job_gigapixels)?;
         let project = caller.project.as_str();
         let mut clip = None;
         if let Some(id) = submission.key {

@@ -33,6 +33,7 @@ pub(crate) mod operations;
 pub(crate) mod ownership;
 pub(crate) mod page;
 pub mod placement;
+pub(crate) mod predicted_cost;
 pub(crate) mod progress;
 pub(crate) mod queue_positions;
 pub(crate) mod quota;
@@ -61,6 +62,10 @@ pub struct Limits {
     pub max_priority: i32,
     /// Bytes of memory that a job may take; one whose scene takes more is refused. `None` leaves that to the workers.
     pub max_job_memory: Option<u64>,
+    /// Billions of pixels of views that a job may draw; 0 for no limit.
+    pub max_job_gigapixels: u64,
+    /// An attempt that makes no progress for so long is ended, though its worker lives.
+    pub progress_stall: Duration,
     /// An upload of which nothing arrives for so long is broken off.
     pub upload_idle: Duration,
     /// A watch whose reader takes nothing for so long is let go.
@@ -71,6 +76,8 @@ pub struct Limits {
     pub false_positive_rate: f64,
     /// Jobs of one project that may wait; none for no limit but that of all.
     pub max_queued_of_project: Option<u64>,
+    /// Whether a project may have no more jobs waiting than there is room left for others.
+    pub fair_shares: bool,
     /// Bytes of artifacts that one project may have; none for no limit.
     pub max_bytes_of_project: Option<u64>,
     /// How often a caller may call.
@@ -94,11 +101,14 @@ impl Default for Limits {
             max_queued: 10_000,
             max_priority: *PRIORITIES.end(),
             max_job_memory: None,
+            max_job_gigapixels: 16,
+            progress_stall: Duration::from_secs(30 * 60),
             upload_idle: Duration::from_secs(60),
             watch_stall: Duration::from_secs(60),
             max_watches: 1_000,
             false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
             max_queued_of_project: None,
+            fair_shares: false,
             max_bytes_of_project: None,
             rates: rate_limit::Rates::default(),
             abandoned_after: Duration::from_secs(24 * 60 * 60),

@@ -18,6 +18,17 @@ impl Service {
         }
     }
 
+    /// Refuses a job of a project that has more of the queue than the `left` that is free for everybody, so that one
+    /// project can't fill the queue alone: thresholds of Choudhury and Hahne (1998), "Dynamic queue length thresholds for
+    /// shared-memory packet switches", with a factor of 1.
+    pub(crate) async fn room_beside_others(&self, project: &str, left: u64) -> Result<()> {
+        let own = self.ledger().usage(project).await?.queued_jobs;
+        match own >= left {
+            true => Err(used_up("queued jobs, a fair share of the queue", project, own)),
+            false => Ok(()),
+        }
+    }
+
     /// Refuses bytes that would take a project over what it may have.
     pub(crate) async fn room_for_bytes(&self, project: &str, bytes: u64) -> Result<()> {
         let Some(limit) = self.limits().max_bytes_of_project else {

@@ -93,9 +93,15 @@ pub struct Flags {
     /// Most mebibytes of memory that a job may take; 0 is no limit but the workers' machines [default: 0]
     #[arg(long, value_name = "MEBIBYTES")]
     pub max_job_memory_mebibytes: Option<u64>,
+    /// Most billions of pixels of views that a job may draw; 0 is no limit [default: 16]
+    #[arg(long, value_name = "GIGAPIXELS")]
+    pub max_job_gigapixels: Option<u64>,
     /// Seconds until a worker that says nothing is given up [default: 30]
     #[arg(long, value_name = "SECONDS")]
     pub lease_seconds: Option<u64>,
+    /// Seconds until an attempt without progress is ended, though its worker lives [default: 1800]
+    #[arg(long, value_name = "SECONDS")]
+    pub progress_stall_seconds: Option<u64>,
     /// How often a job is tried [default: 3]
     #[arg(long, value_name = "TIMES")]
     pub max_attempts: Option<u32>,
@@ -184,7 +190,9 @@ impl Flags {
             max_calls_per_minute,
             max_priority,
             max_job_memory_mebibytes,
+            max_job_gigapixels,
             lease_seconds,
+            progress_stall_seconds,
             max_attempts,
             upload_timeout_seconds,
             watch_stall_seconds,
@@ -229,7 +237,9 @@ impl Flags {
         set(&mut settings.max_calls_per_minute, max_calls_per_minute);
         set(&mut settings.max_priority, max_priority);
         set(&mut settings.max_job_memory_mebibytes, max_job_memory_mebibytes);
+        set(&mut settings.max_job_gigapixels, max_job_gigapixels);
         set(&mut settings.lease_seconds, lease_seconds);
+        set(&mut settings.progress_stall_seconds, progress_stall_seconds);
         set(&mut settings.max_attempts, max_attempts);
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
         set(&mut settings.watch_stall_seconds, watch_stall_seconds);

@@ -64,8 +64,12 @@ pub struct Settings {
     pub max_priority: i32,
     /// Most mebibytes of memory that a job may take; 0 for no limit but the workers' machines.
     pub max_job_memory_mebibytes: u64,
+    /// Most billions of pixels of views that a job may draw; 0 for no limit.
+    pub max_job_gigapixels: u64,
     /// Seconds until a worker that says nothing is given up.
     pub lease_seconds: u64,
+    /// Seconds until an attempt without progress is ended, though its worker lives.
+    pub progress_stall_seconds: u64,
     /// How often a job is tried.
     pub max_attempts: u32,
     /// Seconds that an upload may pause.
@@ -177,7 +181,9 @@ impl Default for Settings {
             max_calls_per_minute: 60_000,
             max_priority: 10,
             max_job_memory_mebibytes: 0,
+            max_job_gigapixels: 16,
             lease_seconds: 30,
+            progress_stall_seconds: 30 * 60,
             max_attempts: 3,
             upload_timeout_seconds: 60,
             watch_stall_seconds: 60,

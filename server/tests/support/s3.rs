@@ -131,10 +131,11 @@ impl Endpoint {
         self.serving.abort();
     }
 
-    /// All objects of the bucket, as files.
+    /// All objects of the bucket, as files; without what says whose they are.
     pub fn objects(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
         walk(&self.folder.path().join(BUCKET), &mut found);
+        found.retain(|path| !path.ends_with("generation") && !path.ends_with("contested"));
         found
     }
 

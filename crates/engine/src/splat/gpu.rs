@@ -98,6 +98,7 @@ impl GpuRasterizer {
 }
 
 /// A kernel argument: `len` elements of `handle`.
+#[allow(unsafe_code)]
 fn argument(handle: &Handle, len: usize) -> BufferArg {
     // SAFETY: every caller passes the number of elements that the buffer was made with, and the kernels stay within it.
     unsafe { BufferArg::from_raw_parts(handle.clone(), len) }

@@ -216,10 +216,12 @@ impl Server {
         self.folder.path()
     }
 
-    /// All files of artifacts there are, staged ones too.
+    /// All files of artifacts there are, staged ones too; without what says whose the folder is.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
-        walk(&self.folder.path().join("artifacts"), &mut found);
+        let folder = self.folder.path().join("artifacts");
+        walk(&folder, &mut found);
+        found.retain(|path| path.parent() != Some(&folder));
         found
     }
 

@@ -90,8 +90,8 @@ async fn a_message_stays_the_same_when_its_artifacts_go() {
     })
     .await;
     let receiver = Receiver::start().await;
-    hook(&server, "", format!("http://{}/", receiver.address)).await;
     let key = server.key(64, b"the key file").await;
+    hook(&server, "", format!("http://{}/", receiver.address)).await;
     let scene = server.upload("scene.ply", b"a scene").await.name;
     let spec = EmbedSpec {
         scene,
@@ -120,7 +120,6 @@ async fn a_message_stays_the_same_when_its_artifacts_go() {
             .deliver(&poster, due.unwrap().expect("it is due"), time)
             .await;
     };
-    // Of the key's job, which came first, nothing is told: there was a hook only later.
     receiver.answer(&[500, 500]);
     send(now()).await;
     let delete = DeleteArtifactRequest { name: marked };

@@ -468,7 +468,7 @@ impl Server {
     }
 
     /// Has a worker make the key that a job is to make.
-    async fn finish_key(&self, job: &str, bits: u32, worker: &str) -> String {
+    pub async fn finish_key(&self, job: &str, bits: u32, worker: &str) -> String {
         // Jobs of other projects wait too; they go back when this is done.
         let mut others = Vec::new();
         let lease_token = loop {

@@ -168,6 +168,7 @@ async fn a_file_of_the_first_version_is_taken_along() {
         "DROP TABLE owners",
         "DROP TABLE signing_keys",
         "DROP TABLE deliveries",
+        "DROP TABLE store_generation",
         "DROP TABLE hooks",
         "ALTER TABLE jobs DROP COLUMN asked_id",
         "ALTER TABLE keys DROP COLUMN state",
