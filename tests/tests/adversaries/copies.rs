@@ -1,4 +1,4 @@
-//! What adversaries do to marks, with the outcome, also where they win: docs/security.md tells of it.
+//! Attacks with copies alone: marked again, averaged, moved to other Gaussians, claimed after they were read.
 use std::sync::LazyLock;
 
 use guardsplat_tests::ply::Ply;
