@@ -130,6 +130,7 @@ fn run(engine: &Engine, input: &Path, output: &Path, settings: &Settings, force:
         output,
         message: &message(),
         settings,
+        cameras: &[],
         force,
         bad_rows: BadRows::Refuse,
     };
@@ -160,7 +161,7 @@ fn the_loss_falls_on_training_views() {
         shift: 0.0,
     };
     let (mut losses, mut accuracies) = (Vec::new(), Vec::new());
-    let done = optimise(&engine, &scene, &message(), &settings, &mut |progress| {
+    let done = optimise(&engine, &scene, &message(), &settings, &[], &mut |progress| {
         if let Progress::Step(step) = progress {
             losses.push(step.terms.message);
             accuracies.push(step.bit_accuracy);
@@ -190,7 +191,16 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     assert!(outcome.changed > 100 && outcome.changed <= outcome.gaussians);
     // What was verified is what anyone reads from the file.
     let scene = Scene::read(&at("a.ply")).unwrap().gaussians;
-    let reading = read_scene(&engine, &scene, 4, 32, [1.0; 3], 3, |_, _| Ok(())).unwrap();
+    let reading = read_scene(
+        &engine,
+        &scene,
+        &ViewSampler::new(&scene, 3).unwrap(),
+        4,
+        32,
+        [1.0; 3],
+        |_, _| Ok(()),
+    )
+    .unwrap();
     let found = &outcome.verification;
     assert_eq!(
         reading.compare(&message(), &engine.acceptance_rule(1)).unwrap(),
@@ -236,7 +246,7 @@ fn gaussians_that_no_view_sees_keep_their_colours() {
     let original = scene.sh.clone();
     let stride = original.per_gaussian();
     let scene = Scene::from_gaussians(scene);
-    let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
+    let done = optimise(&engine, &scene, &message(), &settings(), &[], &mut |_| {}).unwrap();
     let learnable = &done.learned.learnable;
     assert!(learnable.rows().len() > 100 && learnable.rows().len() <= 597);
     // They take no memory either.
@@ -255,13 +265,13 @@ fn gaussians_that_no_view_sees_keep_their_colours() {
 fn scenes_without_view_dependence_and_without_anything_to_see() {
     let engine = engine();
     let scene = sample(300, 0, 7).unwrap();
-    let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
+    let done = optimise(&engine, &scene, &message(), &settings(), &[], &mut |_| {}).unwrap();
     assert!(done.learned.values.iter().any(|o| *o != 0.0));
     // Nothing visible: nothing to learn, and no NaN from it.
     let mut scene = scene.gaussians;
     scene.opacity_logits.fill(f32::NEG_INFINITY);
     let scene = Scene::from_gaussians(scene);
-    let done = optimise(&engine, &scene, &message(), &settings(), &mut |_| {}).unwrap();
+    let done = optimise(&engine, &scene, &message(), &settings(), &[], &mut |_| {}).unwrap();
     assert!(done.learned.values.is_empty());
     // Nothing at all.
     let empty = optimise(
@@ -269,6 +279,7 @@ fn scenes_without_view_dependence_and_without_anything_to_see() {
         &Scene::from_gaussians(Gaussians::default()),
         &message(),
         &settings(),
+        &[],
         &mut |_| {},
     );
     assert!(empty.is_err());
@@ -350,7 +361,7 @@ fn a_held_out_margin_that_holds_ends_the_run() {
         ..settings()
     };
     let mut told = Vec::new();
-    let done = optimise(&engine, &scene, &message(), &settings, &mut |p| told.push(p)).unwrap();
+    let done = optimise(&engine, &scene, &message(), &settings, &[], &mut |p| told.push(p)).unwrap();
     // Checks at 2, 4 and 6 hold; 6 is the first past the least number of steps.
     assert_eq!((done.steps, done.view_steps), (6, 24));
     assert_eq!(told.last(), Some(&Progress::Stopped { step: 6 }));
@@ -363,7 +374,7 @@ fn what_does_not_fit_together_is_refused() {
     let (engine, scene) = (engine(), Scene::from_gaussians(small_scene()));
     let long = Message::parse("5c5c", 16).unwrap();
     let refused = |message: &Message, settings: &Settings| {
-        let result = optimise(&engine, &scene, message, settings, &mut |_| {});
+        let result = optimise(&engine, &scene, message, settings, &[], &mut |_| {});
         result.unwrap_err().to_string()
     };
     assert!(refused(&long, &settings()).contains("16 bits, but the key has 8"));

@@ -83,7 +83,10 @@ impl Attacked {
     /// Reads a scene as a claim does that costs one hypothesis, and compares what it looks like.
     pub fn left(&self, scene: &Gaussians) -> Left {
         let size = default_size(&self.engine);
-        let read = read_scene(&self.engine, scene, DEFAULT_VIEWS, size, WHITE, 0, |_, _| Ok(())).unwrap();
+        let read = {
+            let sampler = ViewSampler::new(scene, 0).unwrap();
+            read_scene(&self.engine, scene, &sampler, DEFAULT_VIEWS, size, WHITE, |_, _| Ok(())).unwrap()
+        };
         let decision = read
             .compare(&self.message, &self.engine.acceptance_rule(1))
             .unwrap()

@@ -55,6 +55,10 @@ pub struct Arguments {
     /// Trains on views on a circle at this elevation in degrees, as the paper's public code does, instead of over the sphere
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     ring: Option<f32>,
+    /// Where the scene's viewers are, from a file (cameras.json or transforms.json): training views are around and between
+    /// these, and every eighth is held out. Unless given, views are around the scene
+    #[arg(long, value_name = "FILE", conflicts_with = "ring")]
+    cameras: Option<PathBuf>,
     /// Side of training views and of those of the verification, in pixels
     #[arg(long, value_name = "PX")]
     size: Option<u32>,
@@ -123,11 +127,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if settings.lambda.lpips > 0.0 && !engine.has_lpips() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
     }
+    let cameras = super::cameras(arguments.cameras.as_deref())?;
     let job = Job {
         input: &arguments.input,
         output: &arguments.output,
         message: &message,
         settings: &settings,
+        cameras: &cameras,
         force: arguments.force,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };

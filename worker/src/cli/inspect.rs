@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if !gaussians.is_empty() {
         extent = Some(Extent::of(gaussians)?);
         let settings = Preset::Standard.settings();
-        let view = measure_view_on_cpu(gaussians, &settings)?;
+        let view = measure_view_on_cpu(gaussians, &settings, &[])?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
         let clip = 4 * clip.parameters() as u64;
         let models = ModelBytes {

@@ -42,6 +42,9 @@ pub struct Arguments {
     /// What is behind a scene, or shows through transparent pixels
     #[arg(long, value_enum, default_value = "white")]
     background: Background,
+    /// Where a scene's viewers are, from a file (cameras.json or transforms.json), as `embed` was told; around it unless given
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<PathBuf>,
     /// Decides the views of a scene
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -88,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         size: arguments.size,
         background: arguments.background.rgb(),
         seed: arguments.seed,
+        cameras: super::cameras(arguments.cameras.as_deref())?,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
     let mut display = Display::new("reading");

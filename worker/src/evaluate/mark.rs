@@ -53,7 +53,7 @@ impl Marking<'_> {
         }
         let stopwatch = self.machine.stopwatch();
         let mut made_after = None;
-        let optimised = optimise(self.engine, self.scene, self.message, self.settings, &mut |p| {
+        let optimised = optimise(self.engine, self.scene, self.message, self.settings, &[], &mut |p| {
             if let Progress::Check(check) = p
                 && check.bit_accuracy >= MADE
             {
@@ -115,7 +115,7 @@ impl Marking<'_> {
             early_stop: None,
             ..*self.settings
         };
-        optimise(self.engine, self.scene, self.message, &settings, &mut |_| {})?;
+        optimise(self.engine, self.scene, self.message, &settings, &[], &mut |_| {})?;
         Ok(())
     }
 }

@@ -81,6 +81,7 @@ pub fn views(spec: &api::VerifySpec) -> Result<Views> {
         size: within("size", spec.size, 16, 4096)?,
         background: WHITE,
         seed: spec.seed,
+        cameras: Vec::new(),
         bad_rows: BadRows::ignored_if(spec.ignore_bad_rows),
     })
 }

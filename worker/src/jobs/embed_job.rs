@@ -56,6 +56,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
             output: &output,
             message: &message,
             settings: &settings,
+            cameras: &[],
             force,
             bad_rows,
         };

@@ -8,6 +8,7 @@ use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
+use guardsplat_engine::view::{Camera, ViewSampler};
 use serde::Serialize;
 
 use super::thumbnails::Thumbnails;
@@ -25,6 +26,8 @@ pub struct Views {
     pub background: [f32; 3],
     /// Decides them.
     pub seed: u64,
+    /// Where the scene's viewers are; around it where none are given.
+    pub cameras: Vec<Camera>,
     /// What becomes of rows of the scene with values that are not legal.
     pub bad_rows: BadRows,
 }
@@ -83,8 +86,8 @@ fn read_scenes(
             progress(before + done, total);
             shown.see("view", before + done - 1, picture)
         };
-        let (background, seed) = (views.background, views.seed);
-        let reading = read_scene(engine, &gaussians, views.count, size, background, seed, seen)?;
+        let sampler = ViewSampler::among(&gaussians, views.seed, &views.cameras)?;
+        let reading = read_scene(engine, &gaussians, &sampler, views.count, size, views.background, seen)?;
         logits.extend(reading.views);
     }
     Ok((logits, ignored))

@@ -14,6 +14,7 @@ use crate::extract::Engine;
 use crate::memory::{MemoryRequirements, SceneSize, admission};
 use crate::message::Message;
 use crate::scene::{BadRows, Format, Gaussians, Ignored, Scene};
+use crate::view::Camera;
 
 /// Times that a mark is made weaker where held-out views show it more than they may. Once is enough where the file keeps
 /// changes as they are; where it rounds them, what is left is not as much less as was asked for.
@@ -29,6 +30,8 @@ pub struct Job<'a> {
     pub message: &'a Message,
     /// How.
     pub settings: &'a Settings,
+    /// Where its viewers are; around the scene where none are given.
+    pub cameras: &'a [Camera],
     /// Writes a scene that misses its target all the same.
     pub force: bool,
     /// What becomes of rows with values that are not legal; ignored ones are in the output as they were.
@@ -81,10 +84,10 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     admission::admit_marking(job.input, &engine.limits, rest)?;
     let scene = Scene::read_within(job.input, job.bad_rows, engine.limits.left(&rest))?;
     stop.check()?;
-    let memory = admit(engine, &scene, settings)?;
+    let memory = admit(engine, &scene, settings, job.cameras)?;
     let aside = reserve(job, &scene)?;
     progress(Progress::Admitted(memory));
-    let mut optimised = optimise(engine, &scene, job.message, settings, progress)?;
+    let mut optimised = optimise(engine, &scene, job.message, settings, job.cameras, progress)?;
     let (mut verification, mut missed);
     let mut weakened = 0;
     loop {
@@ -92,9 +95,15 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         progress(Progress::Writing);
         let marked = write(job, &scene, &optimised.learned, &aside)?;
         let total = settings.verify.views;
-        verification = verify(engine, &scene.gaussians, &marked, job.message, settings, |done| {
-            progress(Progress::Verifying { done, total })
-        })?;
+        verification = verify(
+            engine,
+            &scene.gaussians,
+            &marked,
+            job.message,
+            settings,
+            job.cameras,
+            |done| progress(Progress::Verifying { done, total }),
+        )?;
         missed = settings.target.missed(&verification, &engine.claim_rule());
         match settings.target.weaken(&verification) {
             Some(factor) if weakened < WEAKENED => optimised.learned.scale(factor, &scene),
@@ -136,8 +145,8 @@ fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Path) -
 }
 
 /// Predicts what memory the job will need, and refuses one that does not fit.
-fn admit(engine: &Engine, scene: &Scene, settings: &Settings) -> Result<MemoryRequirements> {
-    let view = measure_view(engine, &scene.gaussians, settings)?;
+fn admit(engine: &Engine, scene: &Scene, settings: &Settings, cameras: &[Camera]) -> Result<MemoryRequirements> {
+    let view = measure_view(engine, &scene.gaussians, settings, cameras)?;
     let memory = predict_memory(SceneSize::of(scene), view, settings, model_bytes(engine, settings));
     engine.limits.admit(&memory)?;
     Ok(memory)
@@ -229,6 +238,7 @@ mod tests {
                 output,
                 message: &message,
                 settings: &settings,
+                cameras: &[],
                 force: false,
                 bad_rows: BadRows::Refuse,
             };

@@ -21,7 +21,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
 use crate::splat::{Learnable, sh};
-use crate::view::ViewSampler;
+use crate::view::{Camera, ViewSampler};
 
 /// Steps between two reports of the timing.
 const TIMED_STEPS: usize = 20;
@@ -39,7 +39,8 @@ pub struct Optimised {
     pub view_steps: usize,
 }
 
-/// Optimises offsets that make views of the scene read as `message`. The same arguments on the same device give the
+/// Optimises offsets that make views of the scene read as `message`: views around and between `cameras`, or, without any,
+/// around the scene. The same arguments on the same device give the
 /// same offsets, bit by bit.
 ///
 /// # Errors
@@ -50,6 +51,7 @@ pub fn optimise(
     scene: &Scene,
     message: &Message,
     settings: &Settings,
+    cameras: &[Camera],
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Optimised> {
     settings.check()?;
@@ -60,7 +62,7 @@ pub fn optimise(
         });
     }
     let gaussians = &scene.gaussians;
-    let mut sampler = ViewSampler::new(gaussians, settings.seed)?;
+    let mut sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
     if let Some(ring) = settings.ring {
         sampler.train_on_ring(ring.elevation.to_radians());
     }

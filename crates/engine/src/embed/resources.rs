@@ -6,7 +6,7 @@ use crate::extract::{Engine, cpu_weight_cache};
 use crate::memory::{EmbeddingWorkload, MemoryRequirements, ModelBytes, SceneSize, ViewSize, embedding_requirements};
 use crate::scene::Gaussians;
 use crate::splat::{PreparedView, prepare};
-use crate::view::{Split, ViewSampler};
+use crate::view::{Camera, Split, ViewSampler};
 
 /// Predicts the most memory that an embedding with these settings has in use at once.
 pub fn predict_memory(scene: SceneSize, view: ViewSize, settings: &Settings, models: ModelBytes) -> MemoryRequirements {
@@ -28,8 +28,13 @@ pub fn predict_memory(scene: SceneSize, view: ViewSize, settings: &Settings, mod
 ///
 /// # Errors
 /// An empty scene, a failing device.
-pub fn measure_view(engine: &Engine, gaussians: &Gaussians, settings: &Settings) -> Result<ViewSize> {
-    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+pub fn measure_view(
+    engine: &Engine,
+    gaussians: &Gaussians,
+    settings: &Settings,
+    cameras: &[Camera],
+) -> Result<ViewSize> {
+    let sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
     let camera = sampler.camera(Split::Training, 0, settings.size);
     let view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?.view;
     Ok(view_size(&view))
@@ -39,8 +44,8 @@ pub fn measure_view(engine: &Engine, gaussians: &Gaussians, settings: &Settings)
 ///
 /// # Errors
 /// An empty scene.
-pub fn measure_view_on_cpu(gaussians: &Gaussians, settings: &Settings) -> Result<ViewSize> {
-    let sampler = ViewSampler::new(gaussians, settings.seed)?;
+pub fn measure_view_on_cpu(gaussians: &Gaussians, settings: &Settings, cameras: &[Camera]) -> Result<ViewSize> {
+    let sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
     let camera = sampler.camera(Split::Training, 0, settings.size);
     let cache = cpu_weight_cache(camera.width, settings.half_weights);
     Ok(view_size(&prepare(gaussians, &camera, cache)?))

@@ -6,7 +6,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Quality, measure};
 use crate::scene::Gaussians;
-use crate::view::{Split, ViewSampler};
+use crate::view::{Camera, Split, ViewSampler};
 
 /// Pairs of pictures that are kept to look at.
 const KEPT_PAIRS: usize = 5;
@@ -36,7 +36,7 @@ pub struct Verification {
     pub pairs: Vec<(Picture, Picture)>,
 }
 
-/// Renders held-out views of both scenes over white, compares and reads them.
+/// Renders held-out views of both scenes over white, those of `cameras` if there are any, compares and reads them.
 ///
 /// # Errors
 /// An empty scene, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
@@ -46,11 +46,12 @@ pub fn verify(
     marked: &Gaussians,
     message: &Message,
     settings: &Settings,
+    cameras: &[Camera],
     mut done: impl FnMut(usize),
 ) -> Result<Verification> {
     let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
     // From the original, so that both scenes are seen by the same cameras whatever happened to the other.
-    let sampler = ViewSampler::new(original, settings.seed)?;
+    let sampler = ViewSampler::among(original, settings.seed, cameras)?;
     let mut pairs = Vec::with_capacity(settings.verify.views);
     let mut logits = Vec::with_capacity(settings.verify.views);
     for index in 0..settings.verify.views {

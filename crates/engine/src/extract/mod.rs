@@ -43,21 +43,20 @@ pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<PooledLogi
     PooledLogits::new(engine.read_logits(pictures)?)
 }
 
-/// Renders `views` held-out 8-bit views of a scene, `size` by `size` pixels, and reads them. `done` hears of every
-/// view, and is shown it.
+/// Renders `views` held-out 8-bit views of a scene as `sampler` has them, `size` by `size` pixels, and reads them. `done`
+/// hears of every view, and is shown it.
 ///
 /// # Errors
-/// An empty scene, a size out of range, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
+/// A size out of range, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn read_scene(
     engine: &Engine,
     gaussians: &Gaussians,
+    sampler: &ViewSampler,
     views: usize,
     size: u32,
     background: [f32; 3],
-    seed: u64,
     mut done: impl FnMut(usize, &Picture) -> Result<()>,
 ) -> Result<PooledLogits> {
-    let sampler = ViewSampler::new(gaussians, seed)?;
     let mut logits = Vec::with_capacity(views);
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);

@@ -2,6 +2,7 @@
 mod camera;
 mod extent;
 mod files;
+mod given;
 mod json;
 mod sampler;
 pub(crate) mod vector;
@@ -9,4 +10,5 @@ pub(crate) mod vector;
 pub use camera::Camera;
 pub use extent::Extent;
 pub use files::{parse_cameras, read_cameras, write_cameras};
+pub use given::GivenViews;
 pub use sampler::{Split, ViewSampler};

@@ -14,14 +14,18 @@
 //!
 //! **Ring.** Training views can be put on a circle instead, at one elevation and one distance and aimed at the centre, as
 //! published code has them ([`ViewSampler::train_on_ring`]); held-out views stay where they are.
+//!
+//! **Given cameras.** Views of both splits can be taken where cameras are ([`ViewSampler::among`]).
 use super::camera::Camera;
 use super::extent::Extent;
+use super::given::GivenViews;
 use super::vector::{along, dot, frame, unit};
 use crate::error::Result;
 use crate::scene::Gaussians;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Vertical field of view, radians, of views that need not keep away from a tiny scene: 45 degrees.
 const FIELD_OF_VIEW: f32 = 0.25 * PI;
@@ -57,6 +61,8 @@ pub struct ViewSampler {
     places: Vec<[f32; 3]>,
     /// Elevation of all training views, radians.
     ring: Option<f32>,
+    /// Where views are, if not around the scene.
+    given: Option<Arc<GivenViews>>,
 }
 
 impl ViewSampler {
@@ -77,7 +83,20 @@ impl ViewSampler {
             shift,
             places,
             ring: None,
+            given: None,
         })
+    }
+
+    /// The same, with views around and between `cameras`; around the scene where there are none.
+    ///
+    /// # Errors
+    /// Those of [`ViewSampler::new`] and [`GivenViews::new`].
+    pub fn among(gaussians: &Gaussians, seed: u64, cameras: &[Camera]) -> Result<ViewSampler> {
+        let mut sampler = Self::new(gaussians, seed)?;
+        if !cameras.is_empty() {
+            sampler.given = Some(Arc::new(GivenViews::new(gaussians, cameras)?));
+        }
+        Ok(sampler)
     }
 
     /// Puts the training views on a circle at this elevation above the scene's horizon, radians.
@@ -95,6 +114,12 @@ impl ViewSampler {
         // Even streams for training, odd ones for held-out; the topmost bit is spared for `new`.
         let odd = u64::from(split == Split::HeldOut);
         let mut random = stream(self.seed, (index & (u64::MAX >> 2)) * 2 + odd);
+        if let Some(given) = &self.given {
+            return match split {
+                Split::Training => given.training(index, size, &mut random),
+                Split::HeldOut => given.held_out(index, size),
+            };
+        }
         let direction = match split {
             Split::Training => self.training_direction(index, &mut random),
             Split::HeldOut => self.held_out_direction(index, &mut random),

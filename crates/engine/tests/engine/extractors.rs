@@ -6,6 +6,7 @@ use guardsplat_engine::message::key::{HiddenKeyOptions, create_hidden_key};
 use guardsplat_engine::message::{Decoding, Message};
 use guardsplat_engine::scene::Scene;
 use guardsplat_engine::stop::Stop;
+use guardsplat_engine::view::ViewSampler;
 use guardsplat_engine::{Error, Result};
 
 use super::{clip, cpu, settings, small_scene};
@@ -52,10 +53,19 @@ fn any_differentiable_extractor_can_be_embedded_for() {
     let scene = Scene::from_gaussians(small_scene());
     for text in ["5", "2"] {
         let message = Message::parse(text, 3).unwrap();
-        let found = optimise(&engine, &scene, &message, &message_only(), &mut |_| {}).unwrap();
+        let found = optimise(&engine, &scene, &message, &message_only(), &[], &mut |_| {}).unwrap();
         let mut marked = scene.gaussians.clone();
         marked.sh = found.learned.colours(&marked.sh);
-        let reading = read_scene(&engine, &marked, 4, 32, [0.0; 3], 3, |_, _| Ok(())).unwrap();
+        let reading = read_scene(
+            &engine,
+            &marked,
+            &ViewSampler::new(&marked, 3).unwrap(),
+            4,
+            32,
+            [0.0; 3],
+            |_, _| Ok(()),
+        )
+        .unwrap();
         assert_eq!(reading.message(), message, "{reading:?}");
     }
 }
@@ -88,7 +98,16 @@ fn convolutional_decoders_come_with_the_key() {
     assert_eq!(engine.bits, 4);
     // Whatever the size of pictures is.
     for size in [20, 160, 200] {
-        let reading = read_scene(&engine, &small_scene(), 1, size, [1.0; 3], 3, |_, _| Ok(())).unwrap();
+        let reading = read_scene(
+            &engine,
+            &small_scene(),
+            &ViewSampler::new(&small_scene(), 3).unwrap(),
+            1,
+            size,
+            [1.0; 3],
+            |_, _| Ok(()),
+        )
+        .unwrap();
         assert_eq!(reading.views[0].len(), 4);
     }
 

@@ -6,6 +6,7 @@ use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::stop::Stop;
+use guardsplat_engine::view::ViewSampler;
 
 use super::{cpu, engine, files, message, new_key_until, run, scene_file, settings, small_scene};
 
@@ -21,6 +22,7 @@ fn whatever_is_computed_ends_when_it_is_asked_to() {
             output: &output,
             message: &message(),
             settings: &settings(),
+            cameras: &[],
             force: true,
             bad_rows: BadRows::Refuse,
         };
@@ -47,7 +49,15 @@ fn whatever_is_computed_ends_when_it_is_asked_to() {
     engine.stop.request();
     let nothing = run(&engine, &folder.path().join("none.ply"), &output, &settings(), true);
     assert!(matches!(nothing, Err(Error::Stopped)), "not even looked for");
-    let unread = read_scene(&engine, &small_scene(), 4, 32, [1.0; 3], 3, |_, _| Ok(()));
+    let unread = read_scene(
+        &engine,
+        &small_scene(),
+        &ViewSampler::new(&small_scene(), 3).unwrap(),
+        4,
+        32,
+        [1.0; 3],
+        |_, _| Ok(()),
+    );
     assert!(matches!(unread, Err(Error::Stopped)));
 }
 

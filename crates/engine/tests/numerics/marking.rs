@@ -71,7 +71,7 @@ fn short(preset: Preset) -> Settings {
 fn mark(engine: &Engine, gaussians: Gaussians, settings: &Settings) -> Optimised {
     let mut terms: Vec<LossTerms> = Vec::new();
     let scene = Scene::from_gaussians(gaussians);
-    let done = optimise(engine, &scene, &message(), settings, &mut |progress| {
+    let done = optimise(engine, &scene, &message(), settings, &[], &mut |progress| {
         if let Progress::Step(step) = progress {
             terms.push(step.terms);
         }
@@ -167,6 +167,7 @@ pub fn poison(machine: &Machine) {
             output: &at("out.ply"),
             message: &message(),
             settings,
+            cameras: &[],
             force: true,
         };
         let mut steps = 0;
@@ -236,6 +237,7 @@ pub fn too_much_for_the_adapter(machine: &Machine) {
         output: &at("out.ply"),
         message: &message(),
         settings: &settings,
+        cameras: &[],
         force: true,
     };
     let mut told = 0;
