@@ -1,4 +1,4 @@
-//! A scene of the project's own: Gaussians on textured solid shapes that stand on a disc of ground.
+//! Scenes of the project's own: Gaussians on textured solid shapes that stand on a disc of ground, or in a room.
 //!
 //! Points are spread over each surface in proportion to its area. A Gaussian there is as wide as the spacing of
 //! points and a tenth of that thick along the surface normal, so that the surface closes without fringes. Its
@@ -10,11 +10,12 @@ mod texture;
 
 use crate::error::{Error, Result};
 use crate::scene::{Gaussians, MAX_DEGREE, Scene, Sh};
+use crate::view::Camera;
 use crate::view::vector::{along, cross, dot, perpendicular, unit};
 use highlight::Highlight;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shapes::{Solid, arrange};
+use shapes::{Solid, arrange, furnish};
 use texture::Texture;
 
 /// Most Gaussians of a sample; it is meant to be small.
@@ -38,6 +39,48 @@ const LAMP: [f32; 3] = [0.45, -0.8, 0.4];
 /// # Errors
 /// [`Error::BadOption`] for no Gaussians or more than [`MAX_GAUSSIANS`], or a degree above 4.
 pub fn sample(gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
+    sample_of(Kind::Object, gaussians, sh_degree, seed)
+}
+
+/// What a sample is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// Things on a disc of ground, seen from outside.
+    #[default]
+    Object,
+    /// A room with things in it, seen from inside: about 4 by 3 units and 1.7 high.
+    Room,
+}
+
+/// Where the viewers of a sample are, 640 by 480 pixels: for a room, at the height of eyes, half of them looking across it
+/// and half along its walls. None for an object, which is seen from all around.
+pub fn cameras(kind: Kind, count: usize) -> Vec<Camera> {
+    if kind == Kind::Object {
+        return Vec::new();
+    }
+    let camera = |i: usize| {
+        // The golden angle: any number of cameras is spread evenly, and neighbours in the list look elsewhere.
+        let angle = i as f32 * std::f32::consts::PI * (3.0 - 5f32.sqrt());
+        let reach = 0.35 * ((i as f32 + 0.5) / count as f32).sqrt();
+        let [a, b] = shapes::ROOM.map(|side| side as f32);
+        let eye = [
+            reach * a * angle.cos(),
+            -0.55 * shapes::CEILING as f32,
+            reach * b * angle.sin(),
+        ];
+        let turned = angle + if i % 2 == 0 { std::f32::consts::PI } else { 1.2 };
+        let height = -(0.25 + 0.4 * (i % 5) as f32 / 4.0) * shapes::CEILING as f32;
+        let target = [a * turned.cos(), height, b * turned.sin()];
+        Camera::look_at(eye, target, [0.0, -1.0, 0.0], 0.9, 640, 480)
+    };
+    (0..count).map(camera).collect()
+}
+
+/// Makes a sample scene of a kind, as [`sample`] does.
+///
+/// # Errors
+/// Those of [`sample`].
+pub fn sample_of(kind: Kind, gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
     if !(1..=MAX_GAUSSIANS).contains(&gaussians) {
         let reason = format!("{gaussians} is not between 1 and {MAX_GAUSSIANS}");
         return Err(Error::BadOption {
@@ -53,7 +96,10 @@ pub fn sample(gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
         });
     }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let solids = arrange(&mut random);
+    let solids = match kind {
+        Kind::Object => arrange(&mut random),
+        Kind::Room => furnish(&mut random),
+    };
     let lamp = unit(LAMP).unwrap_or([0.0, -1.0, 0.0]);
     let highlight = Highlight::new(sh_degree);
     let area: f64 = solids.iter().map(Solid::area).sum();
@@ -140,6 +186,24 @@ mod tests {
                     .chain(&g.sh.coefficients)
                     .all(|v| v.is_finite())
             );
+        }
+    }
+
+    /// Nothing but air is where the cameras are, and wherever they look is something.
+    #[test]
+    fn a_room_is_seen_from_inside() {
+        for seed in 0..4 {
+            let scene = sample_of(Kind::Room, 4000, 1, seed).unwrap().gaussians;
+            let cameras = cameras(Kind::Room, 24);
+            for camera in &cameras {
+                let [x, y, z] = camera.centre();
+                let near = |p: &&[f32; 3]| ((p[0] - x).powi(2) + (p[1] - y).powi(2) + (p[2] - z).powi(2)).sqrt() < 0.3;
+                assert_eq!(scene.positions.iter().filter(near).count(), 0, "seed {seed}");
+                let view = crate::splat::prepare(&scene, camera, crate::splat::WeightCache::None).unwrap();
+                assert!(view.visible.len() > 300, "seed {seed}: {}", view.visible.len());
+            }
+            let [a, b] = shapes::ROOM.map(|side| side as f32 + 0.01);
+            assert!(scene.positions.iter().all(|p| p[0].abs() < a && p[2].abs() < b));
         }
     }
 

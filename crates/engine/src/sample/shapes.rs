@@ -13,6 +13,10 @@ enum Shape {
     Ground {
         radius: f64,
     },
+    /// A rectangle, seen from above: half its sides.
+    Sheet {
+        half: [f64; 2],
+    },
     Sphere {
         radius: f64,
     },
@@ -49,6 +53,7 @@ impl Solid {
     pub fn area(&self) -> f64 {
         match self.shape {
             Shape::Ground { radius } => PI * radius * radius,
+            Shape::Sheet { half: [a, b] } => 4.0 * a * b,
             Shape::Sphere { radius } => 4.0 * PI * radius * radius,
             Shape::Torus { ring, tube } => TAU * ring * TAU * tube,
             Shape::Block { half: [a, b, c] } => 8.0 * (a * b + b * c + c * a),
@@ -59,7 +64,7 @@ impl Solid {
 
     /// Whether this is the ground.
     pub fn is_ground(&self) -> bool {
-        matches!(self.shape, Shape::Ground { .. })
+        matches!(self.shape, Shape::Ground { .. } | Shape::Sheet { .. })
     }
 
     /// The point and outward unit normal for `u`, `v` in [0, 1): even in the square is even on the surface.
@@ -85,6 +90,7 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     let disc = |radius: f64, share: f64, y: f64| [radius * share.sqrt() * cosine, y, radius * share.sqrt() * sine];
     match shape {
         Shape::Ground { radius } => (disc(radius, u, 0.0), [0.0, -1.0, 0.0]),
+        Shape::Sheet { half: [a, b] } => ([a * (2.0 * u - 1.0), 0.0, b * (2.0 * v - 1.0)], [0.0, -1.0, 0.0]),
         Shape::Sphere { radius } => {
             let y = 1.0 - 2.0 * u;
             let level = (1.0 - y * y).max(0.0).sqrt();
@@ -154,6 +160,53 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
 
 /// The ground, a solid in its middle and four around, each of another shape; y points down.
 pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
+    let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut solids = vec![Solid {
+        shape: Shape::Ground { radius: GROUND },
+        axes: upright,
+        centre: [0.0; 3],
+    }];
+    solids.extend(things(random, [0.0, 0.9 * GROUND - 0.42]));
+    solids
+}
+
+/// Half the sides of a room, and how high it is.
+pub(super) const ROOM: [f64; 2] = [2.0, 1.6];
+pub(super) const CEILING: f64 = 1.7;
+
+/// A room: floor, ceiling, four walls, and a thing near each wall, each of another shape; y points down.
+pub(super) fn furnish(random: &mut impl Rng) -> Vec<Solid> {
+    let [a, b] = ROOM;
+    let high = 0.5 * CEILING;
+    // A sheet's normal is its own -y, which is turned to point inwards.
+    let sheet = |half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]| {
+        let down = inwards.map(|x| -x);
+        let along = if inwards[1] == 0.0 {
+            [0.0, 1.0, 0.0]
+        } else {
+            [1.0, 0.0, 0.0]
+        };
+        Solid {
+            shape: Shape::Sheet { half },
+            axes: [along, down, cross(along, down)],
+            centre: centre.map(|x| x as f32),
+        }
+    };
+    let mut solids = vec![
+        sheet([a, b], [0.0, -1.0, 0.0], [0.0; 3]),
+        sheet([a, b], [0.0, 1.0, 0.0], [0.0, -CEILING, 0.0]),
+        sheet([high, b], [-1.0, 0.0, 0.0], [a, -high, 0.0]),
+        sheet([high, b], [1.0, 0.0, 0.0], [-a, -high, 0.0]),
+        sheet([high, a], [0.0, 0.0, -1.0], [0.0, -high, b]),
+        sheet([high, a], [0.0, 0.0, 1.0], [0.0, -high, -b]),
+    ];
+    let far = b - 0.45;
+    solids.extend(things(random, [far, far]));
+    solids
+}
+
+/// A solid of each shape around the middle, the first and the others so far away.
+fn things(random: &mut impl Rng, reaches: [f64; 2]) -> Vec<Solid> {
     let size: [f64; 5] = std::array::from_fn(|_| random.random_range(0.85..1.15));
     let mut shapes = [
         Shape::Sphere { radius: 0.34 * size[0] },
@@ -179,17 +232,14 @@ pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
     }
     let start = random.random_range(0.0..TAU);
     let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut solids = vec![Solid {
-        shape: Shape::Ground { radius: GROUND },
-        axes: upright,
-        centre: [0.0; 3],
-    }];
+    let turn_of_each = if reaches[0] == 0.0 { 0.25 * TAU } else { 0.2 * TAU };
+    let mut solids = Vec::new();
     for (i, shape) in shapes.into_iter().enumerate() {
-        let angle = start + 0.25 * TAU * i as f64 + random.random_range(-0.15..0.15);
-        let reach = if i == 0 { 0.0 } else { 0.9 * GROUND - 0.42 };
+        let angle = start + turn_of_each * i as f64 + random.random_range(-0.15..0.15);
+        let reach = reaches[usize::from(i > 0)];
         let turn = random.random_range(0.0..TAU);
         let (axes, height) = match shape {
-            Shape::Ground { .. } => (upright, 0.0),
+            Shape::Ground { .. } | Shape::Sheet { .. } => (upright, 0.0),
             Shape::Sphere { radius } => (turned(turn), radius),
             // The ring stands on its rim, so that one sees through it.
             Shape::Torus { ring, tube } => (on_edge(turn), ring + tube),
