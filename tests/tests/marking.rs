@@ -282,3 +282,26 @@ fn a_full_disk_is_known_before_the_work() {
     );
     assert!(environment.contents() == before);
 }
+
+/// A room is marked for those who are in it, by the cameras that it was captured with.
+#[test]
+fn a_room_is_marked_for_its_viewers() {
+    let environment = TestEnvironment::new();
+    environment.exits("key create --bits 32 --seed 1 -o k --device cpu", 0);
+    environment.exits(
+        "sample room.ply --kind room --cameras room.json --gaussians 10000 --sh-degree 1 --seed 6",
+        0,
+    );
+    let mark =
+        "embed room.ply out.ply --key k --message 2601cd56 --cameras room.json --preset draft --force --device cpu";
+    assert!(matches!(environment.run(mark).status.code(), Some(0 | 3)));
+    // Held-out cameras, which no training view was at. From outside the same scene is another one.
+    let read = "verify out.ply --key k --message 2601cd56 --device cpu --json";
+    let inside = environment.json(&format!("{read} --cameras room.json"), 0);
+    assert!(inside["bit_accuracy"].as_f64().unwrap() > 0.85, "{inside}");
+    environment.refuses(
+        "embed room.ply out.ply --key k --message 2601cd56 --cameras room.json --ring 30 --device cpu",
+        &["--cameras", "--ring"],
+    );
+    environment.refuses("sample object.ply --cameras object.json", &["--cameras", "--kind room"]);
+}

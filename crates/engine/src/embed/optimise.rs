@@ -132,6 +132,7 @@ impl<'a> Run<'a> {
         settings: &'a Settings,
         sampler: ViewSampler,
     ) -> Result<(Self, Coverage)> {
+        let among_cameras = sampler.is_among_cameras();
         let mut pool = ViewPool::new(sampler, settings);
         let coverage = pool.cover(engine, &scene.gaussians)?;
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
@@ -145,7 +146,7 @@ impl<'a> Run<'a> {
                     .iter()
                     .map(|r| coverage.energies[*r as usize])
                     .collect();
-                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies))
+                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies, among_cameras))
             }
             Optimizer::Adam(options) => OptimizerState::Adam(Adam::new(options, rows, columns, scene.gaussians.len())),
         };

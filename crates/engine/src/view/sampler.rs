@@ -104,6 +104,11 @@ impl ViewSampler {
         self.ring = Some(elevation);
     }
 
+    /// Whether views are around cameras that were given.
+    pub fn is_among_cameras(&self) -> bool {
+        self.given.is_some()
+    }
+
     /// Where and how large the scene is.
     pub fn extent(&self) -> &Extent {
         &self.extent
