@@ -152,9 +152,9 @@ impl From<&Spec> for SpecReport {
             },
             Spec::Verify(spec) => verify(spec, given(spec.views), given(spec.size)),
             // A seed is as good as the key: it is not printed.
-            Spec::CreateKey(KeySpec { bits, seed }) => Self::CreateKey {
+            Spec::CreateKey(KeySpec { bits, seed, seeded }) => Self::CreateKey {
                 bits: *bits,
-                seeded: seed.is_some(),
+                seeded: *seeded || seed.is_some(),
             },
         }
     }
@@ -216,6 +216,7 @@ mod tests {
             spec: Some(Spec::CreateKey(KeySpec {
                 bits: 32,
                 seed: Some(424_242),
+                ..KeySpec::default()
             })),
             queue_position: Some(2),
             priority: Some(-3),

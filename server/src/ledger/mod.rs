@@ -21,6 +21,7 @@ mod commitments;
 pub mod conformance;
 mod discriminants;
 mod error;
+mod history;
 pub mod hooks;
 mod idempotency;
 mod jobs;
@@ -45,6 +46,7 @@ use tokio::sync::broadcast;
 pub use artifacts::ArtifactLedger;
 pub use commitments::{CommitmentLog, SealedSigningKey};
 pub use error::{LedgerError, Result};
+pub use history::{Before as ReadBefore, NewReading, ReadingHistory};
 pub use hooks::{
     DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, NewHook, Sending, Topics,
 };
@@ -65,7 +67,7 @@ pub use types::{
     ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobRow, JobState,
     KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey, Origin,
 };
-pub use work::{JobResult, JobSpec, Progress};
+pub use work::{JobResult, JobSpec, KeyOrder, Progress, Seed};
 pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPresence};
 
 /// What the service keeps of its work, by capability. A call that returned `Ok` is on disk.
@@ -79,6 +81,7 @@ pub trait Ledger:
     + JobQueue
     + JobStore
     + KeyLedger
+    + ReadingHistory
     + Registry
     + Retention
     + Statistics

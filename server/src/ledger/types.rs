@@ -269,6 +269,8 @@ pub struct ArtifactRow {
     pub job: Option<JobId>,
     /// A key file: never visible.
     pub secret: bool,
+    /// A signed report.
+    pub evidence: bool,
     /// Where the store has the bytes.
     pub path: String,
     /// How far it is.

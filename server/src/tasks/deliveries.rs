@@ -142,7 +142,13 @@ impl Service {
                 artifacts.push((role, row));
             }
         }
-        let body = event::body(delivery, job, sending.asked_id, artifacts);
+        let body = event::body(
+            delivery,
+            job,
+            self.limits().raw_verification,
+            sending.asked_id,
+            artifacts,
+        );
         let secret = self
             .master()
             .open(&crate::hooks::secret_context(hook.id), &hook.sealed_secret);

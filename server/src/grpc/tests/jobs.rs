@@ -12,6 +12,7 @@ async fn a_job_is_as_it_was_asked_for() {
     let spec = Spec::CreateKey(KeySpec {
         bits: 48,
         seed: Some(7),
+        ..KeySpec::default()
     });
     let job = Job {
         display_name: "№ 1".into(),

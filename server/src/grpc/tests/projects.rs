@@ -271,6 +271,7 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListAssets" => Own(Vec::new(), own.asset.clone()),
         "GetCommitment" => named!(GetCommitmentRequest, commitment),
         "ExportCommitment" => named!(ExportCommitmentRequest, commitment),
+        "RevealCommitment" => named!(RevealCommitmentRequest, commitment),
         "ListCommitments" | "GetHead" => Own(Vec::new(), own.commitment.clone()),
         "RevokeToken" => named!(RevokeTokenRequest, token_name),
         "ListTokens" => Own(Vec::new(), own.token_name.clone()),

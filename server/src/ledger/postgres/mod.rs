@@ -77,6 +77,8 @@ pub(crate) mod tests;
 mod artifacts;
 #[path = "../shared/commitments.rs"]
 mod commitments;
+#[path = "../shared/history.rs"]
+mod history;
 #[path = "../shared/hooks.rs"]
 mod hooks;
 #[path = "../shared/jobs.rs"]

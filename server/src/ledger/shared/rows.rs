@@ -68,6 +68,7 @@ pub(super) fn artifact(row: &DbRow) -> Result<ArtifactRow> {
         sha256: row.try_get("sha256")?,
         job: row.try_get("job_id")?,
         secret: row.try_get("secret")?,
+        evidence: row.try_get("evidence")?,
         path: row.try_get("path")?,
         state: discriminants::artifact_state(number(row, "state")?)?,
         create_time: row.try_get("create_time")?,

@@ -67,6 +67,8 @@ mod writer;
 mod artifacts;
 #[path = "../shared/commitments.rs"]
 mod commitments;
+#[path = "../shared/history.rs"]
+mod history;
 #[path = "../shared/hooks.rs"]
 mod hooks;
 #[path = "../shared/jobs.rs"]

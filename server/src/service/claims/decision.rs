@@ -6,13 +6,14 @@ use futures::TryStreamExt;
 use guardsplat_codeword::{
     Answer, HypothesisReading, Index, MessageLength, Reading, Scheme, Target, Tested, Verdict, chance,
 };
+use guardsplat_commitment::Signed;
 
 use super::Claim;
 use crate::error::{Error, Result};
-use crate::ledger::{AssetId, AssetRow, Candidate, KeyRow, OwnerRow, candidates};
+use crate::ledger::{AssetId, AssetRow, Candidate, KeyRow, OwnerRow, ReadBefore, candidates};
 use crate::marks::{self, CODE};
-use crate::service::Service;
 use crate::service::names::ResourceKind;
+use crate::service::{Service, clock};
 
 /// A claim that was decided.
 pub struct Decided {
@@ -24,6 +25,12 @@ pub struct Decided {
     pub logits: Vec<f32>,
     /// The asset that agreed best, with its owner.
     pub best: Option<Best>,
+    /// Whether the claim named that asset, whose owner may see its word even where it does not match.
+    pub named: bool,
+    /// What there was before, of a suspect that was read.
+    pub before: Option<ReadBefore>,
+    /// Assets of the owner of the best one, under the key.
+    pub assets_of_owner: u64,
 }
 
 /// How much was compared.
@@ -33,6 +40,10 @@ pub struct Tried {
     pub owners: u64,
     /// Assets, each with a word of its own.
     pub assets: u64,
+    /// Assets that are paid for: all of the key, since whoever claims may have chosen among them.
+    pub assets_paid: u64,
+    /// Readings of the suspect that are paid for, this one included.
+    pub readings: u64,
 }
 
 /// The asset that agreed best.
@@ -43,6 +54,8 @@ pub struct Best {
     pub owner: OwnerRow,
     /// Its word.
     pub target: Target,
+    /// What was signed when it was registered.
+    pub commitment: Signed,
 }
 
 /// All words that a claim could be about.
@@ -54,12 +67,33 @@ struct Words {
 }
 
 impl Service {
-    /// Decides a claim on `read`, whose logits are of the key's length.
-    pub(crate) async fn decide(&self, claim: &Claim, key: &KeyRow, read: &[HypothesisReading]) -> Result<Decided> {
-        let words = match key.bits == marks::bits() {
+    /// Decides a claim on `read`, whose logits are of the key's length. Of a suspect it is said what there was `before`; a
+    /// scene that was just marked has nothing.
+    pub(crate) async fn decide(
+        &self,
+        claim: &Claim,
+        key: &KeyRow,
+        read: &[HypothesisReading],
+        before: Option<ReadBefore>,
+    ) -> Result<Decided> {
+        let readings_paid = before.map_or(1, |before| before.readings.max(1));
+        let mut words = match key.bits == marks::bits() {
             true => self.words(claim, key).await?,
-            false => return Ok(unmarkable(key, self.limits().false_positive_rate)),
+            false => {
+                return Ok(unmarkable(
+                    key,
+                    self.limits().false_positive_rate,
+                    before,
+                    readings_paid,
+                ));
+            }
         };
+        // Counted behind the comparison, so that none was compared that is not paid for. Whoever claims may have
+        // registered all of them, under as many owners as they like, and name the one that fits: so all are paid for,
+        // whichever is named.
+        let all = self.ledger().count_assets(key.id, None).await?;
+        words.tried.assets_paid = all.max(words.tried.assets);
+        words.tried.readings = readings_paid;
         let failed = |error| Error::internal("deciding a claim", error);
         let readings = read.iter().map(|read| Reading::from_logits(&read.logits));
         let readings = readings.collect::<Result<Vec<_>, _>>().map_err(failed)?;
@@ -71,12 +105,13 @@ impl Service {
             None => None,
         };
         let targets: Vec<_> = best.iter().map(|best| best.target.clone()).collect();
+        let named = matches!(claim, Claim::Asset(_));
         let claim = guardsplat_codeword::Claim {
             scheme: Scheme::Coded { code: CODE },
             readings: read,
             targets: &targets,
-            targets_tried: Some(words.tried.assets),
-            other_tries: 1,
+            targets_tried: Some(words.tried.assets_paid),
+            other_tries: words.tried.readings,
             rate: self.limits().false_positive_rate,
         };
         let mut tested = claim.test().map_err(failed)?;
@@ -86,12 +121,21 @@ impl Service {
         }
         let name = tested.answer.best.as_ref().map(|best| best.hypothesis.as_str());
         let read = read.iter().find(|read| Some(read.name.as_str()) == name);
-        Ok(Decided {
+        let assets_of_owner = match &best {
+            Some(best) => self.ledger().count_assets(key.id, Some(best.owner.id)).await?,
+            None => 0,
+        };
+        let mut decided = Decided {
             logits: read.map(|read| read.logits.clone()).unwrap_or_default(),
             tested,
             tried: words.tried,
             best,
-        })
+            named,
+            before,
+            assets_of_owner,
+        };
+        decided.refuse_later_assets();
+        Ok(decided)
     }
 
     async fn words(&self, claim: &Claim, key: &KeyRow) -> Result<Words> {
@@ -124,6 +168,7 @@ impl Service {
         words.tried = Tried {
             owners: owners.len() as u64,
             assets: words.assets.len() as u64,
+            ..Tried::default()
         };
         Ok(words)
     }
@@ -134,18 +179,25 @@ impl Service {
         let (candidate, asset) = candidate.zip(asset).ok_or_else(|| ResourceKind::Asset.not_found(id))?;
         let owner = self.ledger().get_owner(asset.owner).await?;
         let owner = owner.ok_or_else(|| ResourceKind::Owner.not_found(asset.owner))?;
+        let commitment = self.ledger().get_commitment(asset.commitment).await?;
+        let commitment = commitment.ok_or_else(|| ResourceKind::Commitment.not_found(asset.commitment))?;
         let mark = marks::mark(self.master(), key.id, &candidate)?;
         let target = Target {
             id: ResourceKind::Asset.name(id),
             word: mark.word,
             pad: Some(mark.pad),
         };
-        Ok(Best { asset, owner, target })
+        Ok(Best {
+            asset,
+            owner,
+            target,
+            commitment,
+        })
     }
 }
 
 /// What is answered for a key whose assets can't be marked.
-fn unmarkable(key: &KeyRow, rate: f64) -> Decided {
+fn unmarkable(key: &KeyRow, rate: f64, before: Option<ReadBefore>, readings: u64) -> Decided {
     let reason = format!(
         "{} has {} bits, and assets are marked with {}: no asset of it can have been marked",
         ResourceKind::Key.name(key.id),
@@ -167,13 +219,60 @@ fn unmarkable(key: &KeyRow, rate: f64) -> Decided {
             answer,
             confidences: None,
         },
-        tried: Tried::default(),
+        tried: Tried {
+            readings,
+            ..Tried::default()
+        },
         logits: Vec::new(),
         best: None,
+        named: false,
+        before,
+        assets_of_owner: 0,
     }
 }
 
 impl Decided {
+    /// Takes a match back whose asset is younger than its suspect: the word was drawn when the asset was registered, so no
+    /// file from before can carry it. Then the asset was chosen to fit, or chance did it.
+    fn refuse_later_assets(&mut self) {
+        let Some((best, before)) = self.best.as_ref().zip(self.before) else {
+            return;
+        };
+        if self.tested.answer.verdict != Verdict::Match || !self.is_later(best) {
+            return;
+        }
+        let [registered, seen] = [best.commitment.commitment.time, before.first_seen].map(clock::text);
+        let reason = format!(
+            "{} was registered at {registered}, and a file of this suspect was here at {seen} already: it can't carry that \
+             asset's mark",
+            best.target.id
+        );
+        let answer = &mut self.tested.answer;
+        answer.verdict = Verdict::Inconclusive;
+        answer.payload = None;
+        answer.reason = Some(reason);
+    }
+
+    /// Whether an asset was registered after a file of the suspect had been seen.
+    pub fn is_later(&self, asset: &Best) -> bool {
+        self.before
+            .is_some_and(|before| asset.commitment.commitment.time > before.first_seen)
+    }
+
+    /// Whether so many bits agree that it would be a match, were the asset not younger than its suspect.
+    pub fn is_refused(&self) -> bool {
+        let answer = &self.tested.answer;
+        let enough = answer.best.as_ref().zip(answer.needed_bits);
+        answer.verdict == Verdict::Inconclusive && enough.is_some_and(|(best, needed)| best.matched_bits >= needed)
+    }
+
+    /// The asset, where it may be told of: one that was named or found. What came nearest in a search that found nothing is
+    /// nobody's business.
+    pub fn shown(&self) -> Option<&Best> {
+        let found = self.tested.answer.verdict == Verdict::Match || self.is_refused();
+        self.best.as_ref().filter(|_| self.named || found)
+    }
+
     /// Whether more bits, or fewer hypotheses, would have been needed to decide anything.
     pub fn too_few_bits(&self) -> bool {
         let answer = &self.tested.answer;
