@@ -21,6 +21,9 @@ static SIGNED: LazyLock<Signed> = LazyLock::new(|| {
     sign(&evidence, &samples::key()).unwrap()
 });
 
+static SIGNED_EVIDENCE: LazyLock<Option<String>> =
+    LazyLock::new(|| Evidence::from_json(SIGNED.json.as_bytes()).ok()?.to_json().ok());
+
 #[test]
 fn reports_round_trip_but_for_the_bytes_of_pictures() {
     for (name, evidence) in samples::all() {
@@ -94,9 +97,11 @@ proptest! {
             let at = at.index(bytes.len());
             let same = bytes[at] == byte;
             bytes[at] = byte;
-            let answer = guardsplat_evidence::check(&bytes, &samples::key().verifying_key()).answer;
+            let answer = check(&bytes, &samples::key().verifying_key()).answer;
             let space = at + 1 == bytes.len() && byte.is_ascii_whitespace();
-            prop_assert_eq!(matches!(answer, guardsplat_evidence::Answer::Genuine), same || space);
+            // Another last digit may be the same number, to the last bit; then the report says what was signed.
+            let alike = Evidence::from_json(&bytes).is_ok_and(|read| read.to_json().ok() == *SIGNED_EVIDENCE);
+            prop_assert_eq!(matches!(answer, Answer::Genuine), same || space || alike);
         }
     }
 }
