@@ -4,7 +4,7 @@ use guardsplat_evidence::{Evidence, View, Worker};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
 
-use super::decision::Decided;
+use super::decided::Decided;
 use super::{Claim, hypotheses, of_job};
 use crate::error::{Error, Result};
 use crate::ledger::{Completion, JobKind, JobResult, JobRow, KeyRow};

@@ -1,5 +1,6 @@
 //! Whose mark a job writes or looks for: named in its spec, checked when it is submitted, decided when it was read.
 mod conclusion;
+mod decided;
 mod decision;
 mod disclosure;
 mod hypotheses;
@@ -15,7 +16,7 @@ use crate::service::submission::Submission;
 use crate::service::violations::Violations;
 use crate::service::{Service, upload};
 pub(crate) use conclusion::WorkerReadings;
-pub(crate) use decision::{Best, Decided};
+pub(crate) use decided::{Best, Decided};
 pub(crate) use disclosure::Disclosure;
 
 /// What a claim is about.
