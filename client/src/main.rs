@@ -2,6 +2,7 @@
 mod arguments;
 mod backoff;
 mod commands;
+mod commitment;
 mod console;
 mod context;
 mod details;

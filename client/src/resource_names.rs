@@ -33,6 +33,12 @@ pub fn asset(text: &str) -> Result<String> {
     })
 }
 
+/// `commitments/ID`, where an asset could stand too: only the whole name is one.
+pub fn commitment(text: &str) -> Option<String> {
+    text.strip_prefix("commitments/")?;
+    whole("commitments", text)
+}
+
 /// `tokens/ID`, from that or from the id alone.
 pub fn token(text: &str) -> Result<String> {
     whole("tokens", text).ok_or_else(|| Error::BadOption {

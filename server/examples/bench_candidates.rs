@@ -4,11 +4,11 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use futures::{StreamExt, TryStreamExt, stream};
-use guardsplat_proto::v1::{KeyResult, KeySpec};
+use guardsplat_proto::v1::KeyResult;
 use guardsplat_server::access::DEFAULT_PROJECT;
 use guardsplat_server::ledger::{
-    Completion, JobResult, JobSpec, KeyId, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin, Registry,
-    ResourceRequirements, SqliteLedger, candidates,
+    Completion, JobResult, JobSpec, KeyId, KeyOrder, Ledger, NewArtifact, NewAsset, NewJob, NewKey, NewOwner, Origin,
+    Registry, ResourceRequirements, SqliteLedger, candidates,
 };
 use guardsplat_server::notary::{self, Notary};
 use guardsplat_server::secrets::MasterKey;
@@ -107,7 +107,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         id: Uuid::now_v7(),
         project: DEFAULT_PROJECT.into(),
         display_name: "key".into(),
-        spec: JobSpec::CreateKey(KeySpec::default()),
+        spec: JobSpec::CreateKey(KeyOrder { bits: 64, seed: None }),
         inputs: Vec::new(),
         key: None,
         request_id: None,

@@ -116,6 +116,14 @@ pub enum Error {
     /// A token that was taken back.
     #[error("the token is revoked")]
     TokenRevoked,
+    /// A token that is good for the call, and not for what it asks for.
+    #[error("the token lacks the scope {needed}: {what}")]
+    ScopeNeeded {
+        /// Why it takes that.
+        what: &'static str,
+        /// What it lacks.
+        needed: &'static str,
+    },
     /// A token that is not good for what was asked.
     #[error("the token lacks the scope {}", .needed.join(" or "))]
     ScopeMissing {

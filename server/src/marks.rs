@@ -3,13 +3,10 @@
 //! Nonce and blinding, which the ledger keeps sealed and a commitment holds the hash of, decide the pad. So it was
 //! settled when the original was registered, nobody who reads a scene first can choose an asset to fit, and whoever is
 //! shown both can compute the word again. Formulas are in `docs/registry.md`.
-use guardsplat_codeword::{Code, Layout, Mark, MessageLength, Payload, Whitening};
-use guardsplat_commitment::Opening;
-use secrecy::zeroize::Zeroizing;
-use sha2::{Digest, Sha256};
+use guardsplat_codeword::{Code, MARK_CODE, Mark, MessageLength, Payload, Whitening};
 
 use crate::error::{Error, Result};
-use crate::ledger::{Candidate, KeyId, MARK_CODE};
+use crate::ledger::{Candidate, KeyId};
 use crate::notary;
 use crate::secrets::MasterKey;
 
@@ -21,16 +18,13 @@ pub fn bits() -> u32 {
     MessageLength::CODED.bits()
 }
 
-/// The payload of a number of a key. Keys have no numbers: theirs is taken from the hash of their id, which is enough,
-/// since nothing is looked up by it.
+/// The payload of a number of a key.
 ///
 /// # Errors
 /// `Internal` for numbers that no asset is given.
 pub fn payload(key: KeyId, number: i64) -> Result<Payload> {
     let number = u32::try_from(number).map_err(|error| Error::internal("making a codeword", error))?;
-    let [a, b, c, d, ..]: [u8; 32] = Sha256::digest(key.as_bytes()).into();
-    let tag = u32::from_be_bytes([a, b, c, d]) >> (32 - Layout::of(CODE).key);
-    Ok(Payload { key: tag, number })
+    Ok(Payload::of_key(CODE, key.as_bytes(), number))
 }
 
 /// The word that an asset of a key is marked with, and its pad.
@@ -39,7 +33,7 @@ pub fn payload(key: KeyId, number: i64) -> Result<Payload> {
 /// Those of opening the nonce; `Internal` for a payload that the code has no room for.
 pub fn mark(master: &MasterKey, key: KeyId, asset: &Candidate) -> Result<Mark> {
     let opening = notary::open_nonce(master, asset.asset, &asset.sealed_nonce)?;
-    let secret = whitening_secret(&opening);
+    let secret = opening.whitening_secret();
     let whitening = Whitening {
         secret: &secret,
         asset: asset.asset.as_bytes(),
@@ -47,13 +41,6 @@ pub fn mark(master: &MasterKey, key: KeyId, asset: &Candidate) -> Result<Mark> {
     };
     let payload = payload(key, asset.payload)?;
     guardsplat_codeword::mark(CODE, payload, &whitening).map_err(|error| Error::internal("making a codeword", error))
-}
-
-/// SHA-256 of a prefix and the blinding: another value than the commitment's hash is made of, should one ever get out.
-fn whitening_secret(opening: &Opening) -> Zeroizing<[u8; 32]> {
-    let mut hash = Sha256::new_with_prefix(b"guardsplat whitening secret\0");
-    hash.update(opening.blinding());
-    Zeroizing::new(hash.finalize().into())
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ use crate::notary::Notary;
 use crate::secrets;
 use crate::service::rate_limit::Rates;
 use crate::service::retention::RetentionPolicy;
-use crate::service::{Limits, Service, clock};
+use crate::service::{Limits, Service, clock, seeds};
 use crate::settings::{Access, Settings};
 use crate::tasks::{deliveries, housekeeping, remote_changes};
 use crate::tls;
@@ -89,6 +89,7 @@ impl Server {
         let notary = Notary::open(ledger.as_ref(), &master, clock::now())
             .await
             .map_err(startup)?;
+        seeds::seal_all(ledger.as_ref(), &master).await.map_err(startup)?;
         store::claim(&store, &notary, &*ledger, clock::now()).await?;
         let traces = Traces::from_environment()?;
         let api = Service::new(ledger.clone(), store.clone(), master, notary, limits(&settings)).traced(traces);
@@ -270,6 +271,7 @@ fn limits(settings: &Settings) -> Limits {
         watch_stall: settings.watch_stall(),
         max_watches: settings.max_watches_per_caller,
         false_positive_rate: settings.false_positive_rate,
+        raw_verification: settings.allow_raw_verification,
         max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),
         // Without tokens there is one project, whose the whole queue is.
         fair_shares: settings.access == Access::Tokens,

@@ -258,7 +258,11 @@ async fn servers_share_a_database() {
     let (one, two) = (benches[0].start_with_worker(script).await, benches[1].start().await);
     let log = until(|| benches[0].log(), |log| log.ends_with("ready\n")).await;
     assert!(!log.contains("5ec2e7"), "{log}");
-    let spec = Some(Spec::CreateKey(KeySpec { bits: 8, seed: None }));
+    let spec = Some(Spec::CreateKey(KeySpec {
+        bits: 8,
+        seed: None,
+        ..KeySpec::default()
+    }));
     let job = Some(Job { spec, ..Job::default() });
     let request = CreateJobRequest {
         job,

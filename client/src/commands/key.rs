@@ -66,6 +66,7 @@ async fn make(context: &Context, arguments: &Create) -> Result<Exit> {
     let spec = Spec::CreateKey(KeySpec {
         bits: arguments.bits,
         seed: arguments.seed,
+        ..KeySpec::default()
     });
     let job = create(context, &arguments.submission, "", spec).await?;
     if arguments.submission.no_wait {

@@ -1,6 +1,7 @@
 //! The commands, one a file.
 pub mod artifact;
 pub mod asset;
+pub mod commitment;
 pub mod completions;
 pub mod embed;
 mod failed_jobs;
@@ -46,6 +47,9 @@ pub enum Command {
     /// Originals that are registered
     #[command(subcommand)]
     Asset(asset::Command),
+    /// What was signed of an asset when it was registered: exported, opened in a dispute, checked
+    #[command(subcommand)]
+    Commitment(commitment::Command),
     /// Tokens of the project: who may call for it, and what
     #[command(subcommand)]
     Token(token::Command),
@@ -67,6 +71,7 @@ pub async fn run(context: &Context, command: Command) -> Result<Exit> {
         Command::Artifact(command) => artifact::run(context, &command).await,
         Command::Owner(command) => owner::run(context, &command).await,
         Command::Asset(command) => asset::run(context, &command).await,
+        Command::Commitment(command) => commitment::run(context, &command).await,
         Command::Token(command) => token::run(context, &command).await,
         Command::Hook(command) => hook::run(context, &command).await,
         Command::Report(command) => report::run(context, &command).await,

@@ -76,7 +76,7 @@ pub async fn run(context: &Context, command: &Command) -> Result<Exit> {
     match command {
         Command::Open { job, output } => open(context, resource_names::job(job)?, output).await,
         Command::Check { file, public_key } => {
-            let document = read(file, HTML_BYTES as u64)?;
+            let document = document(file)?;
             let key = match public_key {
                 Some(path) => key_of(path)?,
                 None => key_from(&public_key_of_server(context).await?.hex)?,
@@ -126,7 +126,7 @@ async fn open(context: &Context, job: String, folder: &Path) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-async fn public_key_of_server(context: &Context) -> Result<guardsplat_proto::v1::PublicKey> {
+pub(super) async fn public_key_of_server(context: &Context) -> Result<guardsplat_proto::v1::PublicKey> {
     let request = GetPublicKeyRequest {};
     let sent = context.call("reading the public key", request, async |channel, request| {
         RegistryServiceClient::new(channel).get_public_key(request).await
@@ -134,7 +134,7 @@ async fn public_key_of_server(context: &Context) -> Result<guardsplat_proto::v1:
     sent.await
 }
 
-fn key_of(path: &Path) -> Result<VerifyingKey> {
+pub(super) fn key_of(path: &Path) -> Result<VerifyingKey> {
     let bytes = read(path, KEY_BYTES)?;
     let text = String::from_utf8_lossy(&bytes);
     let key = match text.trim_start().starts_with("-----BEGIN") {
@@ -150,8 +150,13 @@ fn key_from(digits: &str) -> Result<VerifyingKey> {
     VerifyingKey::from_bytes(&key.to_bytes()).map_err(|error| bad(error.to_string()))
 }
 
+/// A report, as a file.
+pub(super) fn document(path: &Path) -> Result<Vec<u8>> {
+    read(path, HTML_BYTES as u64)
+}
+
 /// A file that may have so many bytes.
-fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
+pub(super) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let size = std::fs::metadata(path).map_err(Error::io(path))?.len();
     if size > limit {
         let reason = format!("{size} bytes, at most {limit} are read");

@@ -83,8 +83,8 @@ struct ProgressReport {
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 enum ResultReport {
-    Embed(EmbedReport),
-    Verify(VerifyReport),
+    Embed(Box<EmbedReport>),
+    Verify(Box<VerifyReport>),
     Key(KeyResultReport),
 }
 
@@ -111,8 +111,8 @@ impl From<&Job> for JobReport {
             waiting_reason: some(&job.waiting_reason),
             progress: job.progress.as_ref().map(Into::into),
             result: job.result.as_ref().map(|result| match result {
-                Outcome::EmbedResult(result) => ResultReport::Embed(result.into()),
-                Outcome::VerifyResult(result) => ResultReport::Verify(result.into()),
+                Outcome::EmbedResult(result) => ResultReport::Embed(Box::new(result.into())),
+                Outcome::VerifyResult(result) => ResultReport::Verify(Box::new(result.into())),
                 Outcome::KeyResult(result) => ResultReport::Key(result.into()),
             }),
             failure: job.failure.as_ref().map(Into::into),
@@ -152,9 +152,9 @@ impl From<&Spec> for SpecReport {
             },
             Spec::Verify(spec) => verify(spec, given(spec.views), given(spec.size)),
             // A seed is as good as the key: it is not printed.
-            Spec::CreateKey(KeySpec { bits, seed }) => Self::CreateKey {
+            Spec::CreateKey(KeySpec { bits, seed, seeded }) => Self::CreateKey {
                 bits: *bits,
-                seeded: seed.is_some(),
+                seeded: *seeded || seed.is_some(),
             },
         }
     }
@@ -216,6 +216,7 @@ mod tests {
             spec: Some(Spec::CreateKey(KeySpec {
                 bits: 32,
                 seed: Some(424_242),
+                ..KeySpec::default()
             })),
             queue_position: Some(2),
             priority: Some(-3),

@@ -17,6 +17,6 @@ pub use hook::{DeliveryReport, HookReport};
 pub use job::{FailureReport, JobReport, kind, preset};
 pub use key::{KeyReport, KeyResultReport};
 pub use registry::{AssetReport, OwnerReport};
-pub use text::word;
+pub use text::{time, word};
 pub use token::TokenReport;
 pub use verify::VerifyReport;

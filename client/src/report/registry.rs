@@ -34,6 +34,8 @@ pub struct AssetReport {
     payload_number: i64,
     commitment: String,
     create_time: Option<String>,
+    /// When its commitment was first opened.
+    reveal_time: Option<String>,
 }
 
 impl From<&Asset> for AssetReport {
@@ -51,6 +53,7 @@ impl From<&Asset> for AssetReport {
             payload_number: asset.payload_number,
             commitment: asset.commitment.clone(),
             create_time: time(asset.create_time),
+            reveal_time: time(asset.reveal_time),
         }
     }
 }

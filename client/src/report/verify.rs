@@ -3,7 +3,7 @@ use guardsplat_proto::v1::VerifyResult;
 use guardsplat_proto::v1::verify_result::Verdict;
 use serde::Serialize;
 
-use super::text::{rows_ignored, seconds, some, word};
+use super::text::{rows_ignored, seconds, some, time, word};
 use crate::output::{Exit, printable};
 
 /// What came of a job that verified a suspect.
@@ -20,8 +20,8 @@ pub struct VerifyReport {
     message: Option<String>,
     bit_accuracy: Option<f64>,
     bit_accuracy_worst_view: Option<f64>,
-    mean_abs_logit: f64,
-    view_agreement: f64,
+    mean_abs_logit: Option<f64>,
+    view_agreement: Option<f64>,
     hypotheses: Option<u64>,
     framings: Option<u32>,
     assets: Option<u64>,
@@ -32,6 +32,13 @@ pub struct VerifyReport {
     corrected_bits: Option<u32>,
     evidence_html: Option<String>,
     evidence_json: Option<String>,
+    assets_paid: Option<u64>,
+    readings_paid: Option<u64>,
+    first_seen_time: Option<String>,
+    asset_commit_time: Option<String>,
+    asset_registered_later: bool,
+    /// Whether what tells how near it was is left out, for who calls is no admin; such fields are null.
+    redacted: bool,
     reason: Option<String>,
     ignored_rows: u64,
     seconds: f64,
@@ -54,12 +61,18 @@ impl From<&VerifyResult> for VerifyReport {
             message: some(&result.message),
             bit_accuracy: result.bit_accuracy,
             bit_accuracy_worst_view: result.bit_accuracy_worst_view,
-            mean_abs_logit: result.mean_abs_logit,
-            view_agreement: result.view_agreement,
+            mean_abs_logit: Some(result.mean_abs_logit).filter(|_| !result.redacted),
+            view_agreement: Some(result.view_agreement).filter(|_| !result.redacted),
             hypotheses: result.hypotheses,
             // Of a raw message these two are not counted.
             framings: result.hypotheses.map(|_| result.framings),
             assets: result.hypotheses.map(|_| result.assets),
+            assets_paid: Some(result.assets_paid).filter(|&assets| assets > 0),
+            readings_paid: Some(result.readings_paid).filter(|&readings| readings > 0),
+            first_seen_time: time(result.first_seen_time),
+            asset_commit_time: time(result.asset_commit_time),
+            asset_registered_later: result.asset_registered_later,
+            redacted: result.redacted,
             framing: some(&result.framing),
             asset: some(&result.asset),
             owner: some(&result.owner),
@@ -93,12 +106,15 @@ impl VerifyReport {
         if let Some(hypotheses) = self.hypotheses {
             return self.claim(&verdict, hypotheses);
         }
+        if self.redacted {
+            return self.without_figures(verdict);
+        }
         let read = format!(
             "read {} from {} views; views agree on {:.1} % of bits, mean logit {:.2}",
             printable(self.message.as_deref().unwrap_or_default()),
             self.views,
-            100.0 * self.view_agreement,
-            self.mean_abs_logit
+            100.0 * self.view_agreement.unwrap_or_default(),
+            self.mean_abs_logit.unwrap_or_default()
         );
         let mut text = match (self.matched_bits, self.p_value, self.threshold) {
             (Some(matched), Some(p), Some(threshold)) => format!(
@@ -117,6 +133,14 @@ impl VerifyReport {
         text + &rows_ignored(self.ignored_rows)
     }
 
+    /// Of a raw verification, to who is no admin.
+    fn without_figures(&self, mut text: String) -> String {
+        if let Some(reason) = &self.reason {
+            text = format!("{text}\n{}", printable(reason));
+        }
+        text + "\nhow near it was is told to admins" + &rows_ignored(self.ignored_rows)
+    }
+
     /// Of a claim: whose mark it is, and what was tried to find it.
     fn claim(&self, verdict: &str, hypotheses: u64) -> String {
         let mut text = verdict.to_owned();
@@ -126,24 +150,53 @@ impl VerifyReport {
         if let (Some(matched), Some(p), Some(threshold)) = (self.matched_bits, self.p_value, self.threshold) {
             let corrected = self.corrected_bits.map(|bits| format!(", {bits} corrected"));
             text += &format!(
-                ": {matched} of {} bits{}, p = {p:.2e} (threshold {threshold:e}) after {}: {}, {}; {}, best \
-                 {}",
+                ": {matched} of {} bits{}, p = {p:.2e} (threshold {threshold:e}) after {}: {}; {}, best {}",
                 self.bits,
                 corrected.unwrap_or_default(),
                 counted(hypotheses, "hypothesis", "hypotheses"),
-                counted(self.framings.unwrap_or_default().into(), "framing", "framings"),
-                counted(self.assets.unwrap_or_default(), "asset", "assets"),
+                self.tried(),
                 counted(self.views.into(), "view", "views"),
                 printable(self.framing.as_deref().unwrap_or_default())
+            );
+        }
+        if self.redacted {
+            // Of a match what the p-value is at most; of all else nothing.
+            let p = self.p_value.map(|p| format!(", p <= {p:e}"));
+            text += &format!(
+                "{} after {}: {}",
+                p.unwrap_or_default(),
+                counted(hypotheses, "hypothesis", "hypotheses"),
+                self.tried()
             );
         }
         if let Some(reason) = &self.reason {
             text = format!("{text}\n{}", printable(reason));
         }
+        if self.asset_registered_later && self.reason.is_none() {
+            text += "\nthe asset was registered after a file of the suspect was first seen, which can't carry its mark";
+        }
+        if self.redacted {
+            text += "\nhow near it was, and the evidence, are for admins";
+        }
         if let Some(evidence) = &self.evidence_html {
             text += &format!("\nevidence: {evidence}");
         }
         text + &rows_ignored(self.ignored_rows)
+    }
+}
+
+impl VerifyReport {
+    /// What the hypotheses are made of. Servers of before pay for what was compared, once.
+    fn tried(&self) -> String {
+        let framings = counted(self.framings.unwrap_or_default().into(), "framing", "framings");
+        let compared = self.assets.unwrap_or_default();
+        let assets = match self.assets_paid {
+            Some(paid) if paid > compared => format!("{compared} of {}", counted(paid, "asset", "assets")),
+            _ => counted(compared, "asset", "assets"),
+        };
+        let readings = self.readings_paid.filter(|&readings| readings > 1);
+        let readings = readings.map(|readings| format!(", reading {readings} of these files"));
+        format!("{framings}, {assets}{}", readings.unwrap_or_default())
     }
 }
 

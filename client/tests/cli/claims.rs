@@ -1,7 +1,7 @@
 //! `owner`, `asset`, `report`, and `embed` and `verify` with what is registered.
 use guardsplat_evidence::{
-    Audience, Evidence, EvidenceKind, Key, Model, SCHEMA, Sha256, SigningKey, Timestamp, Tried, VERSION,
-    Verdict as Told, Verification, sign,
+    Audience, Evidence, EvidenceKind, History, Key, Model, Multiplicity, SCHEMA, Sha256, SigningKey, Timestamp, Tried,
+    VERSION, Verdict as Told, Verification, sign,
 };
 use guardsplat_proto::v1::asset::Original;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
@@ -123,8 +123,55 @@ fn a_claim_tells_whose_mark_was_found_and_what_was_tried() {
     assert!(json["message"].is_null() && json["asset"] == ASSET, "{json}");
 }
 
+#[test]
+fn who_is_no_admin_is_told_the_verdict_and_what_it_took() {
+    let environment = TestEnvironment::new();
+    environment.file("s.ply", b"ply\n");
+    let mut found = VerifyResult {
+        p_value: Some(1e-6),
+        threshold: Some(1e-6),
+        bits: 64,
+        views: 20,
+        hypotheses: Some(24_000),
+        framings: 8,
+        assets: 1,
+        assets_paid: 1000,
+        readings_paid: 3,
+        asset: ASSET.into(),
+        owner: "owners/o".into(),
+        redacted: true,
+        ..VerifyResult::default()
+    };
+    found.set_verdict(Verdict::Match);
+    environment.fake.plan([success(Outcome::VerifyResult(found.clone()))]);
+    let ran = environment.run(&format!("verify s.ply --key website --asset {ASSET}"));
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let expected = format!(
+        "match with {ASSET} of owners/o, p <= 1e-6 after 24000 hypotheses: 8 framings, 1 of 1000 assets, reading 3 of \
+         these files\nhow near it was, and the evidence, are for admins\n"
+    );
+    assert_eq!(ran.out, expected);
+    found.set_verdict(Verdict::NoMatch);
+    (found.p_value, found.asset, found.owner) = (None, String::new(), String::new());
+    environment.fake.plan([success(Outcome::VerifyResult(found))]);
+    let ran = environment.run(&format!("verify s.ply --key website --asset {ASSET} --json"));
+    assert_eq!(ran.code, 2, "{}", ran.err);
+    let json = ran.json();
+    for hidden in [
+        "p_value",
+        "matched_bits",
+        "mean_abs_logit",
+        "view_agreement",
+        "framing",
+        "corrected_bits",
+    ] {
+        assert!(json[hidden].is_null(), "{hidden}: {json}");
+    }
+    assert_eq!((&json["redacted"], &json["assets_paid"]), (&true.into(), &1000.into()));
+}
+
 /// A signed report of a key that nothing is registered for.
-fn report(key: &SigningKey) -> guardsplat_evidence::Signed {
+pub fn report(key: &SigningKey) -> guardsplat_evidence::Signed {
     let now = Timestamp::from_second(1_800_000_000).unwrap();
     let evidence = Evidence {
         schema: SCHEMA.into(),
@@ -136,6 +183,7 @@ fn report(key: &SigningKey) -> guardsplat_evidence::Signed {
         finished: now,
         engine: "a test".into(),
         device: "cpu".into(),
+        worker: None,
         model: Model {
             name: "guardsplat".into(),
             sha256: Sha256([1; 32]),
@@ -146,9 +194,18 @@ fn report(key: &SigningKey) -> guardsplat_evidence::Signed {
             verdict: Told::UnknownKey,
             reason: None,
             note: None,
-            tried: Tried::once(),
+            tried: Tried {
+                paid: Some(Multiplicity { assets: 1, readings: 1 }),
+                ..Tried::once()
+            },
             views: 0,
             decision: None,
+            history: Some(History {
+                first_seen: now,
+                readings_of_key: 1,
+                assets_of_owner: None,
+                asset: None,
+            }),
             found: None,
             strip: Vec::new(),
         }),

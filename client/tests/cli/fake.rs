@@ -82,6 +82,8 @@ pub struct State {
     pub traced: Vec<Option<String>>,
     /// The public key, in hexadecimal.
     pub public_key: String,
+    /// What an opened commitment is answered with.
+    pub opened: Option<String>,
 
     /// What the next watch streams do.
     pub watch: VecDeque<Vec<Step>>,

@@ -1,5 +1,6 @@
 //! The client as a user runs it, against a server that does what each test says.
 mod claims;
+mod commitments;
 mod direct;
 mod embed;
 mod errors;

@@ -14,8 +14,9 @@ use guardsplat_proto::v1::{
     GetPublicKeyRequest, HttpHeader, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
     ListCommitmentsRequest, ListCommitmentsResponse, ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest,
     ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
-    RequeueJobRequest, StartUploadRequest, StartUploadResponse, UpdateKeyStateRequest, UploadArtifactRequest,
-    WatchJobRequest, WatchJobResponse, download_artifact_response, job_attempt, upload_artifact_request,
+    RequeueJobRequest, RevealCommitmentRequest, RevealCommitmentResponse, StartUploadRequest, StartUploadResponse,
+    UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response,
+    job_attempt, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -411,6 +412,21 @@ impl RegistryService for Fake {
         _: Request<ExportCommitmentRequest>,
     ) -> Result<Response<ExportCommitmentResponse>, Status> {
         Err(Status::unimplemented("no client asks for it"))
+    }
+
+    async fn reveal_commitment(
+        &self,
+        request: Request<RevealCommitmentRequest>,
+    ) -> Result<Response<RevealCommitmentResponse>, Status> {
+        let opened = self.state().opened.clone();
+        let document = opened.ok_or_else(|| not_found(&request.into_inner().name))?;
+        Ok(Response::new(RevealCommitmentResponse {
+            document,
+            reveal_time: Some(prost_types::Timestamp {
+                seconds: 1_800_000_000,
+                nanos: 0,
+            }),
+        }))
     }
 
     async fn get_public_key(&self, _: Request<GetPublicKeyRequest>) -> Result<Response<PublicKey>, Status> {

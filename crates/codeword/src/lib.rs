@@ -19,6 +19,9 @@ mod reading;
 mod search;
 mod whiten;
 
+/// The code that assets are marked with: 2 bits of version, 10 of the key and 24 of the payload number in 64.
+pub const MARK_CODE: Code = Code::Bch36;
+
 pub use acceptance::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE, Verdict};
 pub use claim::{Answer, Claim, Comparison, Confidences, HypothesisReading, ReadPayload, Target, Tested};
 pub use code::{Code, Decoded, Layout, PAPER_LENGTHS, Payload, Scheme};

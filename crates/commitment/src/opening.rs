@@ -1,6 +1,7 @@
 //! The secret nonce of an asset, and the blinding that keeps its hash from telling anything of it.
 use std::fmt;
 
+use secrecy::zeroize::Zeroizing;
 use secrecy::{ExposeSecret, SecretBox};
 use sha2::{Digest, Sha256};
 
@@ -63,6 +64,16 @@ impl Opening {
         hash.update(self.blinding());
         hash.update(self.nonce());
         hash.finalize().into()
+    }
+}
+
+impl Opening {
+    /// The secret of the pad that the asset's mark is under: SHA-256 of a prefix and the blinding, another value than
+    /// the commitment's hash is made of, should one ever get out.
+    pub fn whitening_secret(&self) -> Zeroizing<[u8; 32]> {
+        let mut hash = Sha256::new_with_prefix(b"guardsplat whitening secret\0");
+        hash.update(self.blinding());
+        Zeroizing::new(hash.finalize().into())
     }
 }
 

@@ -83,6 +83,7 @@ fn main() -> Result<(), Failure> {
             output: &folder.path().join("marked"),
             message: &message,
             settings: &settings,
+            cameras: &[],
             force: true,
             bad_rows: BadRows::Refuse,
         };

@@ -23,11 +23,11 @@ pub enum Error {
     #[error("malformed report: {0}")]
     Malformed(String),
     /// It is a report of a version that this program does not know.
-    #[error("the report has version {found}, this program reads version {known}: use a newer one")]
+    #[error("the report has version {found}, this program reads versions up to {known}: use a newer one")]
     UnknownVersion {
         /// What the report says.
         found: u64,
-        /// What can be read.
+        /// The newest that can be read.
         known: u32,
     },
     /// A field has a value that it can't have.

@@ -8,8 +8,11 @@ use serde::{Deserialize, Serialize};
 
 /// What every report says of itself.
 pub const SCHEMA: &str = "guardsplat.evidence";
-/// The version of the fields below. Another version is refused, never guessed at.
-pub const VERSION: u32 = 1;
+/// The version of the fields below, which new reports have. Those of version 1 are read as well; they name neither the
+/// worker nor what was tried before. Any other is refused, never guessed at.
+pub const VERSION: u32 = 2;
+/// The oldest version that is read.
+pub(crate) const FIRST_VERSION: u32 = 1;
 
 /// Everything that a report says. The order of fields is the order of the JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,7 +20,7 @@ pub const VERSION: u32 = 1;
 pub struct Evidence {
     /// [`SCHEMA`].
     pub schema: String,
-    /// [`VERSION`].
+    /// [`VERSION`], or an earlier one.
     pub version: u32,
     /// Who may read it.
     pub audience: Audience,
@@ -33,6 +36,9 @@ pub struct Evidence {
     pub engine: String,
     /// What it was computed on.
     pub device: String,
+    /// Who computed it; absent in reports of version 1, and where it is not told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worker: Option<Worker>,
     /// The CLIP that pictures were read with.
     pub model: Model,
     /// The key.
@@ -65,6 +71,16 @@ pub enum EvidenceKind {
     Embed,
     /// A suspect was read.
     Verify,
+}
+
+/// Who carried out the job, as the service knows it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Worker {
+    /// What the worker calls itself.
+    pub name: String,
+    /// Which time it was that a worker was given the job, from 1.
+    pub attempt: u32,
 }
 
 /// The CLIP that reads pictures.

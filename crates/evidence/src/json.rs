@@ -1,6 +1,6 @@
 //! The JSON of a report, written in one way only and read within limits.
 use crate::error::{Error, Result};
-use crate::evidence::{Evidence, SCHEMA, VERSION};
+use crate::evidence::{Evidence, FIRST_VERSION, SCHEMA, VERSION};
 use crate::limits::JSON_BYTES;
 use crate::signature::Signature;
 use serde::{Deserialize, Serialize};
@@ -77,7 +77,7 @@ pub(crate) fn read(json: &[u8]) -> Result<Document> {
         return Err(Error::NotAReport(format!("its schema is not {SCHEMA}")));
     }
     match version {
-        Some(found) if found == u64::from(VERSION) => {}
+        Some(found) if (u64::from(FIRST_VERSION)..=u64::from(VERSION)).contains(&found) => {}
         Some(found) => return Err(Error::UnknownVersion { found, known: VERSION }),
         None => return Err(Error::NotAReport("it has no version".into())),
     }

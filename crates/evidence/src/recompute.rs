@@ -2,7 +2,7 @@
 use crate::evidence::Evidence;
 use crate::picture::{Picture, View};
 use crate::verification::{Decision, Reason, Verification};
-use guardsplat_codeword::chance;
+use guardsplat_codeword::{Verdict, chance};
 use std::fmt::Debug;
 
 /// One thing that was computed again.
@@ -54,6 +54,15 @@ impl Verification {
         let cautious = !matches!(self.reason, None | Some(Reason::TooFewBits | Reason::TooManyHypotheses));
         let verdict = if cautious { self.verdict } else { decision.verdict() };
         findings.push(Finding::of("verdict", self.verdict, verdict));
+        if let Some(history) = &self.history {
+            // A file from before the asset can't carry its mark, whatever the numbers say.
+            let allowed = !(self.verdict == Verdict::Match && history.registered_later());
+            findings.push(Finding::of(
+                "an asset older than its suspect, of a match",
+                true,
+                allowed,
+            ));
+        }
         let known = self.strip.iter().filter_map(|bit| Some((bit.wanted?, bit.read)));
         let same: Vec<bool> = known.map(|(wanted, read)| wanted == read).collect();
         if !same.is_empty() {

@@ -6,11 +6,12 @@ impl Evidence {
     /// This report without what only an owner may see.
     ///
     /// Gone are the reading bit by bit with its logits and confidences (an attacker could climb them), payloads,
-    /// originals and differences (they are the mark), the engine's notes, and the names of files that the reader did
-    /// not send. Hashes and all that the p-value follows from stay.
+    /// originals and differences (they are the mark), the engine's notes, the worker's name, and the names of files that
+    /// the reader did not send. Hashes and all that the p-value follows from stay.
     pub fn for_stranger(&self) -> Self {
         let mut report = self.clone();
         report.audience = Audience::Stranger;
+        report.worker = None;
         if let Some(verification) = &mut report.verification {
             verification.strip.clear();
             verification.note = None;

@@ -11,6 +11,21 @@ pub struct Tried {
     pub owners: u64,
     /// Assets whose messages were compared, of all these owners together; each is one claim.
     pub assets: u64,
+    /// What is paid for beyond what was compared; absent in reports of version 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paid: Option<Multiplicity>,
+}
+
+/// What a claim is paid for whatever it names, since whoever claims may have chosen by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Multiplicity {
+    /// Assets that are registered for the key, of all owners: the claimant may have registered them, and named the one
+    /// that fits best.
+    pub assets: u64,
+    /// Readings that the claimant had made of any of these files, by different views or with different keys, this one
+    /// included.
+    pub readings: u64,
 }
 
 /// Hypotheses of one kind about what was done to a picture.
@@ -55,6 +70,7 @@ impl Tried {
             }],
             owners: 1,
             assets: 1,
+            paid: None,
         }
     }
 
@@ -64,9 +80,16 @@ impl Tried {
         apart.map(|f| u64::from(f.variants)).sum::<u64>().max(1)
     }
 
-    /// Hypotheses that were tried: each reading against each claim.
+    /// Assets that are paid for: those that were compared, and all others that might have been named.
+    pub fn assets_paid(&self) -> u64 {
+        let all = self.paid.map_or(0, |paid| paid.assets);
+        self.assets.max(all).max(1)
+    }
+
+    /// Hypotheses that are paid for: each reading against each asset, as often as the suspect was read.
     pub fn hypotheses(&self) -> u64 {
-        self.readings().saturating_mul(self.assets.max(1))
+        let times = self.paid.map_or(1, |paid| paid.readings.max(1));
+        self.readings().saturating_mul(self.assets_paid()).saturating_mul(times)
     }
 }
 
@@ -86,8 +109,19 @@ mod tests {
             ],
             owners: 2,
             assets: 10,
+            paid: None,
         };
         assert_eq!(tried.hypotheses(), 40);
+        // One asset that was named out of a thousand, in the third reading of the suspect.
+        let named = Tried {
+            assets: 1,
+            paid: Some(Multiplicity {
+                assets: 1000,
+                readings: 3,
+            }),
+            ..tried.clone()
+        };
+        assert_eq!(named.hypotheses(), 4 * 1000 * 3);
         let endless = Tried {
             assets: u64::MAX,
             ..tried

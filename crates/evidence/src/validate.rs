@@ -3,9 +3,10 @@
 //! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
 use crate::embedding::Embedding;
 use crate::error::{Error, Result};
-use crate::evidence::{Evidence, EvidenceKind, SCHEMA, VERSION};
+use crate::evidence::{Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
+use crate::history::History;
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
-use crate::verification::{Decision, Verification};
+use crate::verification::{Decision, Reason, Verification};
 use guardsplat_codeword::Verdict;
 
 impl Evidence {
@@ -14,7 +15,7 @@ impl Evidence {
         if self.schema != SCHEMA {
             return Err(Error::field("schema", format!("it must be {SCHEMA}")));
         }
-        if self.version != VERSION {
+        if !(FIRST_VERSION..=VERSION).contains(&self.version) {
             let (found, known) = (u64::from(self.version), VERSION);
             return Err(Error::UnknownVersion { found, known });
         }
@@ -40,9 +41,52 @@ impl Evidence {
             (EvidenceKind::Embed, _, None) => return Err(Error::field("embedding", "an embed job has one")),
             _ => {}
         }
+        if let Some(worker) = &self.worker {
+            name("worker.name", &worker.name)?;
+            if worker.attempt == 0 {
+                return Err(Error::field("worker.attempt", "it must be at least 1"));
+            }
+        }
+        self.validate_version()?;
         self.verification.iter().try_for_each(Verification::validate)?;
         self.embedding.iter().try_for_each(Embedding::validate)?;
         self.validate_views()
+    }
+
+    /// Whether it has what reports of its version have: what is missing must not read as if nothing had been tried.
+    fn validate_version(&self) -> Result<()> {
+        let Some(verification) = &self.verification else {
+            return Ok(());
+        };
+        let (paid, history) = (verification.tried.paid, &verification.history);
+        if self.version > FIRST_VERSION {
+            if self.kind == EvidenceKind::Verify && paid.is_none() {
+                return Err(Error::field(
+                    "verification.tried.paid",
+                    "a verify job has it since version 2",
+                ));
+            }
+            if self.kind == EvidenceKind::Verify && history.is_none() {
+                return Err(Error::field(
+                    "verification.history",
+                    "a verify job has it since version 2",
+                ));
+            }
+            return Ok(());
+        }
+        let later = [
+            ("worker", self.worker.is_some()),
+            ("verification.tried.paid", paid.is_some()),
+            ("verification.history", history.is_some()),
+            (
+                "verification.reason",
+                verification.reason == Some(Reason::RegisteredLater),
+            ),
+        ];
+        match later.into_iter().find(|(_, there)| *there) {
+            Some((field, _)) => Err(Error::field(field, "version 1 has no such thing")),
+            None => Ok(()),
+        }
     }
 
     fn validate_views(&self) -> Result<()> {
@@ -102,6 +146,10 @@ impl Verification {
             name(&field("found.asset"), &found.asset)?;
             payload(&field("found.payload"), found.payload.as_deref())?;
         }
+        if self.tried.paid.is_some_and(|paid| paid.readings == 0) {
+            return Err(Error::field(field("tried.paid.readings"), "this one counts"));
+        }
+        self.history.iter().try_for_each(History::validate)?;
         count(&field("strip"), self.strip.len(), BITS)?;
         for (i, bit) in self.strip.iter().enumerate() {
             let field = |name: &str| format!("verification.strip[{i}].{name}");
@@ -119,6 +167,15 @@ impl Verification {
             return Err(Error::field(field("strip"), reason));
         }
         Ok(())
+    }
+}
+
+impl History {
+    fn validate(&self) -> Result<()> {
+        let field = |name: &str| format!("verification.history.{name}");
+        let Some(asset) = &self.asset else { return Ok(()) };
+        name(&field("asset.asset"), &asset.asset)?;
+        name(&field("asset.commitment"), &asset.commitment)
     }
 }
 

@@ -1,4 +1,5 @@
 //! What a reading found: the verdict, the numbers behind it, and whose message it is.
+use crate::history::History;
 use crate::tried::Tried;
 use guardsplat_codeword::{AcceptanceRule, Verdict, chance};
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,9 @@ pub struct Verification {
     pub views: u32,
     /// The numbers; absent where nothing was compared.
     pub decision: Option<Decision>,
+    /// What was before; absent in reports of version 1, and of a marking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub history: Option<History>,
     /// Whose it is; with [`Verdict::Match`] only.
     pub found: Option<Found>,
     /// The reading bit by bit, most significant first; empty, or one for each bit. For owners only.
@@ -39,6 +43,9 @@ pub enum Reason {
     WeakReading,
     /// The pictures are too few or too small to be read.
     TooLittleToRead,
+    /// So many bits match that it would be a match, and a file of the suspect was seen before the asset was registered,
+    /// when nobody could have marked it: the asset was chosen to fit, or chance did it. Not in version 1.
+    RegisteredLater,
 }
 
 /// The numbers behind a verdict. Null hypothesis: the suspect is independent of the secret, uniform pad that the message

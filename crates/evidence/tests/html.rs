@@ -152,7 +152,7 @@ fn the_verdict_comes_first_and_says_how_sure_it_is() {
     assert!(readings.contains("p = 5.64 · 10−15"), "{readings}");
     let numbers = text(&found, "table.facts");
     assert!(numbers.contains("Threshold in bits54 of 64"), "{numbers}");
-    assert!(text(&found, "section p").contains("5 × 10 = 50 hypotheses"));
+    assert!(text(&found, "section p").contains("5 × 10 × 1 = 50 hypotheses"));
     assert_eq!(all(&found, "rect.cell").len(), 64);
     assert_eq!(all(&found, "rect.differs").len(), 2);
     assert_eq!(all(&found, "path.cross").len(), 2, "seen without colour");
@@ -173,6 +173,7 @@ fn each_verdict_says_what_it_is_and_what_it_is_not() {
             "no-match" => ("No match: ", "does not say that the suspect is unmarked"),
             "inconclusive-weak" => ("Inconclusive: ", "more pictures from other directions"),
             "inconclusive-no-message" => ("Inconclusive: ", "reads as some message"),
+            "inconclusive-registered-later" => ("Inconclusive: ", "can’t carry its mark"),
             "inconclusive-few-bits" => ("Inconclusive: ", "even all 16 bits would not do"),
             "unknown-key" => ("Unknown key: ", "Nothing was rendered, read or compared"),
             "embed" => ("Marked: ", "at least 36.00 dB"),

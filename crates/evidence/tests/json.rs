@@ -1,8 +1,9 @@
-//! The JSON of reports: the same bytes again, within limits, and nothing that it can't mean.
+//! The JSON of reports: the same bytes again, within limits, and nothing that it can't mean; and reports that were signed by
+//! versions of before, kept as they were then.
 #[path = "../examples/samples/mod.rs"]
 mod samples;
 
-use guardsplat_evidence::{Error, Evidence, Signed, limits, sign};
+use guardsplat_evidence::{Answer, Error, Evidence, Signed, check, limits, sign};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -19,6 +20,9 @@ static SIGNED: LazyLock<Signed> = LazyLock::new(|| {
     };
     sign(&evidence, &samples::key()).unwrap()
 });
+
+static SIGNED_EVIDENCE: LazyLock<Option<String>> =
+    LazyLock::new(|| Evidence::from_json(SIGNED.json.as_bytes()).ok()?.to_json().ok());
 
 #[test]
 fn reports_round_trip_but_for_the_bytes_of_pictures() {
@@ -40,7 +44,7 @@ fn the_order_of_fields_is_fixed() {
     let json = samples::matching().to_json().unwrap();
     assert!(
         json.starts_with(
-            "{\"schema\":\"guardsplat.evidence\",\"version\":1,\"audience\":\"owner\",\"kind\":\"verify\""
+            "{\"schema\":\"guardsplat.evidence\",\"version\":2,\"audience\":\"owner\",\"kind\":\"verify\""
         )
     );
     let place = |field: &str| json.rfind(&format!("\"{field}\":")).unwrap();
@@ -93,9 +97,13 @@ proptest! {
             let at = at.index(bytes.len());
             let same = bytes[at] == byte;
             bytes[at] = byte;
-            let answer = guardsplat_evidence::check(&bytes, &samples::key().verifying_key()).answer;
+            let answer = check(&bytes, &samples::key().verifying_key()).answer;
             let space = at + 1 == bytes.len() && byte.is_ascii_whitespace();
-            prop_assert_eq!(matches!(answer, guardsplat_evidence::Answer::Genuine), same || space);
+            // Another last digit may be the same number, to the last bit; then the report says what was signed.
+            let alike = Evidence::from_json(&bytes).is_ok_and(|read| read.to_json().ok() == *SIGNED_EVIDENCE);
+            let genuine = matches!(answer, Answer::Genuine);
+            prop_assert!(genuine || !same);
+            prop_assert!(!genuine || same || space || alike);
         }
     }
 }
@@ -103,14 +111,14 @@ proptest! {
 #[test]
 fn another_version_is_named_before_its_fields_are_looked_at() {
     let json = samples::matching().to_json().unwrap();
-    let newer = json.replace("\"version\":1,", "\"version\":2,\"something\":{\"new\":[1,2]},");
+    let newer = json.replace("\"version\":2,", "\"version\":3,\"something\":{\"new\":[1,2]},");
     let error = Evidence::from_json(newer.as_bytes()).unwrap_err();
-    assert!(matches!(error, Error::UnknownVersion { found: 2, known: 1 }), "{error}");
-    assert!(error.to_string().contains("version 2"), "{error}");
+    assert!(matches!(error, Error::UnknownVersion { found: 3, known: 2 }), "{error}");
+    assert!(error.to_string().contains("version 3"), "{error}");
     let signed = sign(&samples::matching(), &samples::key())
         .unwrap()
         .json
-        .replace("\"version\":1", "\"version\":7");
+        .replace("\"version\":2", "\"version\":7");
     let error = Evidence::from_json(signed.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 7, .. }), "{error}");
 }
@@ -201,4 +209,65 @@ fn a_stranger_gets_the_verdict_and_no_secret() {
     let marking = samples::embed(true).for_stranger().to_json().unwrap();
     assert!(!marking.contains("c0ffee42") && !marking.contains("marked.ply"));
     assert_eq!(stranger.for_stranger(), stranger);
+}
+
+/// Signed by version 1.
+const REPORTS: [(&str, &[u8]); 5] = [
+    ("match", include_bytes!("reports_of_before/match.json")),
+    ("no match", include_bytes!("reports_of_before/no-match.json")),
+    ("embed", include_bytes!("reports_of_before/embed.json")),
+    (
+        "inconclusive",
+        include_bytes!("reports_of_before/inconclusive-weak.json"),
+    ),
+    ("page", include_bytes!("reports_of_before/match-stranger.html")),
+];
+
+#[test]
+fn what_was_signed_before_is_genuine_still() {
+    for (name, document) in REPORTS {
+        let checked = check(document, &samples::key().verifying_key());
+        assert!(
+            matches!(checked.answer, Answer::Genuine),
+            "{name}: {:?}",
+            checked.answer
+        );
+        assert!(checked.holds(), "{name}: {:#?}", checked.findings);
+        let evidence = checked.evidence.unwrap();
+        assert_eq!((evidence.version, evidence.worker.as_ref()), (1, None), "{name}");
+        let read = evidence.verification.as_ref().unwrap();
+        assert_eq!((read.tried.paid, read.history.as_ref()), (None, None), "{name}");
+    }
+}
+
+#[test]
+fn what_a_version_has_can_neither_be_left_out_nor_added() {
+    let refused = |change: fn(&mut Evidence)| {
+        let mut evidence = samples::matching();
+        change(&mut evidence);
+        match evidence.to_json() {
+            Err(Error::BadField { field, .. }) => field,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(|e| e.version = 1), "worker");
+    assert_eq!(
+        refused(|e| e.verification.as_mut().unwrap().tried.paid = None),
+        "verification.tried.paid"
+    );
+    assert_eq!(
+        refused(|e| e.verification.as_mut().unwrap().history = None),
+        "verification.history"
+    );
+    assert_eq!(refused(|e| e.worker.as_mut().unwrap().attempt = 0), "worker.attempt");
+}
+
+#[test]
+fn a_match_with_an_asset_that_is_younger_than_its_suspect_does_not_hold() {
+    let mut evidence = samples::matching();
+    let history = evidence.verification.as_mut().unwrap().history.as_mut().unwrap();
+    history.asset.as_mut().unwrap().time = "2026-03-12T18:04:12Z".parse().unwrap();
+    let wrong: Vec<_> = evidence.recompute().into_iter().filter(|f| !f.agrees).collect();
+    assert_eq!(wrong.len(), 1, "{wrong:?}");
+    assert!(wrong[0].what.contains("older than its suspect"), "{wrong:?}");
 }

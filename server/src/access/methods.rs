@@ -23,8 +23,8 @@ const WORK: Need = AnyOf(&[Embed, Verify]);
 const DELETE: Need = LOOK;
 /// Looking at what the project has.
 const LOOK: Need = AnyOf(&[Embed, Verify, Admin]);
-/// Workers read the inputs of running jobs in this way, and nothing else.
-const READ: Need = AnyOf(&[Embed, Verify, Worker]);
+/// Workers read the inputs of running jobs in this way, and nothing else; admins evidence, and nothing else.
+const READ: Need = AnyOf(&[Embed, Verify, Admin, Worker]);
 
 /// Paths of all calls, as HTTP/2 has them.
 pub const METHODS: &[(&str, Need)] = &[
@@ -55,6 +55,7 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.RegistryService/ListCommitments", LOOK),
     ("/guardsplat.v1.RegistryService/GetHead", LOOK),
     ("/guardsplat.v1.RegistryService/ExportCommitment", LOOK),
+    ("/guardsplat.v1.RegistryService/RevealCommitment", ADMIN),
     ("/guardsplat.v1.RegistryService/GetPublicKey", Token),
     ("/guardsplat.v1.TokenService/CreateToken", ADMIN),
     ("/guardsplat.v1.TokenService/ListTokens", ADMIN),

@@ -25,13 +25,14 @@ impl JobService for Service {
 
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<Job>, Status> {
         let id = ResourceKind::Job.parse("name", &request.get_ref().name)?;
-        let row = self.owned_job(&caller(&request)?.project, id).await?;
-        Ok(Response::new(self.describe_job(row).await?))
+        let caller = caller(&request)?;
+        let row = self.owned_job(&caller.project, id).await?;
+        Ok(Response::new(self.describe_job(row, self.disclosure(&caller)).await?))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
-        let project = caller(&request)?.project;
-        Ok(Response::new(self.list(&project, request.get_ref()).await?))
+        let caller = caller(&request)?;
+        Ok(Response::new(self.list(&caller, request.get_ref()).await?))
     }
 
     async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<Job>, Status> {
@@ -44,7 +45,7 @@ impl JobService for Service {
         self.metrics().job_ended(&row);
         self.changes().job(id);
         self.changes().queue_moved();
-        Ok(Response::new(to_proto::job(row)))
+        Ok(Response::new(self.disclosure(&caller).job(to_proto::job(row))))
     }
 
     type WatchJobStream = BoxStream<'static, Result<WatchJobResponse, Status>>;
@@ -53,7 +54,7 @@ impl JobService for Service {
         let caller = caller(&request)?;
         let permit = self.watch_limit().take(payer(&caller), self.limits().max_watches)?;
         let WatchJobRequest { name, cursor } = request.into_inner();
-        let watching = watch::watch(self.clone(), caller.project, &name, &cursor).await?;
+        let watching = watch::watch(self.clone(), &caller, &name, &cursor).await?;
         let kept = move |message| {
             let _ = &permit;
             message

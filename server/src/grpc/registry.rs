@@ -4,7 +4,7 @@ use guardsplat_proto::v1::{
     Asset, Commitment, CreateAssetRequest, CreateOwnerRequest, ExportCommitmentRequest, ExportCommitmentResponse,
     GetAssetRequest, GetCommitmentRequest, GetHeadRequest, GetOwnerRequest, GetPublicKeyRequest, ListAssetsRequest,
     ListAssetsResponse, ListCommitmentsRequest, ListCommitmentsResponse, ListOwnersRequest, ListOwnersResponse, Owner,
-    PublicKey,
+    PublicKey, RevealCommitmentRequest, RevealCommitmentResponse,
 };
 use tonic::{Request, Response, Status};
 
@@ -72,6 +72,17 @@ impl RegistryService for Service {
         let project = caller(&request)?.project;
         let document = self.document(&project, &request.get_ref().name).await?;
         Ok(Response::new(ExportCommitmentResponse { document }))
+    }
+
+    async fn reveal_commitment(
+        &self,
+        request: Request<RevealCommitmentRequest>,
+    ) -> Result<Response<RevealCommitmentResponse>, Status> {
+        let caller = caller(&request)?;
+        let name = &request.get_ref().name;
+        let answer = self.reveal(&caller.project, name).await?;
+        tracing::info!(commitment = name, project = caller.project, by = ?caller.token, "commitment opened: its asset's word is no secret any more");
+        Ok(Response::new(answer))
     }
 
     async fn get_public_key(&self, _: Request<GetPublicKeyRequest>) -> Result<Response<PublicKey>, Status> {

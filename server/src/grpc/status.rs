@@ -45,7 +45,7 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::TokenUnknown => (Code::Unauthenticated, "TOKEN_UNKNOWN"),
         Error::TokenExpired => (Code::Unauthenticated, "TOKEN_EXPIRED"),
         Error::TokenRevoked => (Code::Unauthenticated, "TOKEN_REVOKED"),
-        Error::ScopeMissing { .. } => (Code::PermissionDenied, "SCOPE_MISSING"),
+        Error::ScopeMissing { .. } | Error::ScopeNeeded { .. } => (Code::PermissionDenied, "SCOPE_MISSING"),
         Error::NoSuchCall => (Code::Unimplemented, "UNIMPLEMENTED"),
         Error::QueueFull { .. } => (Code::ResourceExhausted, "QUEUE_FULL"),
         Error::TooManyCalls { .. } => (Code::ResourceExhausted, "TOO_MANY_CALLS"),
@@ -81,6 +81,7 @@ fn metadata(error: &Error) -> HashMap<String, String> {
         }
         Error::QuotaUsedUp { limit, project, .. } => vec![("project", project.clone()), ("limit", limit.to_string())],
         Error::ScopeMissing { needed } => vec![("scopes", needed.join(","))],
+        Error::ScopeNeeded { needed, .. } => vec![("scopes", (*needed).to_owned())],
         Error::QueueFull { limit, .. } => vec![("limit", limit.to_string())],
         Error::TooManyWatches { limit } => vec![("limit", limit.to_string())],
         Error::SceneDoesNotFit {

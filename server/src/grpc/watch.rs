@@ -5,11 +5,13 @@ use futures::stream::{self, BoxStream};
 use guardsplat_proto::v1::WatchJobResponse;
 use tonic::Status;
 
+use crate::access::Caller;
 use crate::error::{Error, Result};
 use crate::grpc::slow_consumer::patient;
 use crate::ledger::{JobId, JobRow, JobState};
 use crate::metrics::Watching;
 use crate::service::changes::{For, Heard, Listener};
+use crate::service::claims::Disclosure;
 use crate::service::names::ResourceKind;
 use crate::service::{Service, opaque_token, queue_positions};
 
@@ -61,7 +63,7 @@ impl Seen {
 /// in between, and holds up nobody. One who does not read at all is let go after a while.
 pub async fn watch(
     api: Service,
-    project: String,
+    caller: &Caller,
     name: &str,
     cursor: &str,
 ) -> Result<BoxStream<'static, Result<WatchJobResponse, Status>>> {
@@ -69,12 +71,14 @@ pub async fn watch(
     let seen = Seen::parse(id, cursor)?;
     // From before the first look, so that no change falls in between.
     let listener = api.changes().listen();
-    let known = api.owned_job(&project, id).await?;
+    let known = api.owned_job(&caller.project, id).await?;
+    let disclosure = api.disclosure(caller);
     let (metrics, stall) = (api.metrics(), api.limits().watch_stall);
     let watcher = Watcher {
         _watching: metrics.watching(),
         api,
-        project,
+        project: caller.project.clone(),
+        disclosure,
         listener,
         id,
         seen,
@@ -105,6 +109,8 @@ struct Watcher {
     _watching: Watching,
     api: Service,
     project: String,
+    /// What whoever watches is told.
+    disclosure: Disclosure,
     listener: Listener,
     id: JobId,
     seen: Option<Seen>,
@@ -150,7 +156,7 @@ impl Watcher {
             let (seen, state) = (Seen::of(&row), row.state);
             let before = self.seen.replace(seen);
             self.over = state.is_over();
-            let job = self.api.describe_job(row.clone()).await?;
+            let job = self.api.describe_job(row.clone(), self.disclosure).await?;
             // No part of the cursor: whoever comes back is told of it once more.
             let waits = self.waits.replace(!job.waiting_reason.is_empty());
             if before != Some(seen) || waits.is_some_and(|waits| waits == job.waiting_reason.is_empty()) {

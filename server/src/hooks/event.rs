@@ -1,10 +1,15 @@
 //! What a hook is sent: a CloudEvents 1.0 message in structured JSON that says what became of a job. It has figures and
 //! names, and never a message, a payload or a key.
+use guardsplat_proto::v1::VerifyResult;
 use guardsplat_proto::v1::failure::Reason;
 use serde::Serialize;
 use uuid::Uuid;
 
-use crate::ledger::{ArtifactId, ArtifactRow, DeliveryRow, FailureReason, JobKind, JobResult, JobRow, JobState};
+use crate::ledger::{
+    ArtifactId, ArtifactRow, DeliveryRow, FailureReason, JobKind, JobResult, JobRow, JobSpec, JobState,
+};
+use crate::service::claims::Disclosure;
+use crate::service::clock::text;
 
 /// What such a message is, for the header.
 pub const CONTENT_TYPE: &str = "application/cloudevents+json; charset=utf-8";
@@ -71,6 +76,7 @@ enum Figures {
         bits: u32,
         views: u32,
         bit_accuracy: Option<f64>,
+        asset_registered_later: bool,
         asset: Option<String>,
         owner: Option<String>,
     },
@@ -107,10 +113,12 @@ pub fn outputs(job: &JobRow) -> Vec<(&'static str, ArtifactId)> {
     found.collect()
 }
 
-/// The message for a delivery; the same however often it is sent.
+/// The message for a delivery; the same however often it is sent. Whoever receives it is no admin, whoever made the hook.
+/// Raw verifications are told as `raw_allowed` has it.
 pub fn body(
     delivery: &DeliveryRow,
     job: &JobRow,
+    raw_allowed: bool,
     asked_id: Option<Uuid>,
     artifacts: Vec<(&'static str, ArtifactRow)>,
 ) -> Vec<u8> {
@@ -121,7 +129,7 @@ pub fn body(
         source: format!("/guardsplat/projects/{}", delivery.project),
         r#type: event_type(delivery.job_state),
         subject: format!("jobs/{}", job.id),
-        time: time(delivery.create_time),
+        time: text(delivery.create_time),
         datacontenttype: "application/json",
         data: Data {
             job: format!("jobs/{}", job.id),
@@ -134,10 +142,10 @@ pub fn body(
             state: word_of(delivery.job_state),
             request_id: asked_id.map(|id| id.to_string()),
             attempt: job.attempt,
-            create_time: time(job.create_time),
-            end_time: time(delivery.create_time),
+            create_time: text(job.create_time),
+            end_time: text(delivery.create_time),
             artifacts: artifacts.into_iter().map(artifact).collect(),
-            figures: figures(job),
+            figures: figures(job, Disclosure::Verdict { raw: raw_allowed }),
             failure_reason: failure.map(|failure| reason(failure.reason)),
         },
     };
@@ -145,8 +153,7 @@ pub fn body(
     serde_json::to_vec(&event).unwrap_or_default()
 }
 
-fn figures(job: &JobRow) -> Option<Figures> {
-    let some = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+fn figures(job: &JobRow, disclosure: Disclosure) -> Option<Figures> {
     Some(match job.result.as_ref()? {
         JobResult::Embed(result) => Figures::Embed {
             bit_accuracy: result.bit_accuracy,
@@ -160,24 +167,33 @@ fn figures(job: &JobRow) -> Option<Figures> {
             changed_gaussians: result.changed_gaussians,
             target_missed: result.target_missed.clone(),
         },
-        JobResult::Verify(result) => Figures::Verify {
-            verdict: word(result.verdict().as_str_name(), "VERDICT_"),
-            p_value: result.p_value,
-            threshold: result.threshold,
-            matched_bits: result.matched_bits,
-            needed_bits: result.needed_bits,
-            bits: result.bits,
-            views: result.views,
-            bit_accuracy: result.bit_accuracy,
-            asset: some(&result.asset),
-            owner: some(&result.owner),
-        },
+        JobResult::Verify(result) => verified(match &job.spec {
+            JobSpec::Verify(spec) => disclosure.result(spec, result.clone()),
+            JobSpec::Embed(_) | JobSpec::CreateKey(_) => return None,
+        }),
         JobResult::CreateKey(result) => Figures::CreateKey {
             key: result.key.clone(),
             bit_accuracy_unseen: result.bit_accuracy_unseen,
             bit_accuracy_unseen_noisy: result.bit_accuracy_unseen_noisy,
         },
     })
+}
+
+fn verified(result: VerifyResult) -> Figures {
+    let some = |text: String| Some(text).filter(|text| !text.is_empty());
+    Figures::Verify {
+        verdict: word(result.verdict().as_str_name(), "VERDICT_"),
+        p_value: result.p_value,
+        threshold: result.threshold,
+        matched_bits: result.matched_bits,
+        needed_bits: result.needed_bits,
+        bits: result.bits,
+        views: result.views,
+        bit_accuracy: result.bit_accuracy,
+        asset_registered_later: result.asset_registered_later,
+        asset: some(result.asset),
+        owner: some(result.owner),
+    }
 }
 
 fn artifact((role, row): (&'static str, ArtifactRow)) -> Artifact {
@@ -210,21 +226,15 @@ fn word_of(state: JobState) -> &'static str {
     }
 }
 
-/// Microseconds since 1970 as RFC 3339.
-fn time(micros: i64) -> String {
-    let since = std::time::Duration::from_micros(u64::try_from(micros).unwrap_or_default());
-    humantime::format_rfc3339_micros(std::time::UNIX_EPOCH + since).to_string()
-}
-
 #[cfg(test)]
 mod tests {
     use guardsplat_proto::v1::verify_result::Verdict;
     use serde_json::Value;
 
     use super::*;
-    use guardsplat_proto::v1::{EmbedSpec, KeyResult, KeySpec, VerifyResult, VerifySpec};
+    use guardsplat_proto::v1::{EmbedSpec, KeyResult, VerifySpec};
 
-    use crate::ledger::{DeliveryState, Failure as Failed, JobSpec, Progress, ResourceRequirements};
+    use crate::ledger::{DeliveryState, Failure as Failed, KeyOrder, Progress, ResourceRequirements};
 
     const SECRET: &str = "5ec2e75ec2e75ec2";
 
@@ -270,7 +280,7 @@ mod tests {
             last_time: None,
             end_time: None,
         };
-        let body = body(&delivery, job, None, Vec::new());
+        let body = body(&delivery, job, false, None, Vec::new());
         let text = String::from_utf8(body.clone()).unwrap();
         assert!(!text.contains(SECRET) && !text.contains("4711"), "{text}");
         serde_json::from_slice(&body).unwrap()
@@ -281,6 +291,7 @@ mod tests {
         let result = VerifyResult {
             verdict: Verdict::NoMatch.into(),
             p_value: Some(0.25),
+            matched_bits: Some(40),
             message: SECRET.into(),
             payload_number: Some(4711),
             evidence_json: format!("artifacts/{}", Uuid::from_u128(3)),
@@ -305,8 +316,8 @@ mod tests {
         );
         let figures = &event["data"]["figures"];
         assert_eq!(
-            (&figures["verdict"], &figures["p_value"]),
-            (&"no_match".into(), &0.25.into())
+            (&figures["verdict"], &figures["p_value"], &figures["matched_bits"]),
+            (&"no_match".into(), &Value::Null, &Value::Null)
         );
         assert_eq!(
             (&figures["asset"], &figures["owner"]),
@@ -322,7 +333,7 @@ mod tests {
             ..KeyResult::default()
         };
         let made = event(&row(
-            JobSpec::CreateKey(KeySpec::default()),
+            JobSpec::CreateKey(KeyOrder { bits: 64, seed: None }),
             JobState::Succeeded,
             Some(JobResult::CreateKey(result)),
         ));

@@ -31,6 +31,7 @@ pub(super) fn numbered(new: &NewAsset, key: &KeyRow, last: i64, now: i64) -> Res
         key: new.key,
         payload: last + 1,
         create_time: now,
+        reveal_time: None,
     })
 }
 

@@ -1,7 +1,8 @@
 //! Keys that jobs have made, and their states.
 use super::Result;
 use super::registry::KeyState;
-use super::types::{KeyId, KeyRow};
+use super::types::{JobId, KeyId, KeyRow};
+use super::work::KeyOrder;
 
 /// The keys of all projects; the key files are secret artifacts.
 #[async_trait::async_trait]
@@ -17,4 +18,11 @@ pub trait KeyLedger: Send + Sync + 'static {
     /// # Errors
     /// `NotFound`; `KeyStateFinal` when nothing leads from the state it has to this one.
     async fn update_key_state(&self, id: KeyId, next: KeyState, reason: &str, now: i64) -> Result<KeyRow>;
+
+    /// Jobs that make or made a key from a seed which is kept as it was told, as versions of before did.
+    async fn open_seeds(&self) -> Result<Vec<(JobId, KeyOrder)>>;
+
+    /// Keeps the order of a key with its seed sealed, and another fingerprint of the request in place of one that the
+    /// seed could be guessed by.
+    async fn seal_seed(&self, job: JobId, order: KeyOrder, fingerprint: [u8; 32]) -> Result<()>;
 }

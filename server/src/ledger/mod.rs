@@ -22,6 +22,7 @@ pub mod conformance;
 mod discriminants;
 mod error;
 mod generation;
+mod history;
 pub mod hooks;
 mod idempotency;
 mod jobs;
@@ -47,6 +48,7 @@ pub use artifacts::ArtifactLedger;
 pub use commitments::{CommitmentLog, SealedSigningKey};
 pub use error::{LedgerError, Result};
 pub use generation::{Generation, GenerationLedger};
+pub use history::{Before as ReadBefore, NewReading, ReadingHistory};
 pub use hooks::{
     Busy, DeliveryFilter, DeliveryId, DeliveryRow, DeliveryState, HookId, HookLedger, HookRow, MOST_WAITING, NewHook,
     Sending, Topics,
@@ -68,7 +70,7 @@ pub use types::{
     ArtifactId, ArtifactRow, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobRow, JobState,
     KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey, Origin,
 };
-pub use work::{JobResult, JobSpec, Progress};
+pub use work::{JobResult, JobSpec, KeyOrder, Progress, Seed};
 pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPresence};
 
 /// What the service keeps of its work, by capability. A call that returned `Ok` is on disk.
@@ -83,6 +85,7 @@ pub trait Ledger:
     + JobQueue
     + JobStore
     + KeyLedger
+    + ReadingHistory
     + Registry
     + Retention
     + Statistics

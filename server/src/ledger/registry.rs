@@ -1,16 +1,15 @@
 //! The registry: owners, assets, and the states of keys.
 use std::sync::Arc;
 
-use guardsplat_codeword::{Code, Layout};
+use guardsplat_codeword::Layout;
 use guardsplat_commitment::{Hash, SigningKey};
 use uuid::Uuid;
 
 use super::Result;
 use super::types::{ArtifactId, KeyId};
 
-/// The code of all marks: 2 bits of version, 10 of the key and 24 of the payload number in 64. It says how many payload
-/// numbers a key has.
-pub const MARK_CODE: Code = Code::Bch36;
+/// The code of all marks, which says how many payload numbers a key has.
+pub use guardsplat_codeword::MARK_CODE;
 
 /// Name of an owner.
 pub type OwnerId = Uuid;
@@ -122,6 +121,8 @@ pub struct AssetRow {
     pub payload: i64,
     /// When it was registered.
     pub create_time: i64,
+    /// When its commitment was first opened for somebody, from when on its word is no secret.
+    pub reveal_time: Option<i64>,
 }
 
 /// Which assets to list; all, when neither is given.
@@ -187,6 +188,15 @@ pub trait Registry: Send + Sync + 'static {
 
     /// Assets of a key by payload number, those with higher ones than `after`. [`super::candidates::of_key`] reads all.
     async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>>;
+
+    /// How many assets a key has; those of one owner, where one is given.
+    async fn count_assets(&self, key: KeyId, owner: Option<OwnerId>) -> Result<u64>;
+
+    /// Notes that the commitment to an asset is opened for somebody. The first time counts.
+    ///
+    /// # Errors
+    /// `NotFound`.
+    async fn reveal_asset(&self, asset: AssetId, now: i64) -> Result<AssetRow>;
 
     /// One asset as a search has it.
     async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>>;

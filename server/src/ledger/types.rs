@@ -269,7 +269,7 @@ pub struct ArtifactRow {
     pub job: Option<JobId>,
     /// A key file: never visible.
     pub secret: bool,
-    /// A signed report of a claim.
+    /// A signed report.
     pub evidence: bool,
     /// Where the store has the bytes.
     pub path: String,

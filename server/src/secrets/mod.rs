@@ -8,7 +8,8 @@ mod load;
 mod seal;
 
 use chacha20poly1305::aead::Generate;
-use secrecy::zeroize::Zeroize;
+use hmac::{Hmac, KeyInit, Mac};
+use secrecy::zeroize::{Zeroize, Zeroizing};
 use secrecy::{ExposeSecret, SecretBox};
 use sha2::{Digest, Sha256};
 
@@ -67,6 +68,23 @@ impl MasterKey {
             key: SecretBox::new(Box::new(bytes)),
             id,
         }
+    }
+
+    /// HMAC-SHA256 of something under a key of its own for this purpose, which follows from the master key: what is hashed
+    /// can't be found by trying without that.
+    pub fn keyed_hash(&self, purpose: &str, bytes: &[u8]) -> [u8; 32] {
+        let mut derived = Sha256::new_with_prefix(b"guardsplat keyed hash\0");
+        derived.update(self.bytes());
+        let derived = Zeroizing::new(<[u8; 32]>::from(derived.finalize()));
+        // A key of a whole block: HMAC itself puts zeros behind shorter ones, and this way nothing can fail.
+        let mut block = Zeroizing::new([0; 64]);
+        block.iter_mut().zip(derived.iter()).for_each(|(to, from)| *to = *from);
+        let mut mac = Hmac::<Sha256>::new(&(*block).into());
+        for part in [purpose.as_bytes(), bytes] {
+            mac.update(&(part.len() as u64).to_be_bytes());
+            mac.update(part);
+        }
+        mac.finalize().into_bytes().into()
     }
 
     /// What tells this key from others, in hexadecimal; no secret.

@@ -23,6 +23,12 @@ pub fn timestamp(micros: i64) -> Timestamp {
     }
 }
 
+/// Microseconds since the epoch as RFC 3339.
+pub fn text(micros: i64) -> String {
+    let since = Duration::from_micros(u64::try_from(micros).unwrap_or_default());
+    humantime::format_rfc3339_micros(UNIX_EPOCH + since).to_string()
+}
+
 /// A timestamp of the API in microseconds since the epoch; `None` when it is malformed or far out of reach.
 pub fn micros_of(time: &Timestamp) -> Option<i64> {
     let nanos = i64::from(time.nanos);

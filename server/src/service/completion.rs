@@ -1,12 +1,12 @@
 //! Checks what a worker says came out of a job, before it becomes the job's result.
 use guardsplat_proto::v1::complete_job_request::Result as Output;
-use guardsplat_proto::v1::{CompleteJobRequest, EmbedResult, KeyOutput, KeyResult, KeySpec, VerifyResult};
+use guardsplat_proto::v1::{CompleteJobRequest, EmbedResult, KeyOutput, KeyResult, VerifyResult};
 use prost::Message as _;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, NewKey};
+use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, KeyOrder, NewKey};
 use crate::service::names::ResourceKind;
 use crate::service::violations::Violations;
 use crate::service::{text, upload};
@@ -101,17 +101,17 @@ fn verify(result: VerifyResult) -> Result<Outcome> {
     })
 }
 
-fn key(job: &JobRow, spec: &KeySpec, output: KeyOutput) -> Result<Outcome> {
+fn key(job: &JobRow, order: &KeyOrder, output: KeyOutput) -> Result<Outcome> {
     let mut problems = Violations::default();
     let artifact = problems.take(ResourceKind::Artifact.parse("key_output.key_file", &output.key_file))?;
     let told = output.key.unwrap_or_default();
     problems.check(
-        told.bits == spec.bits,
+        told.bits == order.bits,
         "key_output.key.bits",
         "must be the bits that were asked for",
     );
     problems.check(
-        told.seeded == spec.seed.is_some(),
+        told.seeded == order.seed.is_some(),
         "key_output.key.seeded",
         "must say whether the job was given a seed",
     );

@@ -3,13 +3,14 @@ use guardsplat_proto::v1::{CreateJobRequest, Job, ListJobsRequest, ListJobsRespo
 use prost::Message as _;
 use uuid::Uuid;
 
-use crate::access::Caller;
+use crate::access::{Caller, Scope};
 use crate::error::{Error, Result};
-use crate::ledger::{JobKind, NewJob};
+use crate::ledger::{JobKind, JobSpec, NewJob};
+use crate::service::claims::Disclosure;
 use crate::service::rate_limit::{Class, payer};
 use crate::service::submission::{self, Submission};
 use crate::service::{
-    Service, clock, fingerprint, keys, message, operations, ownership, page, predicted_cost, to_proto,
+    Service, clock, fingerprint, keys, message, operations, ownership, page, predicted_cost, seeds, to_proto,
 };
 
 /// A page ends early rather than come near the largest message that clients read by default.
@@ -58,17 +59,32 @@ impl Service {
             clip = Some(key.clip_sha256).filter(|hash| !hash.is_empty());
         }
         if submission.spec.kind() == JobKind::Verify {
+            if submission.claim.is_none() && !self.limits().raw_verification && !caller.scopes.has(Scope::Admin) {
+                return Err(Error::ScopeNeeded {
+                    what: "verifying without a claim on an asset tells every bit that is read, and needs it unless the \
+                           operator sets allow_raw_verification",
+                    needed: Scope::Admin.word(),
+                });
+            }
             self.shared.meter.count(Class::Claim, &payer(caller))?;
         }
         let priority = urgency(&submission, self.limits().max_priority)?;
         let mut requirements = self.admit(project, &submission).await?;
         requirements.clip = clip;
-        let fingerprint = self.fingerprint(project, &submission).await?;
+        let mut fingerprint = self.fingerprint(project, &submission).await?;
+        let id = Uuid::now_v7();
+        let spec = match submission.spec {
+            JobSpec::CreateKey(order) if order.seed.is_some() => {
+                fingerprint = seeds::fingerprint(self.master(), fingerprint);
+                JobSpec::CreateKey(seeds::sealed(self.master(), id, order)?)
+            }
+            spec => spec,
+        };
         let new = NewJob {
-            id: Uuid::now_v7(),
+            id,
             project: project.to_owned(),
             display_name: submission.display_name,
-            spec: submission.spec,
+            spec,
             inputs: submission.inputs,
             key: submission.key,
             request_id: submission.request_id.map(|id| ownership::request(project, id)),
@@ -79,7 +95,6 @@ impl Service {
             requirements,
             trace_parent,
         };
-        let id = new.id;
         let row = self.ledger().create_job(new, clock::now()).await;
         let row = row.map_err(|error| ownership::as_asked(error, submission.request_id))?;
         // A request that was sent again has made its job before.
@@ -87,7 +102,12 @@ impl Service {
             self.metrics().created(row.kind());
         }
         self.changes().queue_grew();
-        self.describe_job(row).await
+        self.describe_job(row, self.disclosure(caller)).await
+    }
+
+    /// What a caller is told of jobs.
+    pub(crate) fn disclosure(&self, caller: &Caller) -> Disclosure {
+        Disclosure::to(caller, self.limits().raw_verification)
     }
 
     /// What a request is known by when it is sent again; needed only where it has a name.
@@ -101,7 +121,8 @@ impl Service {
         Ok(fingerprint::whole(&submission.asked, &inputs))
     }
 
-    pub(crate) async fn list(&self, project: &str, request: &ListJobsRequest) -> Result<ListJobsResponse> {
+    pub(crate) async fn list(&self, caller: &Caller, request: &ListJobsRequest) -> Result<ListJobsResponse> {
+        let (project, disclosure) = (caller.project.as_str(), self.disclosure(caller));
         let size = page::size(request.page_size)?;
         let states = to_proto::states(&request.states)?;
         let numbers: Vec<u8> = states.iter().map(|&state| state as u8).collect();
@@ -124,7 +145,7 @@ impl Service {
         let mut last = None;
         for row in rows.into_iter().take(size as usize) {
             let position = (row.create_time, row.id);
-            let job = self.describe_job(row).await?;
+            let job = self.describe_job(row, disclosure).await?;
             bytes += job.encoded_len();
             if bytes > MAX_PAGE_BYTES && !jobs.is_empty() {
                 break;

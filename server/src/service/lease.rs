@@ -13,12 +13,15 @@ use crate::ledger::{Failure, FailureReason, JobRow, JobSpec, KeyId, KeyRow, KeyS
 use crate::service::changes::For;
 use crate::service::names::ResourceKind;
 use crate::service::placement::described;
-use crate::service::{Service, clock, to_proto};
+use crate::service::{Service, clock, seeds, to_proto};
 use crate::traces;
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// How late a job is found that became ready by time alone, after a failed attempt.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
+
+/// The least rate that workers can decide at.
+const LEAST_RATE: f64 = 1e-30;
 
 impl Service {
     /// Leases a job, waiting for one if need be.
@@ -42,8 +45,8 @@ impl Service {
             self.worker_is_there(&worker).await?;
             let capabilities = self.capabilities(&worker).await?;
             if let Some(lease) = self.claim(capabilities).await? {
-                let job = match self.for_worker(&lease).await {
-                    Ok(job) => job,
+                let (job, false_positive_rate) = match self.for_worker(&lease).await {
+                    Ok(told) => told,
                     Err(error) => {
                         self.not_given(&lease, &error).await?;
                         continue;
@@ -54,7 +57,7 @@ impl Service {
                     trace_parent: lease.job.trace_parent.unwrap_or_default(),
                     lease_token: lease.token,
                     lease_duration: Some(clock::proto_duration(self.limits().lease)),
-                    false_positive_rate: self.limits().false_positive_rate,
+                    false_positive_rate,
                 });
             }
             let left = end.saturating_duration_since(Instant::now());
@@ -65,15 +68,24 @@ impl Service {
         }
     }
 
-    /// A job as its worker is told it: with the word to embed, where that is an asset's.
-    async fn for_worker(&self, lease: &Lease) -> Result<Job> {
+    /// A job as its worker is told it, with the word to embed where that is an asset's, and the seed of a key; and the rate
+    /// to decide at.
+    async fn for_worker(&self, lease: &Lease) -> Result<(Job, f64)> {
         let mut job = to_proto::job(lease.job.clone());
+        let mut rate = self.limits().false_positive_rate;
+        if let JobSpec::CreateKey(order) = &lease.job.spec {
+            job.spec = Some(Spec::CreateKey(seeds::opened(self.master(), lease.job.id, order)?));
+        }
         if let Some(Spec::Embed(spec)) = &mut job.spec
             && let Some(word) = self.word_of(spec).await?
         {
             spec.message = word;
+            // A claim pays for all assets of the key, so a mark must be as strong as that takes.
+            let key = ResourceKind::Key.parse("job.embed.key", &spec.key)?;
+            let assets = self.ledger().count_assets(key, None).await?;
+            rate = (rate / assets.max(1) as f64).max(LEAST_RATE);
         }
-        Ok(job)
+        Ok((job, rate))
     }
 
     /// Ends an attempt that could not begin.

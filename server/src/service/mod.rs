@@ -40,6 +40,7 @@ pub(crate) mod quota;
 pub mod rate_limit;
 pub(crate) mod registry;
 pub mod retention;
+pub(crate) mod seeds;
 pub(crate) mod stages;
 pub(crate) mod store_generation;
 pub(crate) mod submission;
@@ -74,6 +75,8 @@ pub struct Limits {
     pub max_watches: u32,
     /// How often a scene without the mark may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
+    /// Whether everybody who verifies may do so without a claim on an asset, and be told every bit; else admins may.
+    pub raw_verification: bool,
     /// Jobs of one project that may wait; none for no limit but that of all.
     pub max_queued_of_project: Option<u64>,
     /// Whether a project may have no more jobs waiting than there is room left for others.
@@ -107,6 +110,7 @@ impl Default for Limits {
             watch_stall: Duration::from_secs(60),
             max_watches: 1_000,
             false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
+            raw_verification: false,
             max_queued_of_project: None,
             fair_shares: false,
             max_bytes_of_project: None,

@@ -26,6 +26,7 @@ impl Service {
         self.metrics().requeued(job.kind());
         self.changes().job(id);
         self.changes().queue_grew();
+        // Only admins queue jobs once more.
         Ok(to_proto::job(row))
     }
 

@@ -36,6 +36,9 @@ impl Service {
         let row = row.ok_or_else(|| ResourceKind::Artifact.not_found(id))?;
         let works = [Scope::Embed, Scope::Verify].into_iter().any(|s| caller.scopes.has(s));
         let own = works && row.project == caller.project;
+        if row.evidence && row.project == caller.project && (works || caller.scopes.has(Scope::Admin)) {
+            return self.readable_evidence(caller, row).await;
+        }
         if own || caller.scopes.has(Scope::Worker) && self.ledger().is_being_read(id).await? {
             return Ok(row);
         }
@@ -58,6 +61,23 @@ impl Service {
             },
             None => Ok(()),
         }
+    }
+
+    /// Evidence of a claim has all that [`Disclosure`](crate::service::claims::Disclosure) keeps from those who are no
+    /// admins. That of a marking is also for those who mark.
+    async fn readable_evidence(&self, caller: &Caller, row: ArtifactRow) -> Result<ArtifactRow> {
+        let job = match row.job {
+            Some(job) => self.ledger().peek_job(job).await?,
+            None => None,
+        };
+        let of_marking = job.is_some_and(|job| job.kind() == JobKind::Embed);
+        if caller.scopes.has(Scope::Admin) || of_marking && caller.scopes.has(Scope::Embed) {
+            return Ok(row);
+        }
+        Err(Error::ScopeNeeded {
+            what: "evidence tells how near a claim was",
+            needed: Scope::Admin.word(),
+        })
     }
 
     pub(crate) async fn owned_key(&self, project: &str, id: KeyId) -> Result<KeyRow> {

@@ -7,6 +7,7 @@ use guardsplat_proto::v1::Job;
 
 use crate::error::{Error, Result};
 use crate::ledger::{JobRow, JobState, ResourceRequirements, SeenWorker, WorkerCapabilities};
+use crate::service::claims::Disclosure;
 use crate::service::{Service, clock, text, to_proto};
 
 /// A worker that was not heard of for so long, and has no job, counts for nothing.
@@ -90,15 +91,15 @@ impl Service {
         Ok(capabilities(worker, &seen))
     }
 
-    /// A job for the API; of one that is queued it is told if nobody can have it.
-    pub(crate) async fn describe_job(&self, row: JobRow) -> Result<Job> {
+    /// A job as somebody is told of it; of one that is queued it is told if nobody can have it.
+    pub(crate) async fn describe_job(&self, row: JobRow, disclosure: Disclosure) -> Result<Job> {
         let waiting_reason = match row.state {
             JobState::Queued => waiting_reason(&row.requirements, &self.workers_lately().await?),
             _ => None,
         };
         Ok(Job {
             waiting_reason: waiting_reason.unwrap_or_default(),
-            ..to_proto::job(row)
+            ..disclosure.job(to_proto::job(row))
         })
     }
 }

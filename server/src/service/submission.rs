@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::error::{Error, Result};
 use crate::ledger::queue::PRIORITIES;
-use crate::ledger::{ArtifactId, JobSpec, KeyId};
+use crate::ledger::{ArtifactId, JobSpec, KeyId, KeyOrder, Seed};
 use crate::service::claims::{self, Claim};
 use crate::service::names::ResourceKind;
 use crate::service::violations::Violations;
@@ -64,7 +64,11 @@ pub fn check(request: CreateJobRequest) -> Result<Submission> {
         Some(Spec::Verify(spec)) => verify(&spec, &mut problems)?.map(|w| (JobSpec::Verify(spec), w)),
         Some(Spec::CreateKey(spec)) => {
             create_key(&spec, &mut problems);
-            Some((JobSpec::CreateKey(spec), Wanted::default()))
+            let order = KeyOrder {
+                bits: spec.bits,
+                seed: spec.seed.map(Seed::Open),
+            };
+            Some((JobSpec::CreateKey(order), Wanted::default()))
         }
         None => {
             problems.add(
@@ -194,6 +198,8 @@ fn create_key(spec: &KeySpec, problems: &mut Violations) {
         "job.create_key.bits",
         "must be 1 to 150",
     );
+    let reason = "is set by the server and must be empty";
+    problems.check(!spec.seeded, "job.create_key.seeded", reason);
 }
 
 fn side(field: &str, size: u32, problems: &mut Violations) {

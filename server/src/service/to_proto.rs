@@ -7,7 +7,7 @@ use crate::ledger::{ArtifactRow, Failure, JobResult, JobRow, JobSpec, JobState, 
 use crate::service::clock::timestamp;
 use crate::service::names::ResourceKind;
 
-/// A job for the API.
+/// A job for the API, all that is known of it; but for seeds, which are told to nobody.
 pub fn job(row: JobRow) -> v1::Job {
     let queued = row.state == JobState::Queued;
     v1::Job {
@@ -37,7 +37,11 @@ fn spec(spec: JobSpec) -> Spec {
     match spec {
         JobSpec::Embed(spec) => Spec::Embed(spec),
         JobSpec::Verify(spec) => Spec::Verify(spec),
-        JobSpec::CreateKey(spec) => Spec::CreateKey(spec),
+        JobSpec::CreateKey(order) => Spec::CreateKey(v1::KeySpec {
+            bits: order.bits,
+            seed: None,
+            seeded: order.seed.is_some(),
+        }),
     }
 }
 

@@ -42,6 +42,9 @@ pub struct Flags {
     /// Whether other machines may reach a server that is open to anybody [default: false]
     #[arg(long, value_name = "true|false")]
     pub allow_open_network: Option<bool>,
+    /// Whether all who verify may do so without a claim on an asset, and be told every bit [default: false]
+    #[arg(long, value_name = "true|false")]
+    pub allow_raw_verification: Option<bool>,
     /// File of the server's certificate (PEM), with which it speaks TLS only [default: none, without TLS]
     #[arg(long, value_name = "FILE")]
     pub tls_certificate: Option<PathBuf>,
@@ -174,6 +177,7 @@ impl Flags {
             metrics_listen,
             access,
             allow_open_network,
+            allow_raw_verification,
             tls_certificate,
             tls_key,
             tls_client_ca,
@@ -218,6 +222,7 @@ impl Flags {
         set(&mut settings.metrics_listen, metrics_listen.map(Some));
         set(&mut settings.access, access);
         set(&mut settings.allow_open_network, allow_open_network);
+        set(&mut settings.allow_raw_verification, allow_raw_verification);
         set(&mut settings.tls_certificate, tls_certificate.map(Some));
         set(&mut settings.tls_key, tls_key.map(Some));
         set(&mut settings.tls_client_ca, tls_client_ca.map(Some));

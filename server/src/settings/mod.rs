@@ -31,6 +31,8 @@ pub struct Settings {
     pub access: Access,
     /// Whether other machines may reach a server that asks nobody for a token.
     pub allow_open_network: bool,
+    /// Whether everybody who verifies may do so without a claim on an asset, and be told every bit that is read.
+    pub allow_raw_verification: bool,
     /// File of the server's certificate; with it the server speaks TLS only.
     pub tls_certificate: Option<PathBuf>,
     /// File of the certificate's key.
@@ -165,6 +167,7 @@ impl Default for Settings {
             metrics_listen: None,
             access: Access::Open,
             allow_open_network: false,
+            allow_raw_verification: false,
             tls_certificate: None,
             tls_key: None,
             tls_client_ca: None,

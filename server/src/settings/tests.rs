@@ -67,6 +67,7 @@ fn every_setting_can_be_set_everywhere() {
         ("metrics_listen", "127.0.0.1:9464"),
         ("access", "tokens"),
         ("allow_open_network", "true"),
+        ("allow_raw_verification", "true"),
         ("tls_certificate", "/c.pem"),
         ("tls_key", "/k.pem"),
         ("tls_client_ca", "/ca.pem"),

@@ -158,7 +158,13 @@ impl Service {
                 artifacts.push((role, row));
             }
         }
-        let body = event::body(&sending.delivery, job, sending.asked_id, artifacts);
+        let body = event::body(
+            &sending.delivery,
+            job,
+            self.limits().raw_verification,
+            sending.asked_id,
+            artifacts,
+        );
         let kept = self
             .ledger()
             .keep_delivery_body(sending.delivery.id, &sending.token, &body);

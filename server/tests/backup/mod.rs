@@ -91,7 +91,15 @@ async fn submit(channel: &Channel, spec: Spec) -> Job {
 
 /// Has a job make a key, as a worker would.
 async fn make_key(channel: &Channel) -> String {
-    let made = submit(channel, Spec::CreateKey(KeySpec { bits: 64, seed: None })).await;
+    let made = submit(
+        channel,
+        Spec::CreateKey(KeySpec {
+            bits: 64,
+            seed: None,
+            ..KeySpec::default()
+        }),
+    )
+    .await;
     let LeaseJobResponse { lease_token, .. } = lease(channel).await;
     let first = OutputMetadata {
         job: made.name.clone(),

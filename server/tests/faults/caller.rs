@@ -179,9 +179,16 @@ impl Caller {
 
     /// A key, made by a job of its own. The queue must be empty.
     pub async fn key(&self) -> String {
-        self.submit(job(Spec::CreateKey(KeySpec { bits: 16, seed: None })), "")
-            .await
-            .unwrap();
+        self.submit(
+            job(Spec::CreateKey(KeySpec {
+                bits: 16,
+                seed: None,
+                ..KeySpec::default()
+            })),
+            "",
+        )
+        .await
+        .unwrap();
         let (job, token) = self.take().await;
         crate::stub::complete(self, &job, &token).await.unwrap();
         match self.job(&job.name).await.unwrap().result {

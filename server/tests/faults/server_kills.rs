@@ -17,7 +17,11 @@ const EACH: usize = 8;
 
 fn job() -> Job {
     Job {
-        spec: Some(Spec::CreateKey(KeySpec { bits: 8, seed: None })),
+        spec: Some(Spec::CreateKey(KeySpec {
+            bits: 8,
+            seed: None,
+            ..KeySpec::default()
+        })),
         ..Job::default()
     }
 }

@@ -17,7 +17,11 @@ use crate::support::SOON;
 
 fn job() -> Job {
     Job {
-        spec: Some(Spec::CreateKey(KeySpec { bits: 8, seed: None })),
+        spec: Some(Spec::CreateKey(KeySpec {
+            bits: 8,
+            seed: None,
+            ..KeySpec::default()
+        })),
         ..Job::default()
     }
 }

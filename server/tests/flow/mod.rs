@@ -48,7 +48,11 @@ pub async fn carry_out(channel: &Channel, client: impl Interceptor + Clone, work
     let scene = scene.into_inner().name;
 
     let made = jobs
-        .create_job(create(Spec::CreateKey(KeySpec { bits: 64, seed: None })))
+        .create_job(create(Spec::CreateKey(KeySpec {
+            bits: 64,
+            seed: None,
+            ..KeySpec::default()
+        })))
         .await;
     let made = made.unwrap().into_inner().name;
     let (_, token) = lease(&mut worker).await;

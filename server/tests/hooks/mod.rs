@@ -37,7 +37,11 @@ async fn a_message_goes_out_and_its_secret_is_in_no_log() {
     let mut hooks = HookServiceClient::new(channel.clone());
     let made = hooks.create_hook(wanted(url)).await.unwrap().into_inner();
     let job = Job {
-        spec: Some(Spec::CreateKey(KeySpec { bits: 8, seed: None })),
+        spec: Some(Spec::CreateKey(KeySpec {
+            bits: 8,
+            seed: None,
+            ..KeySpec::default()
+        })),
         ..Job::default()
     };
     let request = CreateJobRequest {

@@ -1,6 +1,6 @@
 //! What somebody shows to prove a claim: reports of evidence, and commitments.
 use crate::memory::bounded;
-use guardsplat_commitment::Document;
+use guardsplat_commitment::{Document, OpenedDocument};
 use guardsplat_evidence::{Answer, Evidence, SigningKey, check};
 use std::sync::LazyLock;
 
@@ -30,6 +30,12 @@ pub fn evidence(data: &[u8]) {
 /// Commitments as documents: one that is read is written as the same, and holds under one key at most.
 pub fn commitment(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
+    if let Ok(opened) = bounded(data.len(), || OpenedDocument::from_json(text)) {
+        let json = opened.to_json().expect("what was read is written");
+        let again = OpenedDocument::from_json(&json).expect("what was written is read");
+        assert_eq!(again.document, opened.document);
+        assert_eq!(again.opening.bytes(), opened.opening.bytes());
+    }
     let Ok(read) = bounded(data.len(), || Document::from_json(text)) else {
         return;
     };

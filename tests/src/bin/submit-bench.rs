@@ -52,7 +52,11 @@ async fn main() -> ExitCode {
 async fn submit(mut client: JobServiceClient<tonic::transport::Channel>, count: usize) -> Vec<Duration> {
     let mut times = Vec::with_capacity(count);
     for number in 0..count {
-        let spec = KeySpec { bits: 32, seed: None };
+        let spec = KeySpec {
+            bits: 32,
+            seed: None,
+            ..KeySpec::default()
+        };
         let job = Job {
             display_name: format!("number {number}"),
             spec: Some(Spec::CreateKey(spec)),

@@ -54,7 +54,7 @@ fn an_asset_is_marked_and_recognised_and_another_is_not() {
         (&found["asset"], &found["owner"]),
         (&asset.clone().into(), &owner.into())
     );
-    assert_eq!((&found["hypotheses"], &found["payload_number"]), (&1.into(), &1.into()));
+    assert_eq!((&found["hypotheses"], &found["payload_number"]), (&2.into(), &1.into()));
     verify("out.ply", &format!("--asset {other}"), 2);
     verify("out.ply", &format!("--owner {rival}"), 2);
     let searched = verify("out.ply", "--search", 0);

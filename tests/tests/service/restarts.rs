@@ -22,6 +22,7 @@ fn request(number: u32, request_id: Uuid) -> CreateJobRequest {
     let spec = KeySpec {
         bits: 8,
         seed: Some(u64::from(number)),
+        ..KeySpec::default()
     };
     CreateJobRequest {
         job: Some(Job {

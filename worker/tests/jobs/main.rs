@@ -78,6 +78,7 @@ fn jobs_give_what_the_offline_commands_give() {
     server.submit(Spec::CreateKey(KeySpec {
         bits: 32,
         seed: Some(7),
+        ..KeySpec::default()
     }));
     let Done::KeyOutput(made) = completed(&server) else {
         panic!()
@@ -242,7 +243,11 @@ fn jobs_that_cannot_be_done_fail_with_their_reason() {
         ),
         (verify(&[&poisoned], ""), InvalidInput, false, " is NaN"),
         (
-            Spec::CreateKey(KeySpec { bits: 151, seed: None }),
+            Spec::CreateKey(KeySpec {
+                bits: 151,
+                seed: None,
+                ..KeySpec::default()
+            }),
             InvalidInput,
             false,
             "151 is outside 1 to 150",

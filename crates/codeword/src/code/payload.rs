@@ -1,4 +1,6 @@
 //! What a mark says: whose key, and which entry of its registry.
+use sha2::{Digest, Sha256};
+
 use serde::{Deserialize, Serialize};
 
 use crate::code::Code;
@@ -55,6 +57,14 @@ pub struct Payload {
 }
 
 impl Payload {
+    /// The payload of a number of a key. Keys have no numbers: theirs is the first bits of the SHA-256 of their id, which
+    /// is enough, since nothing is looked up by it.
+    pub fn of_key(code: Code, key: &[u8; 16], number: u32) -> Self {
+        let [a, b, c, d, ..]: [u8; 32] = Sha256::digest(key).into();
+        let key = u32::from_be_bytes([a, b, c, d]) >> (32 - Layout::of(code).key);
+        Self { key, number }
+    }
+
     /// The payload as information bits of `code`, in the lowest [`Code::information_bits`].
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 use serde_json::{Value, json};
 
 use super::*;
-use crate::{Document, Error, MAX_DOCUMENT_BYTES};
+use crate::{Document, Error, MAX_DOCUMENT_BYTES, OpenedDocument};
 
 fn document() -> Document {
     Document {
@@ -131,4 +131,57 @@ fn what_is_wrong_is_told() {
     }
     let long = format!("{}{}", document().to_json().unwrap(), " ".repeat(MAX_DOCUMENT_BYTES));
     assert!(matches!(Document::from_json(&long), Err(Error::NotADocument(_))));
+}
+
+fn opened() -> OpenedDocument {
+    OpenedDocument {
+        document: document(),
+        opening: opening(),
+    }
+}
+
+#[test]
+fn an_opened_commitment_is_read_back_and_opens() {
+    let text = opened().to_json().unwrap();
+    assert!(OpenedDocument::is_one(&text) && !OpenedDocument::is_one(&document().to_json().unwrap()));
+    let read = OpenedDocument::from_json(&text).unwrap();
+    assert_eq!((&read.document, read.opening.bytes()), (&document(), opening().bytes()));
+    assert_eq!(read.to_json().unwrap(), text);
+    read.verify(&signing_key().public_key()).unwrap();
+    assert!(matches!(
+        read.verify(&another_key().public_key()),
+        Err(Error::OtherKey { .. })
+    ));
+    // Nothing of it is told by accident.
+    let digits = hex::encode(opening().nonce());
+    assert!(text.contains(&digits) && !format!("{read:?}").contains(&digits));
+}
+
+#[test]
+fn every_field_of_an_opened_commitment_counts() {
+    let json: serde_json::Map<String, Value> = serde_json::from_str(&opened().to_json().unwrap()).unwrap();
+    assert_eq!(json.len(), 5);
+    let held = |json: &serde_json::Map<String, Value>| {
+        let read = OpenedDocument::from_json(&Value::Object(json.clone()).to_string());
+        read.and_then(|read| read.verify(&signing_key().public_key()))
+    };
+    held(&json).unwrap();
+    for field in json.keys() {
+        let mut changed = json.clone();
+        changed.remove(field);
+        assert!(held(&changed).is_err(), "without {field}");
+    }
+    let mut newer = json.clone();
+    newer["version"] = json!(2);
+    assert_eq!(held(&newer), Err(Error::UnknownVersion { found: 2, known: 1 }));
+    for field in ["nonce", "blinding"] {
+        let digits = json[field].as_str().unwrap().to_owned();
+        let mut changed = json.clone();
+        changed[field] = json!(format!("{}{}", &digits[1..], "a"));
+        assert_eq!(held(&changed), Err(Error::WrongOpening), "{field}");
+        for odd in [digits.to_uppercase(), digits[2..].to_owned(), format!("{digits}00")] {
+            changed[field] = json!(odd);
+            assert!(matches!(held(&changed), Err(Error::Field { .. })), "{field}");
+        }
+    }
 }

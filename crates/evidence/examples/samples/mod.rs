@@ -1,7 +1,8 @@
 //! Made-up reports, plausible and always the same, for examples and tests.
 use guardsplat_evidence::{
-    Audience, Bit, Decision, Embedding, Evidence, EvidenceKind, Found, HypothesisGroup, HypothesisKind, Input, Key,
-    Model, Picture, Reason, Role, SCHEMA, Sha256, SigningKey, Target, Tried, VERSION, Verdict, Verification, View,
+    Audience, Bit, Decision, Embedding, Evidence, EvidenceKind, Found, History, HypothesisGroup, HypothesisKind, Input,
+    Key, Model, Multiplicity, Picture, Reason, Registration, Role, SCHEMA, Sha256, SigningKey, Target, Timestamp,
+    Tried, VERSION, Verdict, Verification, View, Worker,
 };
 
 /// The service's key; of examples, so everybody's.
@@ -20,6 +21,7 @@ pub fn all() -> Vec<(&'static str, Evidence)> {
         ("inconclusive-weak", verify(undecided(Reason::WeakReading))),
         ("inconclusive-no-message", verify(undecided(Reason::NothingToCompare))),
         ("inconclusive-few-bits", verify(few_bits())),
+        ("inconclusive-registered-later", verify(registered_later())),
         ("unknown-key", verify(unknown_key())),
         ("embed", embed(true)),
         ("embed-missed", embed(false)),
@@ -40,6 +42,10 @@ pub fn matching() -> Evidence {
         ],
         owners: 2,
         assets: 10,
+        paid: Some(Multiplicity {
+            assets: 10,
+            readings: 1,
+        }),
     };
     let mut evidence = verify(decided(62, tried));
     evidence.views = views(2);
@@ -120,6 +126,10 @@ pub fn verify(verification: Verification) -> Evidence {
         finished: "2026-03-14T09:27:31.5Z".parse().expect("a time"),
         engine: "guardsplat-worker 0.1.0".into(),
         device: "NVIDIA GeForce RTX 4070 (Vulkan)".into(),
+        worker: Some(Worker {
+            name: "render-7".into(),
+            attempt: 1,
+        }),
         model: Model {
             name: "guardsplat-clip".into(),
             sha256: Sha256::of(b"weights"),
@@ -138,7 +148,8 @@ pub fn verify(verification: Verification) -> Evidence {
 }
 
 /// A verification that compared 64 bits, so many of which agree.
-pub fn decided(matched: u32, tried: Tried) -> Verification {
+pub fn decided(matched: u32, mut tried: Tried) -> Verification {
+    tried.paid.get_or_insert(Multiplicity { assets: 1, readings: 1 });
     let decision = Decision::new(64, matched, Some((64 - matched).min(3)), tried.hypotheses(), 1e-6);
     let verdict = decision.verdict();
     Verification {
@@ -147,6 +158,7 @@ pub fn decided(matched: u32, tried: Tried) -> Verification {
         note: None,
         tried,
         views: 20,
+        history: Some(history("2025-11-02T08:00:00Z")),
         found: (verdict == Verdict::Match).then(|| Found {
             owner: "Atelier Morgenrot".into(),
             asset: "Garden statue".into(),
@@ -155,6 +167,34 @@ pub fn decided(matched: u32, tried: Tried) -> Verification {
         strip: strip(64, matched as usize),
         decision: Some(decision),
     }
+}
+
+/// What was before: the suspect was first seen in March, and the asset registered then.
+fn history(registered: &str) -> History {
+    let time = |text: &str| text.parse::<Timestamp>().expect("a time");
+    History {
+        first_seen: time("2026-03-12T18:04:11Z"),
+        readings_of_key: 17,
+        assets_of_owner: Some(12),
+        asset: Some(Registration {
+            asset: "assets/0192a000-0000-7000-8000-000000000001".into(),
+            commitment: "commitments/0192a000-0000-7000-8000-000000000002".into(),
+            sequence: 31,
+            hash: Sha256::of(b"commitment"),
+            time: time(registered),
+            revealed: None,
+        }),
+    }
+}
+
+/// What would be a match, of an asset that is younger than its suspect.
+fn registered_later() -> Verification {
+    let mut verification = decided(62, Tried::once());
+    verification.verdict = Verdict::Inconclusive;
+    verification.reason = Some(Reason::RegisteredLater);
+    verification.found = None;
+    verification.history = Some(history("2026-03-13T10:00:00Z"));
+    verification
 }
 
 fn undecided(reason: Reason) -> Verification {

@@ -14,7 +14,9 @@ pub(super) fn section(evidence: &Evidence) -> Markup {
                 @if decided {
                     li { "The p-value is not the probability that the suspect is unmarked, and nobody\u{2019}s probability of guilt. It
                         says how rarely an unrelated scene would agree this well." }
-                    li { "Attempts that were made elsewhere are not counted. Who repeats this search in other ways pays for that too." }
+                    li { "Attempts that were made elsewhere are not counted, nor readings of changed copies of these files. Compare
+                        the SHA-256 of the suspect with that of the file as it was published: a file that the claimant made says
+                        little." }
                 }
                 @if verdict == Some(Verdict::Match) {
                     li { "A match says that the mark is there, not who put it there or when. That the message was the owner\u{2019}s before

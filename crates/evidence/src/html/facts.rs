@@ -53,6 +53,9 @@ pub(super) fn making(evidence: &Evidence) -> Markup {
                     tr { th scope="row" { "Key" } td { (sent(&evidence.key.id)) } }
                     tr { th scope="row" { "Begun (UTC)" } td { time datetime=(evidence.started) { (evidence.started) } } }
                     tr { th scope="row" { "Done (UTC)" } td { time datetime=(evidence.finished) { (evidence.finished) } } }
+                    @if let Some(worker) = &evidence.worker {
+                        tr { th scope="row" { "Worker" } td { (sent(&worker.name)) ", attempt " (worker.attempt) } }
+                    }
                     tr { th scope="row" { "Engine" } td { (sent(&evidence.engine)) } }
                     tr { th scope="row" { "Computed on" } td { (sent(&evidence.device)) } }
                     tr { th scope="row" { "CLIP" } td { (sent(&evidence.model.name)) } }

@@ -3,6 +3,7 @@ mod caveats;
 mod decision;
 pub(crate) mod embedded;
 mod facts;
+mod history;
 mod pictures;
 mod quality;
 mod strip;
@@ -56,6 +57,7 @@ fn body(evidence: &Evidence, signature: Option<&Signature>) -> Markup {
                     (decision::section(decision, verification))
                     (tried::section(decision, verification))
                 }
+                @if let Some(history) = &verification.history { (history::section(history)) }
                 (strip::section(verification))
             }
             @if let Some(embedding) = &evidence.embedding { (quality::section(embedding)) }

@@ -1,5 +1,5 @@
 //! What was tried, and how it is paid for.
-use crate::tried::{HypothesisGroup, HypothesisKind};
+use crate::tried::{HypothesisGroup, HypothesisKind, Tried};
 use crate::verification::{Decision, Verification};
 use crate::words::{counted, grouped};
 use maud::{Markup, html};
@@ -20,8 +20,21 @@ pub(super) fn section(decision: &Decision, verification: &Verification) -> Marku
                 tfoot { tr { th scope="row" { "Readings" } td {} td.number { (grouped(tried.readings())) } } }
             }
             p { "Compared with the messages of " (counted(tried.assets, "asset", "assets")) " of "
-                (counted(tried.owners, "owner", "owners")) ": " (grouped(tried.readings())) " \u{d7} "
-                (grouped(tried.assets.max(1))) " = " strong { (counted(decision.hypotheses, "hypothesis", "hypotheses")) } "." }
+                (counted(tried.owners, "owner", "owners")) ". " (paid(tried)) "That makes " (grouped(tried.readings()))
+                " \u{d7} " (grouped(tried.assets_paid()))
+                @if let Some(paid) = tried.paid { " \u{d7} " (grouped(paid.readings)) }
+                " = " strong { (counted(decision.hypotheses, "hypothesis", "hypotheses")) } "." }
+        }
+    }
+}
+
+/// What is counted beyond what was compared, and why.
+fn paid(tried: &Tried) -> Markup {
+    html! {
+        @if let Some(paid) = tried.paid {
+            "All " (counted(paid.assets, "asset", "assets")) " of the key are paid for, whichever the claim names: whoever
+            registers many could name the one that fits best. This is the claimant\u{2019}s "
+            (counted(paid.readings, "reading", "readings")) " of these files, counted from the first, and each is paid for. "
         }
     }
 }

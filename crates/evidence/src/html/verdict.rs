@@ -117,6 +117,11 @@ fn why(reason: Reason) -> Markup {
             "There are too few pictures, or they are too small, for a reading.",
             &["Send more pictures, from several directions, at least 224 pixels a side, that show the whole scene."],
         ),
+        Reason::RegisteredLater => (
+            "So many bits agree that it would be a match, but the service had seen a file of the suspect before the asset was
+             registered. Nobody could have marked that file with this asset: the asset was chosen to fit, or chance did it.",
+            &["Claim on the asset that the file was marked with, which was registered before it was made."],
+        ),
     };
     html! {
         h2 { "Why, and what would help" }

@@ -20,12 +20,12 @@ use super::registry::{asset, create_asset, create_owner, public_key};
 use crate::service::Limits;
 
 /// A server with a key of 64 bits and two owners, of whom the first has two assets and the second one.
-struct Bench {
-    server: Server,
-    key: String,
-    owners: [String; 2],
+pub(super) struct Bench {
+    pub(super) server: Server,
+    pub(super) key: String,
+    pub(super) owners: [String; 2],
     /// With their original.
-    assets: Vec<(String, String)>,
+    pub(super) assets: Vec<(String, String)>,
 }
 
 /// A view that a worker saw, three levels off the original.
@@ -38,7 +38,7 @@ fn seen(value: u8) -> SeenView {
     }
 }
 
-async fn bench_with(limits: Limits) -> Bench {
+pub(super) async fn bench_with(limits: Limits) -> Bench {
     let server = Server::with(limits).await;
     let key = server.key(64, b"key file").await;
     let mut owners = Vec::new();
@@ -60,7 +60,7 @@ async fn bench_with(limits: Limits) -> Bench {
     }
 }
 
-async fn bench() -> Bench {
+pub(super) async fn bench() -> Bench {
     bench_with(Limits::default()).await
 }
 
@@ -73,7 +73,7 @@ fn embed(key: &str, scene: &str, asset: &str) -> EmbedSpec {
     }
 }
 
-fn logits(word: &str, wrong: usize) -> Vec<f32> {
+pub(super) fn logits(word: &str, wrong: usize) -> Vec<f32> {
     let word = Message::from_u64(u64::from_str_radix(word, 16).unwrap());
     let sign = |(i, bit): (usize, bool)| {
         if bit != (i % 10 == 3 && i / 10 < wrong) {
@@ -85,7 +85,7 @@ fn logits(word: &str, wrong: usize) -> Vec<f32> {
     word.bits().enumerate().map(sign).collect()
 }
 
-fn framed(quarter_turns: u32, logits: Vec<f32>) -> FramedReading {
+pub(super) fn framed(quarter_turns: u32, logits: Vec<f32>) -> FramedReading {
     FramedReading {
         quarter_turns,
         views: 20,
@@ -95,7 +95,7 @@ fn framed(quarter_turns: u32, logits: Vec<f32>) -> FramedReading {
 }
 
 impl Bench {
-    async fn submit(&self, spec: Spec) -> Result<Job, Status> {
+    pub(super) async fn submit(&self, spec: Spec) -> Result<Job, Status> {
         let job = Job {
             spec: Some(spec),
             ..Job::default()
@@ -103,14 +103,17 @@ impl Bench {
         self.server.submit(job, "").await.map(|answer| answer.into_inner())
     }
 
-    async fn embed(&self, scene: &str, asset: &str) -> Result<Job, Status> {
+    pub(super) async fn embed(&self, scene: &str, asset: &str) -> Result<Job, Status> {
         self.submit(Spec::Embed(embed(&self.key, scene, asset))).await
     }
 
-    async fn verify(&self, claim: VerifySpec) -> Result<Job, Status> {
-        let suspect = self.server.upload("suspect.ply", b"suspect").await.name;
+    pub(super) async fn verify(&self, claim: VerifySpec) -> Result<Job, Status> {
+        let mut suspects = claim.suspects.clone();
+        if suspects.is_empty() {
+            suspects.push(self.server.upload("suspect.ply", b"suspect").await.name);
+        }
         let spec = VerifySpec {
-            suspects: vec![suspect],
+            suspects,
             key: self.key.clone(),
             ..claim
         };
@@ -118,7 +121,7 @@ impl Bench {
     }
 
     /// The word that a worker is told to embed.
-    async fn word(&self, which: usize) -> String {
+    pub(super) async fn word(&self, which: usize) -> String {
         let (asset, scene) = &self.assets[which];
         let job = self.embed(scene, asset).await.unwrap();
         let (leased, token) = self.server.take().await;
@@ -139,7 +142,7 @@ impl Bench {
         spec.message
     }
 
-    async fn complete(
+    pub(super) async fn complete(
         &self,
         job: &str,
         token: &str,
@@ -159,7 +162,7 @@ impl Bench {
     }
 
     /// What comes of a claim on these readings.
-    async fn claimed(&self, claim: VerifySpec, readings: Vec<FramedReading>) -> (VerifyResult, Checked) {
+    pub(super) async fn claimed(&self, claim: VerifySpec, readings: Vec<FramedReading>) -> (VerifyResult, Checked) {
         let job = self.verify(claim).await.unwrap().name;
         let (_, token) = self.server.take().await;
         let read = VerifyResult {
@@ -199,7 +202,23 @@ impl Bench {
         (result, checked)
     }
 
-    async fn report(&self, artifact: &str) -> Checked {
+    /// The job that left this result.
+    pub(super) async fn job_of(&self, result: &VerifyResult) -> String {
+        let request = guardsplat_proto::v1::ListJobsRequest::default();
+        let jobs = self
+            .server
+            .jobs
+            .clone()
+            .list_jobs(request)
+            .await
+            .unwrap()
+            .into_inner()
+            .jobs;
+        let wanted = Some(JobResult::VerifyResult(result.clone()));
+        jobs.into_iter().find(|job| job.result == wanted).unwrap().name
+    }
+
+    pub(super) async fn report(&self, artifact: &str) -> Checked {
         let request = DownloadArtifactRequest {
             name: artifact.into(),
             offset: 0,
@@ -216,21 +235,21 @@ impl Bench {
     }
 }
 
-fn of_asset(asset: &str) -> VerifySpec {
+pub(super) fn of_asset(asset: &str) -> VerifySpec {
     VerifySpec {
         asset: asset.into(),
         ..VerifySpec::default()
     }
 }
 
-fn of_owner(owner: &str) -> VerifySpec {
+pub(super) fn of_owner(owner: &str) -> VerifySpec {
     VerifySpec {
         owner: owner.into(),
         ..VerifySpec::default()
     }
 }
 
-fn search() -> VerifySpec {
+pub(super) fn search() -> VerifySpec {
     VerifySpec {
         search: true,
         ..VerifySpec::default()
@@ -258,7 +277,7 @@ async fn an_asset_is_marked_with_a_word_that_only_its_worker_is_told() {
     let decision = read.decision.unwrap();
     assert_eq!(
         (read.verdict, decision.matched, decision.hypotheses),
-        (Told::Match, 64, 1)
+        (Told::Match, 64, 3)
     );
     let hashes: Vec<_> = evidence.inputs.iter().map(|input| input.sha256.to_string()).collect();
     assert_eq!(hashes, [sha256(b"other"), sha256(b"marked")]);
@@ -314,13 +333,17 @@ async fn a_claim_is_decided_by_the_server_and_leaves_evidence() {
     assert_eq!((&result.asset, &result.owner), (first, &bench.owners[0]));
     assert_eq!(
         (result.matched_bits, result.needed_bits, result.bits),
-        (Some(60), Some(51), 64)
+        (Some(60), Some(52), 64)
     );
     assert_eq!((result.payload_number, result.corrected_bits), (Some(1), Some(4)));
-    assert_eq!((result.hypotheses, result.framings, result.assets), (Some(1), 1, 1));
+    // All three assets of the key are paid for, though one was named.
+    assert_eq!((result.hypotheses, result.framings, result.assets), (Some(3), 1, 1));
+    assert_eq!((result.assets_paid, result.readings_paid), (3, 1));
     assert!(result.p_value.unwrap() < 1e-10 && result.threshold == Some(1e-6));
     let told = checked.evidence.unwrap();
     assert_eq!((told.engine.as_str(), told.key.id), ("a test", bench.key.clone()));
+    let worker = told.worker.unwrap();
+    assert_eq!((worker.name.as_str(), worker.attempt), ("test", 1));
     let told = told.verification.unwrap();
     assert!(told.found.unwrap().owner.starts_with("Studio Nord (owners/"));
     assert_eq!(told.strip.len(), 64);
@@ -328,13 +351,13 @@ async fn a_claim_is_decided_by_the_server_and_leaves_evidence() {
     // Another asset's mark is not there.
     let (result, _) = bench.claimed(of_asset(second), read()).await;
     assert_eq!((result.verdict(), result.asset.as_str()), (Verdict::NoMatch, ""));
-    assert_eq!((result.payload_number, result.hypotheses), (None, Some(1)));
+    assert_eq!((result.payload_number, result.hypotheses), (None, Some(3)));
 
-    // Whoever tries more pays more: two assets of the owner, three of the key, and two framings.
+    // Whatever is claimed, all assets of the key are paid for; and each way of reading.
     let (result, _) = bench.claimed(of_owner(&bench.owners[0]), read()).await;
     assert_eq!(
         (result.verdict(), &result.asset, result.hypotheses),
-        (Verdict::Match, first, Some(2))
+        (Verdict::Match, first, Some(3))
     );
     let (result, _) = bench.claimed(of_owner(&bench.owners[1]), read()).await;
     assert_eq!((result.verdict(), result.assets), (Verdict::NoMatch, 1));
@@ -395,7 +418,7 @@ async fn claims_that_nothing_can_decide_say_why() {
 #[tokio::test]
 async fn the_rate_is_a_setting_and_may_be_out_of_reach() {
     let limits = Limits {
-        false_positive_rate: 1e-19,
+        false_positive_rate: 2e-19,
         ..Limits::default()
     };
     let bench = bench_with(limits).await;
@@ -403,8 +426,9 @@ async fn the_rate_is_a_setting_and_may_be_out_of_reach() {
     let read = || vec![framed(0, logits(&word, 0))];
     let (result, _) = bench.claimed(of_asset(&bench.assets[0].0), read()).await;
     assert_eq!((result.verdict(), result.needed_bits), (Verdict::Match, Some(64)));
-    // 2^-64 is 5.4e-20: two hypotheses are too many.
-    let (result, checked) = bench.claimed(of_owner(&bench.owners[0]), read()).await;
+    // 2^-64 is 5.4e-20: four readings of three assets are too many.
+    let four = (0..4).map(|turns| framed(turns, logits(&word, 0))).collect();
+    let (result, checked) = bench.claimed(of_owner(&bench.owners[0]), four).await;
     assert_eq!((result.verdict(), result.needed_bits), (Verdict::Inconclusive, None));
     let told = checked.evidence.unwrap().verification.unwrap();
     assert_eq!(told.reason, Some(guardsplat_evidence::Reason::TooManyHypotheses));

@@ -163,6 +163,12 @@ impl Server {
         Self::over(ledger, folder, self.api.limits().clone(), self.tokens).await
     }
 
+    /// Another server over the same ledger and artifacts, which asks for tokens.
+    pub async fn with_a_door(&self, limits: Limits) -> Self {
+        let (store, folder) = (self.api.store().clone(), self.folder_of_a_twin());
+        Self::with_store(self.ledger(), store, folder, limits, true).await
+    }
+
     /// A new folder with the same master key.
     pub fn folder_of_a_twin(&self) -> TempDir {
         let folder = TempDir::new().unwrap();
@@ -214,6 +220,12 @@ impl Server {
 
     pub fn folder(&self) -> &Path {
         self.folder.path()
+    }
+
+    /// What is in the files of the ledger.
+    pub fn ledger_files(&self) -> Vec<Vec<u8>> {
+        let names = ["ledger.sqlite", "ledger.sqlite-wal"].map(|name| self.folder.path().join(name));
+        names.into_iter().filter_map(|path| std::fs::read(path).ok()).collect()
     }
 
     /// All files of artifacts there are, staged ones too; without what says whose the folder is.
@@ -311,7 +323,13 @@ impl Server {
 
     /// A key made by a job, with this key file. The queue must be empty.
     pub async fn key(&self, bits: u32, file: &[u8]) -> String {
-        let job = self.create(Spec::CreateKey(KeySpec { bits, seed: None })).await;
+        let job = self
+            .create(Spec::CreateKey(KeySpec {
+                bits,
+                seed: None,
+                ..KeySpec::default()
+            }))
+            .await;
         let (leased, token) = self.take().await;
         assert_eq!(leased.name, job.name);
         let output = self.stored(&job.name, &token, file, true).await;
@@ -383,7 +401,11 @@ pub fn upload_messages(metadata: UploadMetadata, bytes: &[u8]) -> Vec<UploadArti
 }
 
 pub fn key_spec(bits: u32) -> Spec {
-    Spec::CreateKey(KeySpec { bits, seed: None })
+    Spec::CreateKey(KeySpec {
+        bits,
+        seed: None,
+        ..KeySpec::default()
+    })
 }
 
 pub fn verify_spec(suspect: &str, key: &str) -> Spec {

@@ -12,6 +12,7 @@ async fn a_job_is_as_it_was_asked_for() {
     let spec = Spec::CreateKey(KeySpec {
         bits: 48,
         seed: Some(7),
+        ..KeySpec::default()
     });
     let job = Job {
         display_name: "№ 1".into(),
@@ -19,7 +20,13 @@ async fn a_job_is_as_it_was_asked_for() {
         ..Default::default()
     };
     let made = server.submit(job.clone(), "").await.unwrap().into_inner();
-    assert_eq!(made.spec, job.spec);
+    // But for the seed, which is told to nobody again.
+    let told = Spec::CreateKey(KeySpec {
+        bits: 48,
+        seed: None,
+        seeded: true,
+    });
+    assert_eq!(made.spec, Some(told));
     assert_eq!(made.display_name, "№ 1");
     assert_eq!(made.state(), State::Queued);
     assert_eq!((made.attempt, made.max_attempts, made.queue_position), (0, 3, Some(0)));

@@ -184,6 +184,7 @@ async fn what_a_worker_says_of_a_key_is_checked() {
         .create(Spec::CreateKey(KeySpec {
             bits: 32,
             seed: Some(1),
+            ..KeySpec::default()
         }))
         .await
         .name;

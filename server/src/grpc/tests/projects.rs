@@ -271,6 +271,7 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListAssets" => Own(Vec::new(), own.asset.clone()),
         "GetCommitment" => named!(GetCommitmentRequest, commitment),
         "ExportCommitment" => named!(ExportCommitmentRequest, commitment),
+        "RevealCommitment" => named!(RevealCommitmentRequest, commitment),
         "ListCommitments" | "GetHead" => Own(Vec::new(), own.commitment.clone()),
         "RevokeToken" => named!(RevokeTokenRequest, token_name),
         "ListTokens" => Own(Vec::new(), own.token_name.clone()),
@@ -402,9 +403,17 @@ async fn jobs_need_the_scope_of_their_kind() {
         "verify",
     );
     send(Embed, create(embed(&studio.artifact, &studio.key))).await.unwrap();
-    send(Verify, create(verify_spec(&studio.artifact, &studio.key)))
-        .await
-        .unwrap();
+    lacks(
+        send(Verify, create(verify_spec(&studio.artifact, &studio.key))).await,
+        "admin",
+    );
+    let claim = Spec::Verify(VerifySpec {
+        suspects: vec![studio.artifact.clone()],
+        key: studio.key.clone(),
+        search: true,
+        ..VerifySpec::default()
+    });
+    send(Verify, create(claim)).await.unwrap();
     let token = server.token("studio", &[Verify]).await;
     let cancel = asking(&token, CancelJobRequest { name: studio.job });
     lacks(

@@ -93,6 +93,7 @@ async fn an_original_is_registered_and_committed_to() {
         payload_number: 1,
         commitment: made.commitment.clone(),
         create_time: made.create_time,
+        reveal_time: None,
     };
     assert_eq!(made, wanted);
     let request = GetAssetRequest {

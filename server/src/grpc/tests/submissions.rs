@@ -73,11 +73,19 @@ async fn every_wrong_field_is_named() {
         (verify(|s| s.views = 10_001), "job.verify.views"),
         (verify(|s| s.size = 1), "job.verify.size"),
         (
-            of(Spec::CreateKey(KeySpec { bits: 0, seed: None })),
+            of(Spec::CreateKey(KeySpec {
+                bits: 0,
+                seed: None,
+                ..KeySpec::default()
+            })),
             "job.create_key.bits",
         ),
         (
-            of(Spec::CreateKey(KeySpec { bits: 151, seed: None })),
+            of(Spec::CreateKey(KeySpec {
+                bits: 151,
+                seed: None,
+                ..KeySpec::default()
+            })),
             "job.create_key.bits",
         ),
         (job(|j| j.spec = None), "job.spec"),

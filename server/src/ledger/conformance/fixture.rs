@@ -1,12 +1,12 @@
 //! Short words for what the tests do all the time.
 use std::time::Duration;
 
-use guardsplat_proto::v1::{EmbedResult, EmbedSpec, KeyResult, KeySpec, VerifyResult, VerifySpec};
+use guardsplat_proto::v1::{EmbedResult, EmbedSpec, KeyResult, VerifyResult, VerifySpec};
 use uuid::Uuid;
 
 use super::super::{
-    ArtifactId, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobResult, JobRow, JobSpec, Lease,
-    Ledger, LedgerError, NewArtifact, NewJob, Origin, Progress, ResourceRequirements,
+    ArtifactId, ArtifactState, Completion, Failure, FailureReason, JobId, JobKind, JobResult, JobRow, JobSpec,
+    KeyOrder, Lease, Ledger, LedgerError, NewArtifact, NewJob, Origin, Progress, ResourceRequirements,
 };
 
 /// How long the leases of the tests are.
@@ -38,7 +38,7 @@ pub fn spec_of(kind: JobKind) -> JobSpec {
     match kind {
         JobKind::Embed => spec(123),
         JobKind::Verify => JobSpec::Verify(VerifySpec::default()),
-        JobKind::CreateKey => JobSpec::CreateKey(KeySpec::default()),
+        JobKind::CreateKey => JobSpec::CreateKey(KeyOrder { bits: 64, seed: None }),
     }
 }
 

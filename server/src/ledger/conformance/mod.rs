@@ -8,6 +8,7 @@ mod cancelling;
 mod fencing;
 pub(crate) mod fixture;
 mod generation;
+mod history;
 mod hooks;
 pub mod model;
 mod operations;
@@ -28,6 +29,7 @@ pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
 pub(crate) use fencing::*;
 pub(crate) use generation::*;
+pub(crate) use history::*;
 pub(crate) use hooks::*;
 pub(crate) use operations::*;
 pub(crate) use outputs::*;
@@ -112,6 +114,10 @@ macro_rules! conformance_suite {
             payload_numbers_run_out
             owners_and_assets_come_in_pages
             a_search_sees_every_asset_of_its_key_once
+            every_reading_of_a_file_is_known
+            an_upload_is_seen_for_good
+            assets_are_counted_and_opened_once
+            seeds_are_sealed_where_they_lay_open
             a_token_is_kept_and_found_by_its_hash
             a_revoked_token_stays_revoked
             the_use_of_a_token_is_noted

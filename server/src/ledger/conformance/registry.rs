@@ -106,6 +106,7 @@ pub(crate) async fn an_asset_is_kept_and_committed_to(factory: &dyn Factory) {
         key,
         payload: 1,
         create_time: at(2),
+        reveal_time: None,
     };
     assert_eq!(asset, expected);
     assert_eq!(ledger.get_asset(new.id).await.unwrap(), Some(expected));

@@ -194,6 +194,11 @@ pub(super) fn steps() -> Vec<Migration> {
         ),
         step(7, "queue", include_str!("../../../migrations/postgres/0007_queue.sql")),
         step(
+            8,
+            "claims",
+            include_str!("../../../migrations/postgres/0008_claims.sql"),
+        ),
+        step(
             10,
             "hardening",
             include_str!("../../../migrations/postgres/0010_hardening.sql"),

@@ -5,7 +5,7 @@ use sqlx::Row;
 
 use super::super::types::{ArtifactId, ArtifactRow, ArtifactState, JobId, NewArtifact, Origin};
 use super::super::{ArtifactLedger, LedgerError, Result, token};
-use super::{DbConnection, DbLedger, jobs, leases, rows};
+use super::{DbConnection, DbLedger, history, jobs, leases, rows};
 
 #[async_trait::async_trait]
 impl ArtifactLedger for DbLedger {
@@ -119,6 +119,9 @@ pub(super) async fn ready(
         return Ok(artifact);
     }
     set_state(db, id, next, now).await?;
+    if next == ArtifactState::Ready {
+        history::uploaded(db, &artifact).await?;
+    }
     Ok(ArtifactRow {
         state: next,
         ..artifact

@@ -1,9 +1,11 @@
 //! Rows of keys.
+use sqlx::Row;
 use uuid::Uuid;
 
 use super::super::registry::KeyState;
-use super::super::types::{JobId, KeyId, KeyRow, NewKey};
-use super::super::{KeyLedger, LedgerError, Result};
+use super::super::types::{JobId, JobKind, KeyId, KeyRow, NewKey};
+use super::super::work::{JobSpec, KeyOrder, Seed};
+use super::super::{KeyLedger, LedgerError, Result, codec};
 use super::{DbConnection, DbLedger, rows};
 
 /// A page of a project's keys.
@@ -27,6 +29,41 @@ impl KeyLedger for DbLedger {
         self.change(with!([reason] db => update_state(db, id, next, &reason, now)))
             .await
     }
+
+    async fn open_seeds(&self) -> Result<Vec<(JobId, KeyOrder)>> {
+        self.read(with!([] db => open_seeds(db))).await
+    }
+
+    async fn seal_seed(&self, job: JobId, order: KeyOrder, fingerprint: [u8; 32]) -> Result<()> {
+        self.change(with!([order] db => seal_seed(db, job, &order, fingerprint)))
+            .await
+    }
+}
+
+async fn open_seeds(db: &mut DbConnection) -> Result<Vec<(JobId, KeyOrder)>> {
+    let mut found = Vec::new();
+    for row in sqlx::query("SELECT id, spec FROM jobs WHERE kind = 3")
+        .fetch_all(db)
+        .await?
+    {
+        let spec = codec::decode_spec(JobKind::CreateKey, row.try_get("spec")?)?;
+        if let JobSpec::CreateKey(order) = spec
+            && matches!(order.seed, Some(Seed::Open(_)))
+        {
+            found.push((row.try_get("id")?, order));
+        }
+    }
+    Ok(found)
+}
+
+async fn seal_seed(db: &mut DbConnection, job: JobId, order: &KeyOrder, fingerprint: [u8; 32]) -> Result<()> {
+    sqlx::query("UPDATE jobs SET spec = $2, fingerprint = $3 WHERE id = $1 AND kind = 3")
+        .bind(job)
+        .bind(codec::encode_spec(&JobSpec::CreateKey(order.clone())))
+        .bind(fingerprint.as_slice())
+        .execute(db)
+        .await?;
+    Ok(())
 }
 
 pub(super) async fn create(db: &mut DbConnection, new: &NewKey, job: JobId, now: i64) -> Result<()> {

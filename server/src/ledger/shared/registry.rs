@@ -10,7 +10,7 @@ use super::super::registry::{
 };
 use super::super::types::KeyId;
 use super::super::{LedgerError, Result, chain, idempotency};
-use super::{DbConnection, DbLedger, DbRow, commitments, keys, presence, rows};
+use super::{DbConnection, DbLedger, DbRow, commitments, history, keys, presence, rows};
 
 /// Assets with the names of their commitments.
 macro_rules! assets {
@@ -100,6 +100,14 @@ impl Registry for DbLedger {
 
     async fn candidates(&self, key: KeyId, after: i64, limit: u32) -> Result<Vec<Candidate>> {
         self.read(with!([] db => candidates(db, key, after, limit))).await
+    }
+
+    async fn count_assets(&self, key: KeyId, owner: Option<OwnerId>) -> Result<u64> {
+        self.read(with!([] db => count_assets(db, key, owner))).await
+    }
+
+    async fn reveal_asset(&self, asset: AssetId, now: i64) -> Result<AssetRow> {
+        self.change(with!([] db => reveal(db, asset, now))).await
     }
 
     async fn candidate(&self, asset: AssetId) -> Result<Option<Candidate>> {
@@ -262,6 +270,26 @@ pub(super) async fn candidate(db: &mut DbConnection, asset: AssetId) -> Result<O
     found.as_ref().map(candidate_of).transpose()
 }
 
+/// Payload numbers have no gaps, so the last one counts them all.
+async fn count_assets(db: &mut DbConnection, key: KeyId, owner: Option<OwnerId>) -> Result<u64> {
+    let Some(owner) = owner else {
+        let last: Option<i64> = sqlx::query_scalar(LAST_PAYLOAD).bind(key).fetch_optional(db).await?;
+        return history::count(last.unwrap_or(0));
+    };
+    let of_owner = sqlx::query_scalar("SELECT count(*) FROM assets WHERE owner_id = $1 AND key_id = $2");
+    history::count(of_owner.bind(owner).bind(key).fetch_one(db).await?)
+}
+
+async fn reveal(db: &mut DbConnection, id: AssetId, now: i64) -> Result<AssetRow> {
+    sqlx::query("UPDATE assets SET reveal_time = $2 WHERE id = $1 AND reveal_time IS NULL")
+        .bind(id)
+        .bind(now)
+        .execute(&mut *db)
+        .await?;
+    let asset = get_asset(db, id).await?;
+    asset.ok_or(LedgerError::NotFound { kind: "asset", id })
+}
+
 fn candidate_of(row: &DbRow) -> Result<Candidate> {
     Ok(Candidate {
         asset: row.try_get("id")?,
@@ -292,5 +320,6 @@ fn asset(row: &DbRow) -> Result<AssetRow> {
         key: row.try_get("key_id")?,
         payload: row.try_get("payload")?,
         create_time: row.try_get("create_time")?,
+        reveal_time: row.try_get("reveal_time")?,
     })
 }

@@ -69,6 +69,8 @@ mod artifacts;
 mod commitments;
 #[path = "../shared/generation.rs"]
 mod generation;
+#[path = "../shared/history.rs"]
+mod history;
 #[path = "../shared/hooks.rs"]
 mod hooks;
 #[path = "../shared/jobs.rs"]

@@ -23,6 +23,8 @@ pub(super) fn options(path: &Path) -> SqliteConnectOptions {
         .synchronous(SqliteSynchronous::Full)
         .busy_timeout(BUSY)
         .foreign_keys(true)
+        // What is changed or deleted is overwritten, so that a secret which lay here open does not lie on when it was sealed.
+        .pragma("secure_delete", "ON")
 }
 
 pub(super) async fn connect(options: &SqliteConnectOptions) -> Result<SqliteConnection> {
@@ -84,6 +86,7 @@ fn migrator() -> Migrator {
             include_str!("../../../migrations/sqlite/0008_operations.sql"),
         ),
         step(9, "queue", include_str!("../../../migrations/sqlite/0009_queue.sql")),
+        step(10, "claims", include_str!("../../../migrations/sqlite/0010_claims.sql")),
         step(
             12,
             "hardening",

@@ -1,13 +1,14 @@
 //! The end of a job with a claim: what a worker read becomes a verdict, and evidence of it.
 use guardsplat_codeword::{Answer, HypothesisReading, ReadPayload, Verdict};
-use guardsplat_evidence::{Evidence, View};
+use guardsplat_evidence::{Evidence, View, Worker};
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{EmbedResult, FramedReading, SeenView, VerifyResult};
 
-use super::decision::Decided;
+use super::decided::Decided;
 use super::{Claim, hypotheses, of_job};
 use crate::error::{Error, Result};
-use crate::ledger::{Completion, JobResult, JobRow, KeyRow};
+use crate::ledger::{Completion, JobKind, JobResult, JobRow, KeyRow};
+use crate::service::clock::timestamp;
 use crate::service::evidence::{Facts, Files, Read};
 use crate::service::lease::needed_key;
 use crate::service::names::ResourceKind;
@@ -39,7 +40,13 @@ impl Service {
         told: &WorkerReadings,
         completion: &mut Completion,
     ) -> Result<()> {
-        let Some(claim) = of_job(job)? else { return Ok(()) };
+        let Some(claim) = of_job(job)? else {
+            if job.kind() == JobKind::Verify {
+                // No claim, but a reading like any other: what it showed may be claimed next.
+                self.read_before(job, &self.key_of(job).await?).await?;
+            }
+            return Ok(());
+        };
         let key = self.key_of(job).await?;
         let told = Checked {
             told,
@@ -77,6 +84,15 @@ impl Service {
         key.ok_or_else(|| ResourceKind::Key.not_found(id))
     }
 
+    /// Who has the job, or had it last.
+    async fn worker_of(&self, job: &JobRow) -> Result<Option<Worker>> {
+        let attempts = self.ledger().attempts(job.id).await?;
+        Ok(attempts.into_iter().next().map(|attempt| Worker {
+            name: attempt.worker,
+            attempt: attempt.number.unsigned_abs(),
+        }))
+    }
+
     async fn verified(
         &self,
         job: &JobRow,
@@ -90,20 +106,21 @@ impl Service {
             let reason = "is missing: the server decides a claim on what was read";
             return Err(Error::invalid("readings", reason));
         }
-        let decided = self.decide(claim, key, &readings).await?;
+        let before = self.read_before(job, key).await?;
+        let decided = self.decide(claim, key, &readings, Some(before)).await?;
         *result = answered(std::mem::take(result), &decided, readings.len());
         let facts = Facts {
             job,
             key,
             engine: &told.engine,
             device: &result.device,
+            worker: self.worker_of(job).await?,
             views,
         };
         let files = Files::of_suspects(self, job).await?;
         let read = Read {
             decided: &decided,
             framings: hypotheses::kinds(&told.readings),
-            named: matches!(claim, Claim::Asset(_)),
         };
         evidence::of_verification(&facts, files, &read)
     }
@@ -121,18 +138,18 @@ impl Service {
         result.message.clear();
         let decided = match readings.is_empty() {
             true => None,
-            false => Some(self.decide(claim, key, &readings).await?),
+            false => Some(self.decide(claim, key, &readings, None).await?),
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,
             framings: hypotheses::kinds(&told.readings),
-            named: true,
         });
         let facts = Facts {
             job,
             key,
             engine: &told.engine,
             device: &result.device,
+            worker: self.worker_of(job).await?,
             views,
         };
         let files = Files::of_marking(self, job, result).await?;
@@ -179,6 +196,11 @@ fn answered(read: VerifyResult, decided: &Decided, framings: usize) -> VerifyRes
         hypotheses: Some(*hypotheses),
         framings: framings as u32,
         assets: decided.tried.assets,
+        assets_paid: decided.tried.assets_paid,
+        readings_paid: decided.tried.readings,
+        first_seen_time: decided.before.map(|before| timestamp(before.first_seen)),
+        asset_commit_time: decided.shown().map(|best| timestamp(best.commitment.commitment.time)),
+        asset_registered_later: decided.shown().is_some_and(|best| decided.is_later(best)),
         framing: best.as_ref().map(|best| best.hypothesis.clone()).unwrap_or_default(),
         asset: matched
             .map(|best| ResourceKind::Asset.name(best.asset.id))

@@ -3,47 +3,15 @@
 use std::collections::HashSet;
 
 use futures::TryStreamExt;
-use guardsplat_codeword::{
-    Answer, HypothesisReading, Index, MessageLength, Reading, Scheme, Target, Tested, Verdict, chance,
-};
+use guardsplat_codeword::{HypothesisReading, Index, MessageLength, Reading, Scheme, Target, Verdict};
 
 use super::Claim;
+use super::decided::{Best, Decided, Tried, unmarkable};
 use crate::error::{Error, Result};
-use crate::ledger::{AssetId, AssetRow, Candidate, KeyRow, OwnerRow, candidates};
+use crate::ledger::{AssetId, Candidate, KeyRow, ReadBefore, candidates};
 use crate::marks::{self, CODE};
 use crate::service::Service;
 use crate::service::names::ResourceKind;
-
-/// A claim that was decided.
-pub struct Decided {
-    /// The answer, and what only the owner is given.
-    pub tested: Tested,
-    /// What was compared.
-    pub tried: Tried,
-    /// The logits of the best reading; empty where nothing was compared.
-    pub logits: Vec<f32>,
-    /// The asset that agreed best, with its owner.
-    pub best: Option<Best>,
-}
-
-/// How much was compared.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tried {
-    /// Owners of these assets.
-    pub owners: u64,
-    /// Assets, each with a word of its own.
-    pub assets: u64,
-}
-
-/// The asset that agreed best.
-pub struct Best {
-    /// The asset.
-    pub asset: AssetRow,
-    /// Whose it is.
-    pub owner: OwnerRow,
-    /// Its word.
-    pub target: Target,
-}
 
 /// All words that a claim could be about.
 struct Words {
@@ -54,12 +22,33 @@ struct Words {
 }
 
 impl Service {
-    /// Decides a claim on `read`, whose logits are of the key's length.
-    pub(crate) async fn decide(&self, claim: &Claim, key: &KeyRow, read: &[HypothesisReading]) -> Result<Decided> {
-        let words = match key.bits == marks::bits() {
+    /// Decides a claim on `read`, whose logits are of the key's length. Of a suspect it is said what there was `before`; a
+    /// scene that was just marked has nothing.
+    pub(crate) async fn decide(
+        &self,
+        claim: &Claim,
+        key: &KeyRow,
+        read: &[HypothesisReading],
+        before: Option<ReadBefore>,
+    ) -> Result<Decided> {
+        let readings_paid = before.map_or(1, |before| before.readings.max(1));
+        let mut words = match key.bits == marks::bits() {
             true => self.words(claim, key).await?,
-            false => return Ok(unmarkable(key, self.limits().false_positive_rate)),
+            false => {
+                return Ok(unmarkable(
+                    key,
+                    self.limits().false_positive_rate,
+                    before,
+                    readings_paid,
+                ));
+            }
         };
+        // Counted behind the comparison, so that none was compared that is not paid for. Whoever claims may have
+        // registered all of them, under as many owners as they like, and name the one that fits: so all are paid for,
+        // whichever is named.
+        let all = self.ledger().count_assets(key.id, None).await?;
+        words.tried.assets_paid = all.max(words.tried.assets);
+        words.tried.readings = readings_paid;
         let failed = |error| Error::internal("deciding a claim", error);
         let readings = read.iter().map(|read| Reading::from_logits(&read.logits));
         let readings = readings.collect::<Result<Vec<_>, _>>().map_err(failed)?;
@@ -71,12 +60,13 @@ impl Service {
             None => None,
         };
         let targets: Vec<_> = best.iter().map(|best| best.target.clone()).collect();
+        let named = matches!(claim, Claim::Asset(_));
         let claim = guardsplat_codeword::Claim {
             scheme: Scheme::Coded { code: CODE },
             readings: read,
             targets: &targets,
-            targets_tried: Some(words.tried.assets),
-            other_tries: 1,
+            targets_tried: Some(words.tried.assets_paid),
+            other_tries: words.tried.readings,
             rate: self.limits().false_positive_rate,
         };
         let mut tested = claim.test().map_err(failed)?;
@@ -86,12 +76,21 @@ impl Service {
         }
         let name = tested.answer.best.as_ref().map(|best| best.hypothesis.as_str());
         let read = read.iter().find(|read| Some(read.name.as_str()) == name);
-        Ok(Decided {
+        let assets_of_owner = match &best {
+            Some(best) => self.ledger().count_assets(key.id, Some(best.owner.id)).await?,
+            None => 0,
+        };
+        let mut decided = Decided {
             logits: read.map(|read| read.logits.clone()).unwrap_or_default(),
             tested,
             tried: words.tried,
             best,
-        })
+            named,
+            before,
+            assets_of_owner,
+        };
+        decided.refuse_later_assets();
+        Ok(decided)
     }
 
     async fn words(&self, claim: &Claim, key: &KeyRow) -> Result<Words> {
@@ -124,6 +123,7 @@ impl Service {
         words.tried = Tried {
             owners: owners.len() as u64,
             assets: words.assets.len() as u64,
+            ..Tried::default()
         };
         Ok(words)
     }
@@ -134,49 +134,19 @@ impl Service {
         let (candidate, asset) = candidate.zip(asset).ok_or_else(|| ResourceKind::Asset.not_found(id))?;
         let owner = self.ledger().get_owner(asset.owner).await?;
         let owner = owner.ok_or_else(|| ResourceKind::Owner.not_found(asset.owner))?;
+        let commitment = self.ledger().get_commitment(asset.commitment).await?;
+        let commitment = commitment.ok_or_else(|| ResourceKind::Commitment.not_found(asset.commitment))?;
         let mark = marks::mark(self.master(), key.id, &candidate)?;
         let target = Target {
             id: ResourceKind::Asset.name(id),
             word: mark.word,
             pad: Some(mark.pad),
         };
-        Ok(Best { asset, owner, target })
-    }
-}
-
-/// What is answered for a key whose assets can't be marked.
-fn unmarkable(key: &KeyRow, rate: f64) -> Decided {
-    let reason = format!(
-        "{} has {} bits, and assets are marked with {}: no asset of it can have been marked",
-        ResourceKind::Key.name(key.id),
-        key.bits,
-        marks::bits()
-    );
-    let answer = Answer {
-        verdict: Verdict::Inconclusive,
-        rate,
-        bits: key.bits,
-        needed_bits: None,
-        hypotheses: 1,
-        best: None,
-        payload: None,
-        reason: Some(reason),
-    };
-    Decided {
-        tested: Tested {
-            answer,
-            confidences: None,
-        },
-        tried: Tried::default(),
-        logits: Vec::new(),
-        best: None,
-    }
-}
-
-impl Decided {
-    /// Whether more bits, or fewer hypotheses, would have been needed to decide anything.
-    pub fn too_few_bits(&self) -> bool {
-        let answer = &self.tested.answer;
-        chance::reachable_rate(answer.bits, 1).is_ok_and(|reachable| reachable > answer.rate) || answer.best.is_none()
+        Ok(Best {
+            asset,
+            owner,
+            target,
+            commitment,
+        })
     }
 }

@@ -1,7 +1,10 @@
 //! Whose mark a job writes or looks for: named in its spec, checked when it is submitted, decided when it was read.
 mod conclusion;
+mod decided;
 mod decision;
+mod disclosure;
 mod hypotheses;
+mod readings;
 
 use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 
@@ -13,7 +16,8 @@ use crate::service::submission::Submission;
 use crate::service::violations::Violations;
 use crate::service::{Service, upload};
 pub(crate) use conclusion::WorkerReadings;
-pub(crate) use decision::Decided;
+pub(crate) use decided::{Best, Decided};
+pub(crate) use disclosure::Disclosure;
 
 /// What a claim is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +63,11 @@ pub fn of_verify(spec: &VerifySpec) -> Result<Option<Claim>> {
     problems.finish()?;
     let search = spec.search.then_some(Claim::Search);
     Ok(asset.map(Claim::Asset).or(owner.map(Claim::Owner)).or(search))
+}
+
+/// Whether a verification is no claim, and gives back every bit that was read.
+pub(crate) fn is_raw(spec: &VerifySpec) -> bool {
+    spec.asset.is_empty() && spec.owner.is_empty() && !spec.search
 }
 
 /// The claim of a job that is kept.

@@ -5,6 +5,7 @@ mod views;
 
 use guardsplat_evidence::{
     Audience, Embedding, Evidence, EvidenceKind as Of, Key, Model, SCHEMA, Sha256, Target, Timestamp, VERSION, View,
+    Worker,
 };
 use guardsplat_proto::v1::EmbedResult;
 
@@ -31,6 +32,8 @@ pub(crate) struct Facts<'a> {
     pub engine: &'a str,
     /// On what it did.
     pub device: &'a str,
+    /// Who had the job.
+    pub worker: Option<Worker>,
     /// Pictures of what was read.
     pub views: Vec<View>,
 }
@@ -86,6 +89,7 @@ impl Facts<'_> {
             finished: timestamp(clock::now().max(started))?,
             engine: told(self.engine),
             device: told(self.device),
+            worker: self.worker.clone(),
             model: Model {
                 name: told(&self.key.clip),
                 sha256: hash(&self.key.clip_sha256)?,

@@ -1,11 +1,14 @@
 //! A decided claim as the report tells it.
 use guardsplat_codeword::{Answer, ReadPayload, Verdict};
 use guardsplat_evidence as evidence;
-use guardsplat_evidence::{Bit, Found, HypothesisGroup, Reason, Tried, Verification};
+use guardsplat_evidence::{
+    Bit, Found, History, HypothesisGroup, Multiplicity, Reason, Registration, Sha256, Tried, Verification,
+};
 
-use super::{Decided, payload};
+use super::{Decided, payload, timestamp};
 use crate::error::Result;
 use crate::ledger::KeyRow;
+use crate::service::claims::Best;
 use crate::service::names::ResourceKind;
 
 /// A claim that was decided, with how it was read.
@@ -14,8 +17,6 @@ pub struct Read<'a> {
     pub decided: &'a Decided,
     /// The hypotheses that were tried, by kinds.
     pub framings: Vec<HypothesisGroup>,
-    /// Whether the claim named the asset, whose owner may see its word even where it does not match.
-    pub named: bool,
 }
 
 impl Read<'_> {
@@ -30,12 +31,17 @@ impl Read<'_> {
                 framings: self.framings.clone(),
                 owners: self.decided.tried.owners,
                 assets: self.decided.tried.assets,
+                paid: Some(Multiplicity {
+                    assets: self.decided.tried.assets_paid,
+                    readings: self.decided.tried.readings,
+                }),
             },
             views: answer.best.as_ref().map_or(0, |best| best.views),
             decision: answer.best.as_ref().map(|best| {
                 let (bits, corrected) = (answer.bits, corrected(answer));
                 evidence::Decision::new(bits, best.matched_bits, corrected, answer.hypotheses, answer.rate)
             }),
+            history: self.history()?,
             found: self.found(key)?,
             strip: self.strip(),
         })
@@ -45,6 +51,7 @@ impl Read<'_> {
         let answer = &self.decided.tested.answer;
         let inconclusive = answer.verdict == Verdict::Inconclusive;
         inconclusive.then(|| match answer.needed_bits {
+            Some(_) if self.decided.is_refused() => Reason::RegisteredLater,
             Some(_) => Reason::WeakReading,
             None if self.decided.too_few_bits() => Reason::TooFewBits,
             None => Reason::TooManyHypotheses,
@@ -58,6 +65,31 @@ impl Read<'_> {
             bits => format!("best in this framing: {}; {bits} bits were undecided", best.hypothesis),
         });
         answer.reason.clone().or(framing)
+    }
+
+    /// What there was before, of a suspect.
+    fn history(&self) -> Result<Option<History>> {
+        let Some(before) = self.decided.before else {
+            return Ok(None);
+        };
+        let shown = self.decided.shown();
+        let registration = |best: &Best| -> Result<Registration> {
+            let commitment = &best.commitment.commitment;
+            Ok(Registration {
+                asset: ResourceKind::Asset.name(best.asset.id),
+                commitment: ResourceKind::Commitment.name(commitment.id),
+                sequence: commitment.sequence,
+                hash: Sha256(best.commitment.hash()),
+                time: timestamp(commitment.time)?,
+                revealed: best.asset.reveal_time.map(timestamp).transpose()?,
+            })
+        };
+        Ok(Some(History {
+            first_seen: timestamp(before.first_seen)?,
+            readings_of_key: before.readings_of_key,
+            assets_of_owner: shown.map(|_| self.decided.assets_of_owner),
+            asset: shown.map(registration).transpose()?,
+        }))
     }
 
     fn found(&self, key: &KeyRow) -> Result<Option<Found>> {
@@ -82,9 +114,11 @@ impl Read<'_> {
             return Vec::new();
         };
         // A search that found nothing is nobody's business but the searcher's, who owns none of these assets.
-        let known = self.named || tested.answer.verdict == Verdict::Match;
-        let target = self.decided.best.as_ref().filter(|_| known);
-        let mut wanted = target.into_iter().flat_map(|best| best.target.word.bits());
+        let mut wanted = self
+            .decided
+            .shown()
+            .into_iter()
+            .flat_map(|best| best.target.word.bits());
         let read = confidences.word.bits();
         let each = read.zip(&confidences.bits).zip(&self.decided.logits);
         each.map(|((read, &confidence), &logit)| {

@@ -132,6 +132,7 @@ fn checked(request: CreateAssetRequest) -> Result<Registration> {
         ("asset.payload_number", asset.payload_number == 0),
         ("asset.commitment", asset.commitment.is_empty()),
         ("asset.create_time", asset.create_time.is_none()),
+        ("asset.reveal_time", asset.reveal_time.is_none()),
     ] {
         problems.check(empty, field, "is set by the server and must be empty");
     }
@@ -159,5 +160,6 @@ fn message(row: AssetRow) -> Asset {
         payload_number: row.payload,
         commitment: ResourceKind::Commitment.name(row.commitment),
         create_time: Some(timestamp(row.create_time)),
+        reveal_time: row.reveal_time.map(timestamp),
     }
 }

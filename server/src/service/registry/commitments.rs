@@ -1,10 +1,13 @@
 //! Commitments as they are told: one, all in their order, and as documents that stand for themselves.
-use guardsplat_commitment::{Document, Signed};
-use guardsplat_proto::v1::{Commitment, ListCommitmentsRequest, ListCommitmentsResponse, PublicKey};
+use guardsplat_commitment::{Document, OpenedDocument, Signed};
+use guardsplat_proto::v1::{
+    Commitment, ListCommitmentsRequest, ListCommitmentsResponse, PublicKey, RevealCommitmentResponse,
+};
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
-use crate::service::clock::timestamp;
+use crate::notary;
+use crate::service::clock::{self, timestamp};
 use crate::service::names::ResourceKind;
 use crate::service::{Service, page};
 
@@ -48,6 +51,30 @@ impl Service {
         document
             .to_json()
             .map_err(|error| Error::internal("writing a commitment", error))
+    }
+
+    /// Opens a commitment for whoever is to check it, and notes that it was opened.
+    pub(crate) async fn reveal(&self, project: &str, name: &str) -> Result<RevealCommitmentResponse> {
+        let signed = self.commitment(project, name).await?;
+        let asset = signed.commitment.asset;
+        let secret = self.ledger().candidate(asset).await?;
+        let secret = secret.ok_or_else(|| ResourceKind::Asset.not_found(asset))?;
+        let document = OpenedDocument {
+            opening: notary::open_nonce(self.master(), asset, &secret.sealed_nonce)?,
+            document: Document {
+                signed,
+                public_key: self.notary().public_key(),
+            },
+        };
+        let failed = |error| Error::internal("opening a commitment", error);
+        // What does not open is not given out as if it did.
+        document.verify(&self.notary().public_key()).map_err(failed)?;
+        let text = document.to_json().map_err(failed)?;
+        let row = self.ledger().reveal_asset(asset, clock::now()).await?;
+        Ok(RevealCommitmentResponse {
+            document: text,
+            reveal_time: row.reveal_time.map(timestamp),
+        })
     }
 
     pub(crate) fn public_key(&self) -> Result<PublicKey> {

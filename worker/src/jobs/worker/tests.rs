@@ -36,7 +36,11 @@ async fn a_panic_fails_the_job_and_ends_the_worker() {
     let mut worker = worker(&server, folder.path()).await;
     // The first job fails by itself, and the worker goes on.
     server.submit(Spec::Verify(VerifySpec::default()));
-    server.submit(Spec::CreateKey(KeySpec { bits: 8, seed: None }));
+    server.submit(Spec::CreateKey(KeySpec {
+        bits: 8,
+        seed: None,
+        ..KeySpec::default()
+    }));
     let (lease, job) = worker.lease().await.unwrap().unwrap();
     worker.attempt(&lease, &job).await.unwrap();
     let failed = |server: &server::Server| match server.next(&mut Vec::new()) {

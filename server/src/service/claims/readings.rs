@@ -1,0 +1,50 @@
+//! Which reading of a suspect a job makes, and what there was before it: whoever has one suspect read again and again, with
+//! other views or other keys, pays for each.
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+use crate::ledger::{JobRow, JobSpec, KeyRow, NewReading, ReadBefore};
+use crate::service::names::ResourceKind;
+use crate::service::{Service, clock};
+
+/// Views that a scene is read from where nothing is said.
+const VIEWS: u32 = 20;
+
+impl Service {
+    /// Notes the reading that a verification made, and says what there was before.
+    pub(super) async fn read_before(&self, job: &JobRow, key: &KeyRow) -> Result<ReadBefore> {
+        let failed = |reason| Error::internal("noting a reading", reason);
+        let JobSpec::Verify(spec) = &job.spec else {
+            return Err(failed("the job is no verification"));
+        };
+        let mut files = Vec::with_capacity(spec.suspects.len());
+        for name in &spec.suspects {
+            let id = ResourceKind::Artifact.parse("job.verify.suspects", name)?;
+            let row = self.ledger().get_any_artifact(id).await?;
+            let row = row.ok_or_else(|| ResourceKind::Artifact.not_found(id))?;
+            files.push((row.sha256, row.create_time));
+        }
+        files.sort();
+        let mut hash = Sha256::new_with_prefix(b"guardsplat reading\0");
+        hash.update((job.project.len() as u64).to_be_bytes());
+        hash.update(job.project.as_bytes());
+        hash.update(key.id.as_bytes());
+        let views = if spec.views == 0 { VIEWS } else { spec.views };
+        hash.update(views.to_be_bytes());
+        hash.update(spec.size.to_be_bytes());
+        hash.update(spec.seed.to_be_bytes());
+        hash.update([spec.ignore_bad_rows.into()]);
+        // Each has 64 digits, so no two lists give the same bytes.
+        files.iter().for_each(|(sha256, _)| hash.update(sha256.as_bytes()));
+        let id = hash.finalize().into();
+        let new = NewReading {
+            id,
+            project: job.project.clone(),
+            key: key.id,
+            files,
+        };
+        self.ledger().note_reading(new, clock::now()).await?;
+        let before = self.ledger().before(id).await?;
+        before.ok_or_else(|| failed("the ledger has none of its files"))
+    }
+}
