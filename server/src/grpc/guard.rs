@@ -9,7 +9,7 @@ use futures::future::BoxFuture;
 use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::http::{HeaderMap, Request, Response};
-use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
+use tonic::transport::server::TcpConnectInfo;
 use tower::{Layer, Service};
 
 use crate::access::{self, Caller, Need, Scope};
@@ -119,13 +119,7 @@ impl Guard {
 
 /// Where a request comes from.
 fn address<B>(request: &Request<B>) -> Option<IpAddr> {
-    let extensions = request.extensions();
-    let plain = extensions.get::<TcpConnectInfo>();
-    let info = plain.or_else(|| {
-        extensions
-            .get::<TlsConnectInfo<TcpConnectInfo>>()
-            .map(TlsConnectInfo::get_ref)
-    });
+    let info = request.extensions().get::<TcpConnectInfo>();
     info.and_then(TcpConnectInfo::remote_addr).map(|address| address.ip())
 }
 

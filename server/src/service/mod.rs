@@ -66,6 +66,10 @@ pub struct Limits {
     pub watch_stall: Duration,
     /// Watches that a caller may have open; 0 for no limit.
     pub max_watches: u32,
+    /// A download whose reader takes nothing for so long is let go.
+    pub download_stall: Duration,
+    /// Uploads and downloads that a caller may have at once; 0 for no limit.
+    pub max_transfers: u32,
     /// How often a scene without the mark may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
     /// Jobs of one project that may wait; none for no limit but that of all.
@@ -96,6 +100,8 @@ impl Default for Limits {
             upload_idle: Duration::from_secs(60),
             watch_stall: Duration::from_secs(60),
             max_watches: 1_000,
+            download_stall: Duration::from_secs(60),
+            max_transfers: 64,
             false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
             max_queued_of_project: None,
             max_bytes_of_project: None,
@@ -131,7 +137,8 @@ struct Shared {
     reports: progress::ProgressThrottle,
     placement: placement::Placement,
     positions: queue_positions::QueuePositions,
-    places: Arc<concurrency_limit::ConcurrencyLimit>,
+    watches: Arc<concurrency_limit::ConcurrencyLimit>,
+    transfers: Arc<concurrency_limit::ConcurrencyLimit>,
 }
 
 impl Service {
@@ -160,7 +167,8 @@ impl Service {
             reports: progress::ProgressThrottle::default(),
             placement: placement::Placement::default(),
             positions: queue_positions::QueuePositions::default(),
-            places: Arc::default(),
+            watches: Arc::default(),
+            transfers: Arc::default(),
         };
         Self {
             shared: Arc::new(shared),
@@ -242,7 +250,11 @@ impl Service {
     }
 
     pub(crate) fn watch_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
-        &self.shared.places
+        &self.shared.watches
+    }
+
+    pub(crate) fn transfer_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
+        &self.shared.transfers
     }
 }
 

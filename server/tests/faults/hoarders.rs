@@ -25,7 +25,9 @@ const FILES: u64 = 1024;
 const IDLE: u32 = 1100;
 /// Connections of one address that have begun to speak HTTP/2.
 const OF_ONE_ADDRESS: u32 = 50;
-/// What is downloaded; also what is announced, half of which is sent.
+/// What is downloaded: more than is ever on the way.
+const READ: usize = 6 << 20;
+/// What is announced, half of which is sent.
 const BYTES: usize = 8 << 20;
 /// Downloads and uploads of one address.
 const STREAMS: usize = 50;
@@ -90,24 +92,45 @@ fn computed(server: &Server) -> f64 {
     ticks / 100.0 // ticks a second, on every Linux
 }
 
+/// An S3 server with threads of its own: what it computes is not to hold up the callers that are timed.
+fn service() -> Endpoint {
+    let (give, take) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let runtime = tokio::runtime::Runtime::new().unwrap();
+        runtime.block_on(async {
+            give.send(Endpoint::start().await).unwrap();
+            // For as long as this process.
+            std::future::pending::<()>().await;
+        });
+    });
+    take.recv().unwrap()
+}
+
 pub async fn of_a_folder(place: Place) {
-    do_not_use_it_up(place, "folder").await;
+    do_not_use_it_up(place, "a folder", IDLE).await;
 }
 
 pub async fn of_a_bucket(mut place: Place) {
-    let endpoint = Endpoint::start().await;
+    let endpoint = service();
     place.keeps_artifacts_in(&endpoint);
-    do_not_use_it_up(place, "S3").await;
+    do_not_use_it_up(place, "S3", IDLE).await;
 }
 
-async fn do_not_use_it_up(mut place: Place, store: &str) {
+/// Without idle connections, which are another thing than memory.
+pub async fn of_memory(mut place: Place) {
+    let endpoint = service();
+    place.keeps_artifacts_in(&endpoint);
+    do_not_use_it_up(place, "S3", 0).await;
+}
+
+async fn do_not_use_it_up(mut place: Place, store: &str, idle_connections: u32) {
     let (readers, uploads) = short_or_full((50, 20), (256, 100));
     let long = short_or_full(Duration::from_secs(2), Duration::from_secs(20));
     place.bench.may_open(FILES);
     let server = place.start(&[]).await;
     let caller = place.caller();
     let inputs = Arc::new(caller.inputs().await);
-    let scene = caller.upload("large.ply", &vec![7; BYTES]).await.unwrap().name;
+    let scene = caller.upload("large.ply", &vec![7; READ]).await.unwrap().name;
     let before = healthy(&place, &inputs, long).await;
     let at_rest = peak(&server);
 
@@ -135,7 +158,7 @@ async fn do_not_use_it_up(mut place: Place, store: &str) {
         .collect();
     let to: SocketAddr = server.address().parse().unwrap();
     let mut connections = Vec::new();
-    for i in 0..IDLE {
+    for i in 0..idle_connections {
         // Every other one begins to speak.
         let (from, said) = match i % 2 {
             0 => (address(3, 0), &b""[..]),
@@ -158,7 +181,7 @@ async fn do_not_use_it_up(mut place: Place, store: &str) {
     let moved = begun.elapsed();
     let most = peak(&server);
     place.figure(&format!(
-        "artifacts in {store}, {readers} downloads that are not read or slowly, {IDLE} idle connections, {uploads} uploads \
+        "artifacts in {store}, {readers} downloads that are not read or slowly, {idle_connections} idle connections, {uploads} uploads \
          that stop half-way, {FILES} files: the server had {most} MiB at most ({at_rest} before); others' calls {before}; \
          with them {during}, {cores:.2} cores; 8 MiB sent and fetched in {:.1} s",
         moved.as_secs_f64()

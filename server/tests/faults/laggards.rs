@@ -105,6 +105,8 @@ pub async fn do_not_hold_up_others(place: Place) {
         patience,
         "--watch-stall-seconds",
         patience,
+        "--max-transfers-per-caller",
+        "0",
         "--metrics-listen",
         &metrics,
     ];

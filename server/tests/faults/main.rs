@@ -50,6 +50,7 @@ faults!(
     crate::laggards::do_not_hold_up_others as laggards_do_not_hold_up_others,
     crate::hoarders::of_a_folder as hoarders_do_not_use_up_a_server_with_a_folder,
     crate::hoarders::of_a_bucket as hoarders_do_not_use_up_a_server_with_a_bucket,
+    crate::hoarders::of_memory as hoarders_do_not_use_up_the_memory,
     crate::stopping::hands_back as a_server_that_stops_hands_back,
     crate::cancelling::ends_soon as cancelled_jobs_end_soon_and_stay_as_they_are,
     crate::away::the_database as the_database_goes_away_and_comes_back,
