@@ -193,5 +193,10 @@ pub(super) fn steps() -> Vec<Migration> {
             include_str!("../../../migrations/postgres/0006_operations.sql"),
         ),
         step(7, "queue", include_str!("../../../migrations/postgres/0007_queue.sql")),
+        step(
+            9,
+            "upload reservations",
+            include_str!("../../../migrations/postgres/0009_upload_reservations.sql"),
+        ),
     ]
 }

@@ -84,5 +84,10 @@ fn migrator() -> Migrator {
             include_str!("../../../migrations/sqlite/0008_operations.sql"),
         ),
         step(9, "queue", include_str!("../../../migrations/sqlite/0009_queue.sql")),
+        step(
+            11,
+            "upload reservations",
+            include_str!("../../../migrations/sqlite/0011_upload_reservations.sql"),
+        ),
     ])
 }
