@@ -34,6 +34,7 @@ mod slow_consumer;
 mod status;
 #[cfg(test)]
 mod tests;
+mod token_memory;
 mod tokens;
 mod transport_errors;
 mod upload_stream;
