@@ -157,6 +157,12 @@ pub enum Error {
         /// Most that it may have.
         limit: u32,
     },
+    /// A caller that has as many uploads and downloads under way as it may have.
+    #[error("{limit} uploads and downloads are under way, and a caller may have no more at once")]
+    TooManyTransfers {
+        /// Most that it may have.
+        limit: u32,
+    },
     /// A project that has as much as it may have.
     #[error("project {project} has used up its {limit} {what}")]
     QuotaUsedUp {
@@ -195,6 +201,9 @@ pub enum Error {
     /// A watch whose reader did not read.
     #[error("nothing of the watch was read for {} s; it goes on from the last cursor", .0.as_secs())]
     WatchStalled(Duration),
+    /// A download whose reader did not read.
+    #[error("nothing of the download was read for {} s; it goes on from an offset", .0.as_secs())]
+    DownloadStalled(Duration),
     /// The deadline that the caller set has passed.
     #[error("the deadline has passed")]
     DeadlineExceeded,

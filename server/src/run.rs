@@ -1,4 +1,5 @@
 //! The server as a whole: opens what it keeps, answers calls, looks after its worker, and stops in good order.
+mod files;
 mod folder;
 mod health;
 pub(crate) mod ledger;
@@ -23,7 +24,7 @@ use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{self, ListenerOptions};
+use crate::grpc::listener::{self, ConnectionLimits, ListenerOptions};
 use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::metrics::{self, Page};
@@ -41,6 +42,12 @@ pub use health::Readiness;
 
 /// Calls that have begun get at least so long to end, even if the worker took all the time there was.
 const LEAST_DRAIN: Duration = Duration::from_secs(1);
+
+/// Connections of the own worker, which has a listener to itself. Others on this machine may try.
+const SIDE: ConnectionLimits = ConnectionLimits {
+    total: 32,
+    of_one_address: 32,
+};
 
 /// Runs a server until `shutdown`. Says on standard output where it listens, once it does.
 pub async fn serve(settings: Settings, shutdown: impl Future<Output = ()>) -> Result<()> {
@@ -78,6 +85,7 @@ pub struct Server {
 impl Server {
     /// Opens the data folder, the master key, the store, the ledger and the listener.
     pub async fn open(settings: Settings) -> Result<Self> {
+        let files = files::raise();
         let folder = DataFolder::open(&settings.data_dir)?;
         let master = secrets::load(settings.key_source(), folder.path()).map_err(startup)?;
         let store = store::open(&settings, folder.path()).await?;
@@ -123,6 +131,9 @@ impl Server {
         let door = ListenerOptions {
             guard,
             tls,
+            connections: files::connections(&settings, files),
+            handshake: listener::HANDSHAKE,
+            idle: settings.connection_idle(),
             measured: api.measured(),
         };
         let metrics = match settings.metrics_listen {
@@ -178,6 +189,9 @@ impl Server {
             let door = ListenerOptions {
                 guard,
                 tls: None,
+                connections: SIDE,
+                handshake: listener::HANDSHAKE,
+                idle: None,
                 measured: self.api.measured(),
             };
             tokio::spawn(listener::serve(routes.clone(), door, listener, drained.clone()))
@@ -270,6 +284,8 @@ fn limits(settings: &Settings) -> Limits {
         upload_idle: settings.upload_timeout(),
         watch_stall: settings.watch_stall(),
         max_watches: settings.max_watches_per_caller,
+        download_stall: settings.download_stall(),
+        max_transfers: settings.max_transfers_per_caller,
         false_positive_rate: settings.false_positive_rate,
         raw_verification: settings.allow_raw_verification,
         max_queued_of_project: Some(settings.max_queued_jobs_per_project).filter(|&limit| limit > 0),

@@ -1,33 +1,61 @@
 //! TLS of the listener, and certificates of clients (mTLS), by rustls.
 use std::path::Path;
+use std::sync::Arc;
 
-use tonic::transport::{Certificate, Identity, Server, ServerTlsConfig};
+use rustls::crypto::ring;
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::server::WebPkiClientVerifier;
+use rustls::{RootCertStore, ServerConfig};
 
 use crate::error::{Error, Result};
 use crate::settings::Settings;
 
+/// What HTTP/2 is called when a protocol is agreed on.
+const HTTP2: &[u8] = b"h2";
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
 /// What the listener needs for TLS, as the settings have it; none where they have no certificate. Files are read once,
 /// at the start.
-pub fn load(settings: &Settings) -> Result<Option<ServerTlsConfig>> {
+pub fn load(settings: &Settings) -> Result<Option<Arc<ServerConfig>>> {
     let (Some(certificate), Some(key)) = (&settings.tls_certificate, &settings.tls_key) else {
         // That one is there without the other was refused with the settings.
         return Ok(None);
     };
-    let identity = Identity::from_pem(read("tls_certificate", certificate)?, read("tls_key", key)?);
-    let mut tls = ServerTlsConfig::new().identity(identity);
-    if let Some(ca) = &settings.tls_client_ca {
-        tls = tls.client_ca_root(Certificate::from_pem(read("tls_client_ca", ca)?));
-    }
-    // Set up once for nothing, so that files that are no certificates are told at the start.
-    Server::builder().tls_config(tls.clone()).map_err(|error| {
-        let cause = std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string);
+    let certificates = read("tls_certificate", certificate)?;
+    let private = read("tls_key", key)?;
+    let clients = settings.tls_client_ca.as_deref();
+    let clients = clients.map(|path| read("tls_client_ca", path)).transpose()?;
+    let config = config(&certificates, &private, clients.as_deref()).map_err(|cause| {
         Error::Startup(format!(
             "TLS can't be set up with tls_certificate {} and tls_key {}: {cause}",
             certificate.display(),
             key.display()
         ))
     })?;
-    Ok(Some(tls))
+    Ok(Some(Arc::new(config)))
+}
+
+fn config(certificates: &[u8], private: &[u8], clients: Option<&[u8]>) -> Result<ServerConfig, Failure> {
+    let provider = Arc::new(ring::default_provider());
+    let chain = CertificateDer::pem_slice_iter(certificates).collect::<Result<Vec<_>, _>>()?;
+    let private = PrivateKeyDer::from_pem_slice(private)?;
+    let builder = ServerConfig::builder_with_provider(provider.clone()).with_safe_default_protocol_versions()?;
+    let builder = match clients {
+        None => builder.with_no_client_auth(),
+        Some(clients) => {
+            let mut roots = RootCertStore::empty();
+            for root in CertificateDer::pem_slice_iter(clients) {
+                roots.add(root?)?;
+            }
+            let verifier = WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider).build()?;
+            builder.with_client_cert_verifier(verifier)
+        }
+    };
+    let mut config = builder.with_single_cert(chain, private)?;
+    config.alpn_protocols.push(HTTP2.to_vec());
+    Ok(config)
 }
 
 fn read(setting: &str, path: &Path) -> Result<Vec<u8>> {

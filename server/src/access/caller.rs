@@ -44,6 +44,11 @@ impl Caller {
         }
     }
 
+    /// Whether this is a worker for certain. On an open server anybody may be one, and so nobody is.
+    pub fn is_worker(&self) -> bool {
+        self.scopes.has(Scope::Worker) && self.scopes != Scopes::all()
+    }
+
     /// Refuses a caller who may not do what `scope` is for.
     pub fn must(&self, scope: Scope) -> Result<()> {
         if self.scopes.has(scope) {
@@ -84,6 +89,7 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_told() {
+        assert!(Caller::own_worker().is_worker() && !Caller::anybody(None).is_worker());
         assert!(Caller::anybody(None).must(Scope::Admin).is_ok());
         let error = Caller::own_worker().must(Scope::Admin).unwrap_err().to_string();
         assert_eq!(error, "the token lacks the scope admin");

@@ -4,11 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::Place;
+use super::local::FOLDER;
 use crate::error::Error;
 use crate::secrets::SecretError;
-
-/// What object_store calls a folder in its errors; whatever else it names is reached by a network.
-const FOLDER: &str = "LocalFileSystem";
 
 /// A result of the store.
 pub type StoreResult<T> = Result<T, StoreError>;

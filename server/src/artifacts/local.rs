@@ -10,6 +10,9 @@ use object_store::path::Path as ObjectPath;
 
 use super::{StoreError, StoreResult};
 
+/// What object_store calls a folder in its errors; whatever else it names is reached by a network.
+pub(super) const FOLDER: &str = "LocalFileSystem";
+
 /// The folder that the store is in.
 #[derive(Clone, Debug)]
 pub(super) struct Folder(PathBuf);

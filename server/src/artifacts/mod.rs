@@ -10,18 +10,21 @@ mod error;
 mod generation;
 mod list;
 mod local;
+mod memory;
+mod multipart;
 mod path;
 mod place;
 mod reader;
 mod remote;
 mod sealed;
 mod sign;
+mod spool;
 mod start;
 mod taken;
 mod writer;
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,6 +37,7 @@ use tokio::time::timeout;
 pub use check::{Announced, Check};
 pub use error::{StoreError, StoreResult};
 pub use list::Listed;
+pub use memory::TransferMemory;
 pub use path::ArtifactPath;
 pub use place::Place;
 pub use reader::Reader;
@@ -43,15 +47,21 @@ pub use sign::UploadUrl;
 pub use taken::Taken;
 pub use writer::Writer;
 
-/// Most bytes that one chunk has, in and out.
+/// Most bytes that one chunk has that is sent to the server.
 pub const CHUNK_BYTES: usize = 1 << 20;
+/// Most bytes that an artifact gives out at once; fewer are not written one by one.
+pub const PIECE_BYTES: usize = 32 << 10;
 
 /// Least bytes of a part, but for the last; S3 asks for so many.
 const PART_BYTES: u64 = 5 << 20;
 /// Most parts of an artifact; S3 and GCS take no more.
 const PARTS: u64 = 10_000;
-/// Bytes that one request to a service asks for: answers take long to begin.
-const WINDOW_BYTES: usize = 4 << 20;
+/// Most bytes that one request asks for: answers of a service take long to begin.
+const REMOTE_WINDOW: usize = 4 << 20;
+const FOLDER_WINDOW: usize = 1 << 20;
+/// The same for readers who are slow.
+const SLOW_REMOTE_WINDOW: usize = 256 << 10;
+const SLOW_FOLDER_WINDOW: usize = 64 << 10;
 /// How long a service may take to answer, all repetitions included; to take bytes, longer.
 const ANSWER: Duration = Duration::from_secs(15);
 const WRITE: Duration = Duration::from_secs(60);
@@ -74,6 +84,10 @@ struct Inner {
     /// Where it can sign.
     signer: Option<Arc<dyn Signer>>,
     max_bytes: u64,
+    /// What bytes under way draw from.
+    memory: TransferMemory,
+    /// Where parts wait that are not complete.
+    spool: PathBuf,
 }
 
 impl ArtifactStore {
@@ -104,6 +118,8 @@ impl ArtifactStore {
             folder: None,
             signer: Some(remote.signer),
             max_bytes,
+            memory: TransferMemory::default(),
+            spool: std::env::temp_dir(),
         }))
     }
 
@@ -117,11 +133,23 @@ impl ArtifactStore {
             folder: Some(folder),
             signer: None,
             max_bytes,
+            memory: TransferMemory::default(),
+            spool: std::env::temp_dir(),
         }))
     }
 
     fn new(inner: Inner) -> Self {
         Self { inner: Arc::new(inner) }
+    }
+
+    /// The same, with so much memory for bytes under way, and parts that are not complete in files of this folder, which
+    /// have no names. For a store that nobody shares yet.
+    pub fn within(mut self, memory: TransferMemory, spool: &Path) -> Self {
+        if let Some(inner) = Arc::get_mut(&mut self.inner) {
+            inner.memory = memory;
+            inner.spool = spool.to_owned();
+        }
+        self
     }
 
     /// Where it is.
@@ -165,6 +193,15 @@ impl ArtifactStore {
         }
     }
 
+    /// What bytes under way draw from.
+    pub(crate) fn memory(&self) -> &TransferMemory {
+        &self.inner.memory
+    }
+
+    fn spool_folder(&self) -> &Path {
+        &self.inner.spool
+    }
+
     fn objects(&self) -> &dyn ObjectStore {
         self.inner.objects.as_ref()
     }
@@ -177,39 +214,44 @@ impl ArtifactStore {
         Ok(self.answered(self.objects().head(path)).await?.size)
     }
 
-    /// Bytes of the parts that an artifact of this size is written in; none where it goes at once.
+    /// Bytes of the parts that an artifact of this size goes to a service in; none where it goes at once.
     fn part_bytes(&self, size: u64) -> Option<usize> {
-        if !self.is_remote() {
-            return Some(CHUNK_BYTES);
-        }
         let part = PART_BYTES.max(size.div_ceil(PARTS).next_multiple_of(1 << 20));
         (size > part).then(|| usize::try_from(part).unwrap_or(usize::MAX))
     }
 
-    /// Bytes that one request asks for.
+    /// Most bytes that one request asks for.
     fn window(&self) -> usize {
         match self.is_remote() {
-            true => WINDOW_BYTES,
-            false => CHUNK_BYTES,
+            true => REMOTE_WINDOW,
+            false => FOLDER_WINDOW,
+        }
+    }
+
+    /// The same for readers who are slow.
+    fn slow_window(&self) -> usize {
+        match self.is_remote() {
+            true => SLOW_REMOTE_WINDOW,
+            false => SLOW_FOLDER_WINDOW,
         }
     }
 
     /// What a store says within the time that it has; a disk has all the time it needs.
     async fn answered<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
-        self.within(ANSWER, call).await
+        self.in_time(ANSWER, call).await
     }
 
     /// As [`Self::answered`], for calls that bring bytes.
     async fn written<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
-        self.within(WRITE, call).await
+        self.in_time(WRITE, call).await
     }
 
     /// As [`Self::answered`], for copies inside the store.
     async fn copied<T>(&self, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
-        self.within(COPY, call).await
+        self.in_time(COPY, call).await
     }
 
-    async fn within<T>(&self, limit: Duration, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
+    async fn in_time<T>(&self, limit: Duration, call: impl Future<Output = object_store::Result<T>>) -> StoreResult<T> {
         if !self.is_remote() {
             return Ok(call.await?);
         }

@@ -35,8 +35,8 @@ impl ArtifactStore {
     pub async fn read_sealed(&self, path: &ArtifactPath, master: &MasterKey) -> StoreResult<SecretSlice<u8>> {
         let mut reader = self.read(path, 0).await?;
         let mut sealed = Vec::with_capacity(reader.size().min(MAX_SECRET_BYTES) as usize);
-        while let Some(chunk) = reader.chunk().await? {
-            sealed.extend_from_slice(&chunk);
+        while let Some(piece) = reader.piece().await? {
+            sealed.extend_from_slice(&piece);
         }
         Ok(master.open(&path.to_string(), &sealed)?)
     }

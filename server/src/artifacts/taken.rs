@@ -45,8 +45,8 @@ impl ArtifactStore {
         let mut copy = self.read(path, 0).await?;
         // Something else may have been sent after the first look.
         of_length(announced, copy.size())?;
-        while let Some(chunk) = copy.chunk().await? {
-            check.chunk(&chunk)?;
+        while let Some(piece) = copy.piece().await? {
+            check.chunk(&piece)?;
         }
         check.finish()?;
         Ok(())

@@ -1,13 +1,11 @@
 //! Writes one artifact, chunk by chunk.
 use object_store::path::Path;
-use object_store::{ObjectStoreExt, PutPayloadMut, WriteMultipart};
+use object_store::{ObjectStoreExt, PutPayloadMut};
 use prost::bytes::Bytes;
-use tokio::runtime::Handle;
 
-use super::{Announced, ArtifactStore, Check, StoreResult};
-
-/// Parts that may be on their way to the store while the next chunk is awaited. Bounds the memory of a slow one.
-const PARTS_UNDER_WAY: usize = 2;
+use super::multipart::Multipart;
+use super::spool::Spool;
+use super::{Announced, ArtifactStore, Check, PIECE_BYTES, StoreResult};
 
 /// An artifact that is being written. Nothing is kept unless [`Writer::finish`] succeeds: dropping the writer, as
 /// happens when a stream breaks off, removes what was written.
@@ -20,10 +18,12 @@ pub struct Writer {
 
 /// Where the bytes go meanwhile.
 enum Sink {
-    /// A part after the other, which the store keeps apart until they are said to be all.
-    Parts(Parts),
-    /// So few that they are sent at once, when all are there.
-    Whole(PutPayloadMut),
+    /// Into the folder's staged file as they come; a few are gathered.
+    Staged(Multipart, PutPayloadMut),
+    /// To the service in parts of so many bytes, which it keeps apart until they are said to be all.
+    Parts(Multipart, Spool, usize),
+    /// To the service at once, as they are few, when all are there.
+    Whole(Spool),
 }
 
 impl Writer {
@@ -33,15 +33,11 @@ impl Writer {
         announced: Announced,
         check: Check,
     ) -> StoreResult<Self> {
+        let spool = || Spool::new(store.spool_folder());
         let bytes = match store.part_bytes(announced.size) {
-            Some(part) => {
-                let upload = store.answered(store.objects().put_multipart(&path)).await?;
-                Sink::Parts(Parts {
-                    parts: Some(WriteMultipart::new_with_chunk_size(upload, part)),
-                    remote: store.is_remote(),
-                })
-            }
-            None => Sink::Whole(PutPayloadMut::new()),
+            _ if !store.is_remote() => Sink::Staged(Multipart::begin(&store, &path).await?, PutPayloadMut::new()),
+            Some(part) => Sink::Parts(Multipart::begin(&store, &path).await?, spool(), part),
+            None => Sink::Whole(spool()),
         };
         Ok(Self {
             store,
@@ -53,16 +49,25 @@ impl Writer {
 
     /// Takes the next bytes. After an error the writer is of no more use.
     pub async fn chunk(&mut self, chunk: impl Into<Bytes>) -> StoreResult<()> {
-        let chunk = chunk.into();
+        let mut chunk = chunk.into();
         self.check.chunk(&chunk)?;
         match &mut self.bytes {
-            Sink::Parts(Parts { parts: Some(parts), .. }) => {
-                parts.wait_for_capacity(PARTS_UNDER_WAY).await?;
-                parts.put(chunk);
+            Sink::Staged(file, few) => {
+                few.push(chunk);
+                if few.content_length() >= PIECE_BYTES {
+                    file.put(std::mem::take(few).freeze()).await?;
+                }
             }
-            // Only its end takes the parts.
-            Sink::Parts(Parts { parts: None, .. }) => {}
-            Sink::Whole(all) => all.push(chunk),
+            Sink::Parts(parts, spool, size) => {
+                while !chunk.is_empty() {
+                    let room = *size - spool.length();
+                    spool.push(chunk.split_to(chunk.len().min(room))).await?;
+                    if spool.length() == *size {
+                        parts.send(spool, self.store.memory()).await?;
+                    }
+                }
+            }
+            Sink::Whole(spool) => spool.push(chunk).await?,
         }
         Ok(())
     }
@@ -86,10 +91,22 @@ impl Writer {
             }
         };
         match bytes {
-            Sink::Whole(all) => {
-                store.written(store.objects().put(&path, all.freeze())).await?;
+            Sink::Staged(mut file, few) => {
+                if !few.is_empty() {
+                    file.put(few.freeze()).await?;
+                }
+                file.publish(&path, announced).await?;
             }
-            Sink::Parts(mut parts) => parts.publish(&store, &path, announced).await?,
+            Sink::Parts(mut parts, mut spool, _) => {
+                if spool.length() > 0 {
+                    parts.send(&mut spool, store.memory()).await?;
+                }
+                parts.publish(&path, announced).await?;
+            }
+            Sink::Whole(mut spool) => {
+                let (all, _held) = spool.take(store.memory()).await?;
+                store.written(store.objects().put(&path, all.into())).await?;
+            }
         }
         Ok(announced)
     }
@@ -103,56 +120,8 @@ impl Writer {
 impl Sink {
     async fn abort(self) -> StoreResult<()> {
         match self {
-            Self::Parts(mut parts) => match parts.parts.take() {
-                Some(parts) => Ok(parts.abort().await?),
-                None => Ok(()),
-            },
+            Self::Staged(parts, _) | Self::Parts(parts, ..) => parts.abort().await,
             Self::Whole(_) => Ok(()),
         }
-    }
-}
-
-/// Parts that are given up when they are dropped. A folder sees to that itself.
-struct Parts {
-    parts: Option<WriteMultipart>,
-    remote: bool,
-}
-
-impl Parts {
-    async fn publish(&mut self, store: &ArtifactStore, path: &Path, announced: Announced) -> StoreResult<()> {
-        let Some(mut parts) = self.parts.take() else {
-            return Ok(());
-        };
-        // A part that failed is told before the last word is tried.
-        if let Err(error) = parts.wait_for_capacity(0).await {
-            self.parts = Some(parts);
-            return Err(error.into());
-        }
-        let Err(error) = store.written(parts.finish()).await else {
-            return Ok(());
-        };
-        if !self.remote {
-            return Err(error);
-        }
-        // The last word may have been heard, and its answer lost: then the store knows no such upload when it is said
-        // again. Nobody else writes at this path, and it shows nothing before all is there.
-        match store.size_of(path).await {
-            Ok(size) if size == announced.size => Ok(()),
-            _ => Err(error),
-        }
-    }
-}
-
-impl Drop for Parts {
-    fn drop(&mut self) {
-        let parts = self.parts.take().filter(|_| self.remote);
-        let (Some(parts), Ok(runtime)) = (parts, Handle::try_current()) else {
-            return;
-        };
-        runtime.spawn(async move {
-            if let Err(error) = parts.abort().await {
-                tracing::warn!(%error, "parts of an upload are left in the store");
-            }
-        });
     }
 }

@@ -1,20 +1,24 @@
 //! `ArtifactService`: scenes and pictures, in and out.
-use futures::stream::{self, BoxStream, StreamExt};
+use futures::stream::{BoxStream, StreamExt};
 use guardsplat_proto::v1::artifact_service_server::ArtifactService;
 use guardsplat_proto::v1::{
     Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, FinishUploadRequest,
     GetArtifactRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, StartUploadRequest, StartUploadResponse,
-    UploadArtifactRequest, download_artifact_response,
+    UploadArtifactRequest,
 };
 use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
 
+use crate::access::Caller;
 use crate::artifacts::ArtifactPath;
 use crate::error::{Error, Result, chain};
+use crate::grpc::download::download;
 use crate::grpc::guard::caller;
 use crate::grpc::upload_stream::Incoming;
 use crate::ledger::{ArtifactRow, NewArtifact, Origin};
+use crate::service::concurrency_limit::Permit;
 use crate::service::names::ResourceKind;
+use crate::service::rate_limit::payer;
 use crate::service::{Service, clock, to_proto, upload};
 
 #[tonic::async_trait]
@@ -23,7 +27,9 @@ impl ArtifactService for Service {
         &self,
         request: Request<Streaming<UploadArtifactRequest>>,
     ) -> Result<Response<Artifact>, Status> {
-        let project = caller(&request)?.project;
+        let caller = caller(&request)?;
+        let _permit = self.transfer(&caller)?;
+        let project = caller.project;
         let incoming = Incoming::new(request.into_inner(), self.limits().upload_idle);
         let row = self.within_upload_time(self.receive_upload(project, incoming)).await?;
         self.metrics().uploaded(false, row.size);
@@ -40,7 +46,9 @@ impl ArtifactService for Service {
     }
 
     async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
-        let project = caller(&request)?.project;
+        let caller = caller(&request)?;
+        let _permit = self.transfer(&caller)?;
+        let project = caller.project;
         let finished = async { Ok(self.finish(&project, &request.get_ref().upload).await?) };
         let (row, new) = self.within_upload_time(finished).await?;
         if new {
@@ -56,19 +64,19 @@ impl ArtifactService for Service {
         request: Request<DownloadArtifactRequest>,
     ) -> Result<Response<Self::DownloadArtifactStream>, Status> {
         let caller = caller(&request)?;
+        let permit = self.transfer(&caller)?;
         let DownloadArtifactRequest { name, offset } = request.into_inner();
         let id = ResourceKind::Artifact.parse("name", &name)?;
         let row = self.readable_artifact(&caller, id).await?;
         let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
         let path = ArtifactPath::parse(&row.path).map_err(Error::from)?;
         let bytes = self.store().read(&path, offset).await.map_err(Error::from)?;
-        let respond = |payload| DownloadArtifactResponse { payload: Some(payload) };
-        let first = respond(download_artifact_response::Payload::Artifact(to_proto::artifact(row)));
-        let rest = bytes.into_stream().map(move |chunk| match chunk {
-            Ok(chunk) => Ok(respond(download_artifact_response::Payload::Chunk(chunk.into()))),
-            Err(error) => Err(Error::from(error).into()),
-        });
-        Ok(Response::new(stream::iter([Ok(first)]).chain(rest).boxed()))
+        let sent = download(self, to_proto::artifact(row), bytes);
+        let kept = move |message| {
+            let _ = &permit;
+            message
+        };
+        Ok(Response::new(sent.map(kept).boxed()))
     }
 
     async fn get_download_url(
@@ -107,6 +115,16 @@ impl ArtifactService for Service {
 }
 
 impl Service {
+    /// A permit for one more transfer of a caller. Workers move what jobs that were counted need.
+    fn transfer(&self, caller: &Caller) -> Result<Option<Permit>> {
+        if caller.is_worker() {
+            return Ok(None);
+        }
+        let limit = self.limits().max_transfers;
+        let permit = self.transfer_limit().take(payer(caller), limit);
+        permit.map(Some).ok_or(Error::TooManyTransfers { limit })
+    }
+
     /// An address for an artifact, where the server is to give any and the store has some.
     async fn signed(&self, row: ArtifactRow) -> Result<GetDownloadUrlResponse> {
         let (mut url, mut expire_time) = (None, None);

@@ -1,5 +1,5 @@
-//! Deadlines of callers (`grpc-timeout`): a call that takes longer ends with `DEADLINE_EXCEEDED` and details. tonic has
-//! such a limit too, and answers `CANCELLED`, from which a caller can't tell who ended the call.
+//! Deadlines of callers (`grpc-timeout`): a call that takes longer ends with `DEADLINE_EXCEEDED` and details. Clients have
+//! a clock of their own, and tonic's calls it `CANCELLED` then, from which a caller can't tell who ended the call.
 use std::time::Duration;
 
 use tonic::Status;
@@ -8,7 +8,7 @@ use tonic::codegen::http::{HeaderMap, Request};
 use super::around::{Answer, AroundCall};
 use crate::error::Error;
 
-/// So much before the deadline the answer is given, to be ahead of tonic's.
+/// So much before the deadline the answer is given, to be ahead of the client's.
 const AHEAD: Duration = Duration::from_millis(2);
 
 /// Ends calls at their deadline. An answer that is a stream is the caller's to end once it has begun.

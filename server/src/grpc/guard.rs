@@ -9,12 +9,13 @@ use futures::future::BoxFuture;
 use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::http::{HeaderMap, Request, Response};
-use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
+use tonic::transport::server::TcpConnectInfo;
 use tower::{Layer, Service};
 
 use crate::access::{self, Caller, Need, Scope};
 use crate::error::{Error, Result, chain};
-use crate::ledger::{Ledger, TokenRow};
+use crate::grpc::token_memory::TokenMemory;
+use crate::ledger::{TokenLedger, TokenRow};
 use crate::service::clock;
 use crate::service::rate_limit::{Class, Meter, Payer, payer};
 
@@ -40,8 +41,9 @@ enum Rule {
     OwnWorker([u8; 32]),
     /// Whoever shows a token that the ledger knows; and the server's own worker, by the hash of its token.
     Tokens {
-        ledger: Arc<dyn Ledger>,
+        ledger: Arc<dyn TokenLedger>,
         own_worker: Option<[u8; 32]>,
+        memory: Arc<TokenMemory>,
     },
 }
 
@@ -55,9 +57,13 @@ impl Guard {
     }
 
     /// One that asks for tokens. `own_worker` is the hash of a token that stands in no ledger, good for a worker.
-    pub fn tokens(meter: Arc<Meter>, ledger: Arc<dyn Ledger>, own_worker: Option<[u8; 32]>) -> Self {
+    pub fn tokens(meter: Arc<Meter>, ledger: Arc<dyn TokenLedger>, own_worker: Option<[u8; 32]>) -> Self {
         Self {
-            rule: Rule::Tokens { ledger, own_worker },
+            rule: Rule::Tokens {
+                ledger,
+                own_worker,
+                memory: Arc::default(),
+            },
             meter,
         }
     }
@@ -76,14 +82,7 @@ impl Guard {
         if need == Some(Need::Nothing) {
             return Ok(None);
         }
-        let caller = match self.caller(headers, address).await {
-            Ok(caller) => caller,
-            Err(refusal) => {
-                // Who tries tokens out is slowed down too.
-                self.meter.count(Class::Call, &Payer::at(address))?;
-                return Err(refusal);
-            }
-        };
+        let caller = self.caller(headers, address).await?;
         if let Some(class) = Class::of(path) {
             self.meter.count(class, &payer(&caller))?;
         }
@@ -100,18 +99,42 @@ impl Guard {
     }
 
     async fn caller(&self, headers: &HeaderMap, address: Option<IpAddr>) -> Result<Caller> {
+        // Who tries tokens out is slowed down too.
+        let payer = Payer::at(address);
+        let counted = |refusal| self.meter.count(Class::Call, &payer).err().unwrap_or(refusal);
+        let shown = || token(headers).map(access::hash).map_err(counted);
         match &self.rule {
             Rule::Open => Ok(Caller::anybody(address)),
-            Rule::OwnWorker(own) => match access::hash(token(headers)?) == *own {
+            Rule::OwnWorker(own) => match shown()? == *own {
                 true => Ok(Caller::own_worker()),
-                false => Err(Error::TokenUnknown),
+                false => Err(counted(Error::TokenUnknown)),
             },
-            Rule::Tokens { ledger, own_worker } => {
-                let hash = access::hash(token(headers)?);
+            Rule::Tokens {
+                ledger,
+                own_worker,
+                memory,
+            } => {
+                let hash = shown()?;
                 if *own_worker == Some(hash) {
                     return Ok(Caller::own_worker());
                 }
-                known(ledger, &hash, address).await
+                // Before the ledger has work with it, where it will most likely be refused.
+                let doubted = memory.doubts(&payer, &hash);
+                if doubted {
+                    self.meter.count(Class::Call, &payer)?;
+                }
+                match known(ledger, &hash, address).await {
+                    Ok(caller) => {
+                        memory.found(&hash);
+                        Ok(caller)
+                    }
+                    Err(refusal @ (Error::TokenUnknown | Error::TokenExpired | Error::TokenRevoked)) => {
+                        memory.refuse(&payer, &hash);
+                        Err(if doubted { refusal } else { counted(refusal) })
+                    }
+                    // A ledger that is away says nothing of the token.
+                    Err(error) => Err(error),
+                }
             }
         }
     }
@@ -119,13 +142,7 @@ impl Guard {
 
 /// Where a request comes from.
 fn address<B>(request: &Request<B>) -> Option<IpAddr> {
-    let extensions = request.extensions();
-    let plain = extensions.get::<TcpConnectInfo>();
-    let info = plain.or_else(|| {
-        extensions
-            .get::<TlsConnectInfo<TcpConnectInfo>>()
-            .map(TlsConnectInfo::get_ref)
-    });
+    let info = request.extensions().get::<TcpConnectInfo>();
     info.and_then(TcpConnectInfo::remote_addr).map(|address| address.ip())
 }
 
@@ -142,7 +159,7 @@ fn token(headers: &HeaderMap) -> Result<&str> {
 }
 
 /// Whose token has this hash, if it may still be used.
-async fn known(ledger: &Arc<dyn Ledger>, hash: &[u8; 32], address: Option<IpAddr>) -> Result<Caller> {
+async fn known(ledger: &Arc<dyn TokenLedger>, hash: &[u8; 32], address: Option<IpAddr>) -> Result<Caller> {
     let row = ledger.find_token(hash).await?.ok_or(Error::TokenUnknown)?;
     let now = clock::now();
     if row.revoke_time.is_some() {
@@ -161,7 +178,7 @@ async fn known(ledger: &Arc<dyn Ledger>, hash: &[u8; 32], address: Option<IpAddr
 }
 
 /// Notes that a token is in use, without holding up the call.
-fn note(ledger: &Arc<dyn Ledger>, row: &TokenRow, now: i64) {
+fn note(ledger: &Arc<dyn TokenLedger>, row: &TokenRow, now: i64) {
     if row
         .last_use_time
         .is_some_and(|last| now < last.saturating_add(NOTE_EVERY))
@@ -234,4 +251,121 @@ where
 pub(crate) fn caller<T>(request: &tonic::Request<T>) -> Result<Caller> {
     let caller = request.extensions().get::<Caller>().cloned();
     caller.ok_or_else(|| Error::internal("looking up who calls", "the guard was passed by"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+    use crate::access::Scopes;
+    use crate::ledger::{self, NewToken, TokenId};
+    use crate::service::rate_limit::Rates;
+
+    /// Tokens, and how often one was looked for.
+    #[derive(Default)]
+    struct Tokens {
+        good: Mutex<Vec<[u8; 32]>>,
+        asked: AtomicU32,
+    }
+
+    impl Tokens {
+        fn make(&self, text: &str) {
+            self.good.lock().unwrap().push(access::hash(text));
+        }
+    }
+
+    #[async_trait::async_trait]
+    impl TokenLedger for Tokens {
+        async fn find_token(&self, hash: &[u8; 32]) -> ledger::Result<Option<TokenRow>> {
+            self.asked.fetch_add(1, Ordering::Relaxed);
+            let known = self.good.lock().unwrap().contains(hash);
+            Ok(known.then(|| TokenRow {
+                id: TokenId::nil(),
+                display_name: String::new(),
+                project: "studio".into(),
+                scopes: Scopes::all(),
+                create_time: 0,
+                expire_time: None,
+                last_use_time: None,
+                revoke_time: None,
+            }))
+        }
+
+        async fn create_token(&self, _: NewToken, _: i64) -> ledger::Result<TokenRow> {
+            unreachable!("the guard makes none")
+        }
+
+        async fn get_token(&self, _: TokenId) -> ledger::Result<Option<TokenRow>> {
+            Ok(None)
+        }
+
+        async fn list_tokens(
+            &self,
+            _: Option<&str>,
+            _: Option<(i64, TokenId)>,
+            _: u32,
+        ) -> ledger::Result<Vec<TokenRow>> {
+            Ok(Vec::new())
+        }
+
+        async fn revoke_token(&self, _: TokenId, _: i64) -> ledger::Result<TokenRow> {
+            unreachable!("the guard revokes none")
+        }
+
+        async fn touch_token(&self, _: TokenId, _: i64) -> ledger::Result<()> {
+            Ok(())
+        }
+    }
+
+    const PER_MINUTE: u32 = 10;
+
+    async fn call(guard: &Guard, token: &str, address: &str) -> Result<()> {
+        let mut headers = HeaderMap::new();
+        headers.insert("authorization", format!("Bearer {token}").parse().unwrap());
+        let path = "/guardsplat.v1.JobService/ListJobs";
+        let admitted = guard.admit(path, &headers, Some(address.parse().unwrap())).await;
+        admitted.map(|_| ())
+    }
+
+    #[tokio::test]
+    async fn who_tries_tokens_out_does_not_reach_the_ledger_for_long() {
+        let rates = Rates {
+            calls: PER_MINUTE,
+            ..Rates::default()
+        };
+        let ledger = Arc::new(Tokens::default());
+        ledger.make("ours");
+        let guard = Guard::tokens(Arc::new(Meter::new(rates)), ledger.clone(), None);
+        let (here, there) = ("192.0.2.1", "192.0.2.2");
+        call(&guard, "ours", here).await.unwrap();
+        for i in 0..100 {
+            let refused = call(&guard, &format!("guess {i}"), here).await.unwrap_err();
+            match i < PER_MINUTE {
+                true => assert!(matches!(refused, Error::TokenUnknown), "{i}: {refused}"),
+                false => assert!(matches!(refused, Error::TooManyCalls { .. }), "{i}: {refused}"),
+            }
+        }
+        let asked = ledger.asked.load(Ordering::Relaxed);
+        assert!(asked <= 1 + PER_MINUTE + 1, "the ledger was asked {asked} times");
+        // Whoever has a good one is not held up by who calls from beside them, nor is anybody elsewhere.
+        call(&guard, "ours", here).await.unwrap();
+        ledger.make("new");
+        call(&guard, "new", there).await.unwrap();
+        // And from here on it is known here too.
+        call(&guard, "new", here).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_new_token_works_at_once_where_others_were_refused() {
+        let ledger = Arc::new(Tokens::default());
+        let guard = Guard::tokens(Arc::new(Meter::new(Rates::default())), ledger.clone(), None);
+        let here = "192.0.2.1";
+        for _ in 0..3 {
+            call(&guard, "soon", here).await.unwrap_err();
+        }
+        ledger.make("soon");
+        call(&guard, "soon", here).await.unwrap();
+    }
 }

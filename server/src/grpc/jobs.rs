@@ -52,7 +52,9 @@ impl JobService for Service {
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
         let caller = caller(&request)?;
-        let permit = self.watch_limit().take(payer(&caller), self.limits().max_watches)?;
+        let limit = self.limits().max_watches;
+        let permit = self.watch_limit().take(payer(&caller), limit);
+        let permit = permit.ok_or(Error::TooManyWatches { limit })?;
         let WatchJobRequest { name, cursor } = request.into_inner();
         let watching = watch::watch(self.clone(), &caller, &name, &cursor).await?;
         let kept = move |message| {

@@ -1,60 +1,119 @@
-//! The listener: the transport's settings, and calls until somebody says stop.
+//! The listener: takes connections, and calls that come by them, until somebody says stop.
+use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::net::TcpListener;
+use rustls::ServerConfig;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tokio::time::{Instant, sleep};
 use tonic::service::Routes;
-use tonic::transport::server::TcpIncoming;
-use tonic::transport::{Server, ServerTlsConfig};
+use tower::Layer;
+use tower::limit::ConcurrencyLimit;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::grpc::around::Around;
+use crate::grpc::connection::{self, CALLS_AT_ONCE, Manner};
+pub use crate::grpc::connections::ConnectionLimits;
+use crate::grpc::connections::Connections;
 use crate::grpc::deadline::Deadlines;
 use crate::grpc::guard::Guard;
 use crate::grpc::metrics_layer::MetricsLayer;
 use crate::grpc::transport_errors::ErrorDetailsLayer;
 
-/// A connection that says nothing is asked whether it lives so often; a watcher that is gone is noticed by this.
-const KEEPALIVE: Duration = Duration::from_secs(30);
-const KEEPALIVE_ANSWER: Duration = Duration::from_secs(10);
-
-/// Calls of one connection at a time; more wait. Long answers, such as `WatchJob`'s, count until they end.
-const CALLS_AT_ONCE: u32 = 256;
+/// TLS and the preface of HTTP/2 may take so long, unless something else is asked for.
+pub const HANDSHAKE: Duration = Duration::from_secs(10);
+/// After an error of the listener, such as too many open files, which stays as it is if it is asked again at once.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Such errors are told so often at most.
+const TELL_EVERY: Duration = Duration::from_secs(10);
 
 /// Who is let in, and how.
 pub struct ListenerOptions {
     /// Who.
     pub guard: Guard,
     /// TLS, if that is spoken; then nothing else is.
-    pub tls: Option<ServerTlsConfig>,
+    pub tls: Option<Arc<ServerConfig>>,
+    /// How many connections there may be.
+    pub connections: ConnectionLimits,
+    /// How long TLS and the preface of HTTP/2 may take.
+    pub handshake: Duration,
+    /// How long a connection may be open without a call, where that is limited.
+    pub idle: Option<Duration>,
     /// What counts calls.
     pub measured: MetricsLayer,
 }
 
-/// Answers calls that come through `door` until `shutdown`, then finishes those that have begun.
+/// Answers calls that come through `door` until `shutdown`, then finishes those that have begun. When it is dropped
+/// before, all connections are cut off.
 pub async fn serve(
     routes: Routes,
     door: ListenerOptions,
     listener: TcpListener,
     shutdown: impl Future<Output = ()>,
 ) -> Result<()> {
-    // Set here because tonic's own setting is for listeners that it makes itself.
-    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-    let failed = |error| Error::internal("the listener", error);
-    let mut server = Server::builder();
-    if let Some(tls) = door.tls {
-        server = server.tls_config(tls).map_err(failed)?;
+    let connections = Connections::new(door.connections, door.measured.metrics.clone());
+    let service = door.guard.layer(routes.prepare());
+    let service = Around(ErrorDetailsLayer).layer(Around(Deadlines).layer(service));
+    let service = door.measured.layer(service);
+    let manner = Manner {
+        tls: door.tls,
+        handshake: door.handshake,
+        idle: door.idle,
+    };
+    let (stop, stopping) = watch::channel(());
+    let mut held = JoinSet::new();
+    let mut shutdown = std::pin::pin!(shutdown);
+    let mut told: Option<Instant> = None;
+    loop {
+        let stream = tokio::select! {
+            () = &mut shutdown => break,
+            Some(_) = held.join_next() => continue,
+            stream = accepted(&listener) => stream,
+        };
+        match stream {
+            Ok((stream, address)) => {
+                // Whoever finds no place is told so by the end of the connection.
+                if let Some(place) = connections.take(address) {
+                    let service = ConcurrencyLimit::new(service.clone(), CALLS_AT_ONCE as usize);
+                    held.spawn(connection::hold(
+                        stream,
+                        place,
+                        manner.clone(),
+                        service,
+                        stopping.clone(),
+                    ));
+                }
+            }
+            Err(error) => {
+                if told.is_none_or(|at| at.elapsed() >= TELL_EVERY) {
+                    told = Some(Instant::now());
+                    tracing::warn!(%error, "connections can't be taken");
+                }
+                sleep(PAUSE).await;
+            }
+        }
     }
-    server
-        .max_concurrent_streams(CALLS_AT_ONCE)
-        .concurrency_limit_per_connection(CALLS_AT_ONCE as usize)
-        .http2_keepalive_interval(Some(KEEPALIVE))
-        .http2_keepalive_timeout(Some(KEEPALIVE_ANSWER))
-        .layer(door.measured)
-        .layer(Around(ErrorDetailsLayer))
-        .layer(Around(Deadlines))
-        .layer(door.guard)
-        .add_routes(routes)
-        .serve_with_incoming_shutdown(incoming, shutdown)
-        .await
-        .map_err(failed)
+    // Nobody is to connect and then wait for nothing.
+    drop(listener);
+    let _ = stop.send(());
+    while held.join_next().await.is_some() {}
+    Ok(())
+}
+
+/// The next connection, and where it comes from.
+async fn accepted(listener: &TcpListener) -> io::Result<(TcpStream, std::net::IpAddr)> {
+    loop {
+        match listener.accept().await {
+            Ok((stream, address)) => {
+                // Messages are small, and waited for.
+                stream.set_nodelay(true)?;
+                return Ok((stream, address.ip()));
+            }
+            // That one is gone again.
+            Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
+            Err(error) => return Err(error),
+        }
+    }
 }

@@ -9,12 +9,16 @@ use guardsplat_proto::v1::worker_service_server::WorkerServiceServer;
 use tonic::Status;
 use tonic::service::Routes;
 
+use crate::artifacts::CHUNK_BYTES;
 use crate::error::{Error, Result};
 use crate::service::Service;
 
 mod around;
 mod artifacts;
+mod connection;
+mod connections;
 mod deadline;
+mod download;
 #[doc(hidden)]
 pub mod fuzz_api;
 pub mod guard;
@@ -24,11 +28,13 @@ mod keys;
 pub mod listener;
 pub mod metrics_layer;
 mod outputs;
+mod prefaced;
 mod registry;
 mod slow_consumer;
 mod status;
 #[cfg(test)]
 mod tests;
+mod token_memory;
 mod tokens;
 mod transport_errors;
 mod upload_stream;
@@ -37,6 +43,9 @@ mod worker;
 
 /// Largest message that is read, as tonic has it by default: large things never travel in one message.
 const MAX_MESSAGE: usize = 4 << 20;
+/// The same for messages of uploads: a chunk and what is around it. Of a message that has not arrived whole, the part that
+/// has is in memory.
+const MAX_UPLOAD_MESSAGE: usize = CHUNK_BYTES + (64 << 10);
 
 impl Service {
     /// The seven services and reflection. Health, which knows more than the API, is added by the caller.
@@ -50,7 +59,7 @@ impl Service {
         let failed = |error| Error::internal("setting up reflection", error);
         Ok(
             Routes::new(JobServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
-                .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
+                .add_service(ArtifactServiceServer::new(self.clone()).max_decoding_message_size(MAX_UPLOAD_MESSAGE))
                 .add_service(KeyServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(RegistryServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))
                 .add_service(TokenServiceServer::new(self.clone()).max_decoding_message_size(MAX_MESSAGE))

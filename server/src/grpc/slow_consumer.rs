@@ -1,6 +1,5 @@
 //! Answers that are streams, for readers that may be slow but not stand still.
 use std::future::ready;
-use std::pin::pin;
 use std::time::Duration;
 
 use futures::stream::{self, BoxStream, Stream, StreamExt};
@@ -10,6 +9,34 @@ use tonic::Status;
 use tracing::Instrument as _;
 
 use crate::error::Error;
+
+/// A reader that has taken nothing for so long gets nothing kept ready.
+const REST: Duration = Duration::from_secs(1);
+
+/// What a reader is told, one thing after the other.
+pub trait Source: Send + 'static {
+    /// A thing to be told.
+    type Item: Send + 'static;
+
+    /// What is to be told next; none at the end.
+    fn next(&mut self) -> impl Future<Output = Option<Self::Item>> + Send;
+
+    /// Lets go of what it keeps ready, as nothing is taken now.
+    fn rest(&mut self);
+}
+
+/// A stream that keeps nothing ready.
+struct Ready<S>(BoxStream<'static, S>);
+
+impl<T: Send + 'static> Source for Ready<T> {
+    type Item = T;
+
+    fn next(&mut self) -> impl Future<Output = Option<T>> + Send {
+        self.0.next()
+    }
+
+    fn rest(&mut self) {}
+}
 
 /// How the source of a stream ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +54,15 @@ enum End {
 /// asks the source, and has room for one message.
 pub fn patient<T: Send + 'static>(
     source: impl Stream<Item = Result<T, Status>> + Send + 'static,
+    stall: Duration,
+    shed: impl FnOnce() -> Status + Send + 'static,
+) -> BoxStream<'static, Result<T, Status>> {
+    patient_source(Ready(source.boxed()), stall, shed)
+}
+
+/// The same for a source that keeps something ready: a reader that has taken nothing for a second has it let go of that.
+pub fn patient_source<T: Send + 'static>(
+    source: impl Source<Item = Result<T, Status>>,
     stall: Duration,
     shed: impl FnOnce() -> Status + Send + 'static,
 ) -> BoxStream<'static, Result<T, Status>> {
@@ -48,12 +84,17 @@ pub fn patient<T: Send + 'static>(
     told.chain(end).boxed()
 }
 
-async fn tell<T>(source: impl Stream<Item = T>, give: mpsc::Sender<T>, stall: Duration) -> End {
-    let mut source = pin!(source);
+async fn tell<S: Source>(mut source: S, give: mpsc::Sender<S::Item>, stall: Duration) -> End {
+    let rest = REST.min(stall);
     loop {
         // There is room when what was told before has been taken. Only then the source is asked, so that what is told is
         // as things stand, and one who is behind costs nothing.
-        let room = match timeout(stall, give.reserve()).await {
+        let mut room = timeout(rest, give.reserve()).await;
+        if room.is_err() {
+            source.rest();
+            room = timeout(stall - rest, give.reserve()).await;
+        }
+        let room = match room {
             Ok(Ok(room)) => room,
             Ok(Err(_)) => return End::Told,
             Err(_) => return End::Shed,
@@ -129,6 +170,34 @@ mod tests {
         assert_eq!(stream.next().await.unwrap().unwrap(), 0);
         drop(stream);
         gone.await.unwrap_err();
+    }
+
+    /// Tells how often it rested.
+    struct Rested(u32);
+
+    impl Source for Rested {
+        type Item = Result<u32, Status>;
+
+        async fn next(&mut self) -> Option<Self::Item> {
+            Some(Ok(self.0))
+        }
+
+        fn rest(&mut self) {
+            self.0 += 1;
+        }
+    }
+
+    #[tokio::test]
+    async fn a_source_rests_when_nothing_is_taken() {
+        let mut stream = patient_source(Rested(0), LONG, shed);
+        for _ in 0..10 {
+            sleep(REST / 8).await;
+            assert_eq!(stream.next().await.unwrap().unwrap(), 0);
+        }
+        sleep(2 * REST).await;
+        // What was told before, and what is told after.
+        let told = [stream.next().await, stream.next().await].map(|told| told.unwrap().unwrap());
+        assert_eq!(told, [0, 1]);
     }
 
     #[tokio::test]

@@ -50,13 +50,15 @@ fn kind(error: &Error) -> (Code, &'static str) {
         Error::QueueFull { .. } => (Code::ResourceExhausted, "QUEUE_FULL"),
         Error::TooManyCalls { .. } => (Code::ResourceExhausted, "TOO_MANY_CALLS"),
         Error::TooManyWatches { .. } => (Code::ResourceExhausted, "TOO_MANY_WATCHES"),
+        Error::TooManyTransfers { .. } => (Code::ResourceExhausted, "TOO_MANY_TRANSFERS"),
         Error::QuotaUsedUp { .. } => (Code::ResourceExhausted, "QUOTA_USED_UP"),
         Error::NoSpace => (Code::ResourceExhausted, "NO_SPACE"),
         Error::UploadStalled(_) => (Code::Aborted, "UPLOAD_STALLED"),
         Error::UploadTooSlow(_) => (Code::Aborted, "UPLOAD_TOO_SLOW"),
         Error::DeadlineExceeded => (Code::DeadlineExceeded, "DEADLINE_EXCEEDED"),
-        // As where a connection is lost: a client that resumes a watch then, resumes it now.
+        // As where a connection is lost: a client that resumes a watch or a download then, resumes it now.
         Error::WatchStalled(_) => (Code::Unavailable, "WATCH_STALLED"),
+        Error::DownloadStalled(_) => (Code::Unavailable, "DOWNLOAD_STALLED"),
         Error::Stopping => (Code::Unavailable, "STOPPING"),
         Error::Unavailable { .. } => (Code::Unavailable, "UNAVAILABLE"),
         Error::Internal { .. } | Error::Startup(_) => (Code::Internal, "INTERNAL"),
@@ -83,7 +85,7 @@ fn metadata(error: &Error) -> HashMap<String, String> {
         Error::ScopeMissing { needed } => vec![("scopes", needed.join(","))],
         Error::ScopeNeeded { needed, .. } => vec![("scopes", (*needed).to_owned())],
         Error::QueueFull { limit, .. } => vec![("limit", limit.to_string())],
-        Error::TooManyWatches { limit } => vec![("limit", limit.to_string())],
+        Error::TooManyWatches { limit } | Error::TooManyTransfers { limit } => vec![("limit", limit.to_string())],
         Error::SceneDoesNotFit {
             name,
             gaussians,
@@ -147,7 +149,10 @@ fn add_details(details: &mut ErrorDetails, error: &Error) {
         Error::TooManyWatches { .. } => {
             details.set_quota_failure(vec![QuotaViolation::new("watches", error.to_string())]);
         }
-        Error::Stopping | Error::WatchStalled(_) | Error::Unavailable { .. } => {
+        Error::TooManyTransfers { .. } => {
+            details.set_quota_failure(vec![QuotaViolation::new("transfers", error.to_string())]);
+        }
+        Error::Stopping | Error::WatchStalled(_) | Error::DownloadStalled(_) | Error::Unavailable { .. } => {
             details.set_retry_info(Some(SOON));
         }
         _ => {}

@@ -31,6 +31,7 @@ pub mod postgres;
 pub mod queue;
 mod registry;
 mod remote_changes;
+mod reservations;
 pub mod retention;
 pub mod retry;
 pub mod sqlite;
@@ -62,6 +63,7 @@ pub use registry::{
     OwnerRow, Registry,
 };
 pub use remote_changes::RemoteChange;
+pub use reservations::{UploadReservation, UploadReservations};
 pub use retention::{Before, Expired, Retention};
 pub use sqlite::SqliteLedger;
 pub use statistics::{Running, Statistics, Tally, Usage, Waiting};
@@ -90,6 +92,7 @@ pub trait Ledger:
     + Retention
     + Statistics
     + TokenLedger
+    + UploadReservations
     + WorkerPresence
 {
     /// Whether the ledger can be read and written.

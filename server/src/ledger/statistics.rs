@@ -42,6 +42,15 @@ pub struct Usage {
     pub queued_jobs: u64,
     /// Bytes of its artifacts that are all there, published or not, secret ones too.
     pub artifact_bytes: u64,
+    /// Bytes of uploads that are begun and go to the store by themselves.
+    pub reserved_bytes: u64,
+}
+
+impl Usage {
+    /// All bytes that count.
+    pub fn bytes(&self) -> u64 {
+        self.artifact_bytes.saturating_add(self.reserved_bytes)
+    }
 }
 
 /// Numbers for operators, and for limits on what a project takes.

@@ -132,6 +132,26 @@ impl Metrics {
         self.watches_shed.inc();
     }
 
+    /// A download was let go, because its reader took nothing.
+    pub fn download_shed(&self) {
+        self.downloads_shed.inc();
+    }
+
+    /// A connection was taken.
+    pub fn connected(&self) {
+        self.connections.inc();
+    }
+
+    /// A connection is gone.
+    pub fn disconnected(&self) {
+        self.connections.dec();
+    }
+
+    /// A connection was refused, or closed for another, because there were too many.
+    pub fn turned_away(&self) {
+        self.connections_turned_away.inc();
+    }
+
     /// Whether a part is well.
     pub fn ready(&self, part: &'static str, well: bool) {
         self.ready.get_or_create(&Part { part }).set(well.into());

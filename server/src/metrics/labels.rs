@@ -29,7 +29,7 @@ pub const REASONS: [Reason; 5] = [
 /// What workers compute on: all that there is, and what is none of it.
 pub const DEVICES: [&str; 3] = ["cpu", "wgpu", OTHER];
 /// Why calls are refused that others than the caller may want to know of: reasons of errors.
-pub const REFUSALS: [&str; 10] = [
+pub const REFUSALS: [&str; 11] = [
     "TOKEN_MISSING",
     "TOKEN_UNKNOWN",
     "TOKEN_EXPIRED",
@@ -37,6 +37,7 @@ pub const REFUSALS: [&str; 10] = [
     "SCOPE_MISSING",
     "TOO_MANY_CALLS",
     "TOO_MANY_WATCHES",
+    "TOO_MANY_TRANSFERS",
     "QUOTA_USED_UP",
     "QUEUE_FULL",
     "NO_SPACE",

@@ -93,6 +93,9 @@ pub struct Metrics {
     refused: Counts<Refused>,
     watches: Gauge,
     watches_shed: Counter,
+    downloads_shed: Counter,
+    connections: Gauge,
+    connections_turned_away: Counter,
     ready: Gauges<Part>,
 }
 
@@ -222,6 +225,24 @@ impl Default for Metrics {
                 r,
                 "watches_shed",
                 "Watches that were let go because their readers took nothing",
+                Counter::default(),
+            ),
+            downloads_shed: add(
+                r,
+                "downloads_shed",
+                "Downloads that were let go because their readers took nothing",
+                Counter::default(),
+            ),
+            connections: add(
+                r,
+                "connections",
+                "Connections of callers that are open",
+                Gauge::default(),
+            ),
+            connections_turned_away: add(
+                r,
+                "connections_turned_away",
+                "Connections that were refused, or closed for another, because there were too many",
                 Counter::default(),
             ),
             ready: add(

@@ -1,7 +1,7 @@
 //! Which store the settings name: a folder in the data folder, or one that several servers may share.
 use std::path::Path;
 
-use crate::artifacts::{ArtifactStore, StoreResult};
+use crate::artifacts::{ArtifactStore, StoreResult, TransferMemory};
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
 use crate::notary::Notary;
@@ -29,7 +29,8 @@ fn named(settings: &Settings, folder: &Path) -> Result<ArtifactStore> {
             most,
         ),
     };
-    opened.map_err(startup)
+    let memory = TransferMemory::new(settings.transfer_memory());
+    Ok(opened.map_err(startup)?.within(memory, folder))
 }
 
 /// Sees that the store is this ledger's, which is known by the key that only it has, and that the ledger is no copy of

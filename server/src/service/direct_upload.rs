@@ -1,9 +1,12 @@
 //! `StartUpload` and `FinishUpload`: uploads whose bytes go to the store without the server.
 //!
-//! Nothing is kept of one before it is finished: all that is known of it is sealed in its name. The bytes lie where the
+//! All that is known of one before it is finished is sealed in its name. Where a project may have so many bytes only, those
+//! that were announced are reserved until there is an artifact, or nothing more can come of it. The bytes lie where the
 //! client may write for as long as the address is good, so they are copied to where it may not, and the copy is checked.
 //! Only then there is a row, so a row that is there is of bytes that are right, whoever made it: a call that comes twice,
 //! even at once, gives one artifact.
+use std::time::Duration;
+
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use guardsplat_proto::v1::{HttpHeader, StartUploadResponse, UploadMetadata};
@@ -13,11 +16,13 @@ use uuid::Uuid;
 
 use crate::artifacts::{Announced, ArtifactPath, Check, StoreError};
 use crate::error::{Error, Result, chain};
-use crate::ledger::{ArtifactRow, NewArtifact, Origin};
+use crate::ledger::{ArtifactRow, NewArtifact, Origin, UploadReservation};
 use crate::service::{Service, clock, upload};
 
 /// What names of uploads begin with.
 const COLLECTION: &str = "uploads/";
+/// What was finished in time has been copied so long after.
+const LAST_COPY: Duration = Duration::from_secs(10 * 60);
 /// Longest name that is looked at. Names hold an id, a time, and what was announced.
 const MAX_NAME_BYTES: usize = 1024;
 
@@ -53,6 +58,14 @@ impl Service {
         let Some(address) = address else {
             return Ok(StartUploadResponse::default());
         };
+        self.reserve_bytes(UploadReservation {
+            id,
+            project: project.to_owned(),
+            size: metadata.size_bytes,
+            address_end: now.saturating_add(clock::micros(lifetime)),
+            end_time: now.saturating_add(clock::micros(self.limits().abandoned_after + LAST_COPY)),
+        })
+        .await?;
         let headers = address.headers.iter().map(|&(name, value)| HttpHeader {
             name: name.to_owned(),
             value: value.to_owned(),
@@ -89,6 +102,8 @@ impl Service {
                 // What is worth another try stays for it.
                 if matches!(error, Error::Invalid(_) | Error::QuotaUsedUp { .. }) {
                     self.remove_staged(id).await;
+                    // It may be sent once more while the address is good.
+                    self.ledger().end_with_address(id).await?;
                 }
                 Err(error)
             }
@@ -106,7 +121,9 @@ impl Service {
 
     async fn take(&self, project: &str, id: Uuid, metadata: UploadMetadata) -> Result<ArtifactRow> {
         let announced = upload::announced("upload", &metadata)?;
-        self.room_for_bytes(project, announced.size).await?;
+        if !self.ledger().is_reserved(id).await? {
+            self.room_for_bytes(project, announced.size).await?;
+        }
         let path = ArtifactPath::taken(Uuid::now_v7(), id);
         let taken = self
             .store()

@@ -73,6 +73,10 @@ pub struct Limits {
     pub watch_stall: Duration,
     /// Watches that a caller may have open; 0 for no limit.
     pub max_watches: u32,
+    /// A download whose reader takes nothing for so long is let go.
+    pub download_stall: Duration,
+    /// Uploads and downloads that a caller may have at once; 0 for no limit.
+    pub max_transfers: u32,
     /// How often a scene without the mark may be said to match by chance, above 0 and below 1.
     pub false_positive_rate: f64,
     /// Whether everybody who verifies may do so without a claim on an asset, and be told every bit; else admins may.
@@ -109,6 +113,8 @@ impl Default for Limits {
             upload_idle: Duration::from_secs(60),
             watch_stall: Duration::from_secs(60),
             max_watches: 1_000,
+            download_stall: Duration::from_secs(60),
+            max_transfers: 64,
             false_positive_rate: guardsplat_codeword::DEFAULT_FALSE_POSITIVE_RATE,
             raw_verification: false,
             max_queued_of_project: None,
@@ -146,7 +152,8 @@ struct Shared {
     reports: progress::ProgressThrottle,
     placement: placement::Placement,
     positions: queue_positions::QueuePositions,
-    places: Arc<concurrency_limit::ConcurrencyLimit>,
+    watches: Arc<concurrency_limit::ConcurrencyLimit>,
+    transfers: Arc<concurrency_limit::ConcurrencyLimit>,
 }
 
 impl Service {
@@ -175,7 +182,8 @@ impl Service {
             reports: progress::ProgressThrottle::default(),
             placement: placement::Placement::default(),
             positions: queue_positions::QueuePositions::default(),
-            places: Arc::default(),
+            watches: Arc::default(),
+            transfers: Arc::default(),
         };
         Self {
             shared: Arc::new(shared),
@@ -257,7 +265,11 @@ impl Service {
     }
 
     pub(crate) fn watch_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
-        &self.shared.places
+        &self.shared.watches
+    }
+
+    pub(crate) fn transfer_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
+        &self.shared.transfers
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a project may take: queued jobs, and bytes of artifacts. What arrives at the same moment may go over by itself.
 use crate::error::{Error, Result};
-use crate::ledger::JobKind;
+use crate::ledger::{JobKind, UploadReservation};
 use crate::service::Service;
 
 impl Service {
@@ -34,11 +34,23 @@ impl Service {
         let Some(limit) = self.limits().max_bytes_of_project else {
             return Ok(());
         };
-        let used = self.ledger().usage(project).await?.artifact_bytes;
+        let used = self.ledger().usage(project).await?.bytes();
         if used.saturating_add(bytes) > limit {
             return Err(used_up("bytes of artifacts", project, limit));
         }
         Ok(())
+    }
+
+    /// Reserves bytes for an upload that goes to the store by itself, where there is a limit.
+    pub(crate) async fn reserve_bytes(&self, new: UploadReservation) -> Result<()> {
+        let Some(limit) = self.limits().max_bytes_of_project else {
+            return Ok(());
+        };
+        let project = new.project.clone();
+        match self.ledger().reserve_upload(new, limit).await? {
+            true => Ok(()),
+            false => Err(used_up("bytes of artifacts", &project, limit)),
+        }
     }
 }
 

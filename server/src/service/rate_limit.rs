@@ -57,8 +57,8 @@ impl Class {
             (service, _) if service.starts_with("grpc.health.") => None,
             (
                 _,
-                "CreateJob" | "UploadArtifact" | "FinishUpload" | "CreateOwner" | "CreateAsset" | "CreateToken"
-                | "CreateHook" | "RedeliverDelivery",
+                "CreateJob" | "UploadArtifact" | "StartUpload" | "FinishUpload" | "CreateOwner" | "CreateAsset"
+                | "CreateToken" | "CreateHook" | "RedeliverDelivery",
             ) => Some(Self::Submission),
             _ => Some(Self::Call),
         }

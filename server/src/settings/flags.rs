@@ -117,6 +117,24 @@ pub struct Flags {
     /// Most watches of one caller at once; 0 is no limit [default: 1000]
     #[arg(long, value_name = "WATCHES")]
     pub max_watches_per_caller: Option<u32>,
+    /// Seconds that a download may go unread before it is let go [default: 60]
+    #[arg(long, value_name = "SECONDS")]
+    pub download_stall_seconds: Option<u64>,
+    /// Most uploads and downloads of one caller at once; 0 is no limit [default: 64]
+    #[arg(long, value_name = "TRANSFERS")]
+    pub max_transfers_per_caller: Option<u32>,
+    /// Mebibytes of memory that bytes on their way may take, of all uploads and downloads [default: 128]
+    #[arg(long, value_name = "MEBIBYTES")]
+    pub transfer_memory_mebibytes: Option<u64>,
+    /// Most connections at once; fewer where the process may not open twice as many files [default: 4096]
+    #[arg(long, value_name = "CONNECTIONS")]
+    pub max_connections: Option<u32>,
+    /// Most connections of one address at once, and at most half of all [default: 1024]
+    #[arg(long, value_name = "CONNECTIONS")]
+    pub max_connections_per_address: Option<u32>,
+    /// Seconds that a connection may be open without a call; 0 for ever [default: 300]
+    #[arg(long, value_name = "SECONDS")]
+    pub connection_idle_seconds: Option<u64>,
     /// Seconds after which bytes that nobody published are removed [default: 86400]
     #[arg(long, value_name = "SECONDS")]
     pub abandoned_after_seconds: Option<u64>,
@@ -201,6 +219,12 @@ impl Flags {
             upload_timeout_seconds,
             watch_stall_seconds,
             max_watches_per_caller,
+            download_stall_seconds,
+            max_transfers_per_caller,
+            transfer_memory_mebibytes,
+            max_connections,
+            max_connections_per_address,
+            connection_idle_seconds,
             abandoned_after_seconds,
             hook_allow_http,
             hook_allow_private,
@@ -249,6 +273,12 @@ impl Flags {
         set(&mut settings.upload_timeout_seconds, upload_timeout_seconds);
         set(&mut settings.watch_stall_seconds, watch_stall_seconds);
         set(&mut settings.max_watches_per_caller, max_watches_per_caller);
+        set(&mut settings.download_stall_seconds, download_stall_seconds);
+        set(&mut settings.max_transfers_per_caller, max_transfers_per_caller);
+        set(&mut settings.transfer_memory_mebibytes, transfer_memory_mebibytes);
+        set(&mut settings.max_connections, max_connections);
+        set(&mut settings.max_connections_per_address, max_connections_per_address);
+        set(&mut settings.connection_idle_seconds, connection_idle_seconds);
         set(&mut settings.abandoned_after_seconds, abandoned_after_seconds);
         set(&mut settings.hook_allow_http, hook_allow_http);
         set(&mut settings.hook_allow_private, hook_allow_private);

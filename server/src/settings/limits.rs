@@ -51,6 +51,22 @@ impl Settings {
                 0,
                 1_000_000,
             ),
+            ("download_stall_seconds", self.download_stall_seconds, 1, DAY),
+            (
+                "max_transfers_per_caller",
+                self.max_transfers_per_caller.into(),
+                0,
+                1_000_000,
+            ),
+            ("transfer_memory_mebibytes", self.transfer_memory_mebibytes, 16, 1 << 20),
+            ("max_connections", self.max_connections.into(), 16, 1_000_000),
+            (
+                "max_connections_per_address",
+                self.max_connections_per_address.into(),
+                1,
+                1_000_000,
+            ),
+            ("connection_idle_seconds", self.connection_idle_seconds, 0, DAY),
             ("abandoned_after_seconds", self.abandoned_after_seconds, 1, 365 * DAY),
             ("hook_give_up_seconds", self.hook_give_up_seconds, 1, 365 * DAY),
             // A week is the longest that S3 signs for.

@@ -80,6 +80,18 @@ pub struct Settings {
     pub watch_stall_seconds: u64,
     /// Most watches of one caller at once; 0 for no limit.
     pub max_watches_per_caller: u32,
+    /// Seconds that a download may go unread.
+    pub download_stall_seconds: u64,
+    /// Most uploads and downloads of one caller at once; 0 for no limit.
+    pub max_transfers_per_caller: u32,
+    /// Mebibytes of memory that bytes on their way may take, of all uploads and downloads together.
+    pub transfer_memory_mebibytes: u64,
+    /// Most connections at once, and fewer where the process may not open twice as many files.
+    pub max_connections: u32,
+    /// Most connections of one address at once, and at most half of all.
+    pub max_connections_per_address: u32,
+    /// Seconds that a connection may be open without a call; 0 for ever.
+    pub connection_idle_seconds: u64,
     /// Seconds after which bytes that nobody published are removed.
     pub abandoned_after_seconds: u64,
     /// Whether hooks may be called without TLS.
@@ -191,6 +203,12 @@ impl Default for Settings {
             upload_timeout_seconds: 60,
             watch_stall_seconds: 60,
             max_watches_per_caller: 1_000,
+            download_stall_seconds: 60,
+            max_transfers_per_caller: 64,
+            transfer_memory_mebibytes: 128,
+            max_connections: 4_096,
+            max_connections_per_address: 1_024,
+            connection_idle_seconds: 300,
             abandoned_after_seconds: 24 * 60 * 60,
             hook_allow_http: false,
             hook_allow_private: false,
@@ -240,6 +258,21 @@ impl Settings {
     /// How long a watch may go unread.
     pub fn watch_stall(&self) -> Duration {
         Duration::from_secs(self.watch_stall_seconds)
+    }
+
+    /// How long a download may go unread.
+    pub fn download_stall(&self) -> Duration {
+        Duration::from_secs(self.download_stall_seconds)
+    }
+
+    /// Bytes of memory for bytes on their way.
+    pub fn transfer_memory(&self) -> u64 {
+        self.transfer_memory_mebibytes << 20
+    }
+
+    /// How long a connection may be open without a call, where that is limited.
+    pub fn connection_idle(&self) -> Option<Duration> {
+        Some(Duration::from_secs(self.connection_idle_seconds)).filter(|time| !time.is_zero())
     }
 
     /// When bytes that nobody published are removed.

@@ -107,6 +107,9 @@ async fn delete(api: &Service) {
         if let Err(error) = api.collect(api.opened()).await {
             tracing::error!(error = %chain(&error), "abandoned artifacts could not be deleted");
         }
+        if let Err(error) = api.end_reservations().await {
+            tracing::error!(error = %chain(&error), "bytes of uploads that were not finished could not be given back");
+        }
         if searched.elapsed() >= orphans_every {
             searched = Instant::now();
             if let Err(error) = api.collect_orphans().await {
@@ -199,6 +202,16 @@ impl Service {
                     self.ledger().put_off_artifact(artifact.id, clock::now()).await?;
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Gives back what was reserved for uploads of which nothing more can come, and deletes what was sent.
+    pub(crate) async fn end_reservations(&self) -> Result<()> {
+        let ended = self.ledger().ended_reservations(clock::now(), COLLECT_AT_ONCE);
+        for id in ended.await? {
+            self.store().delete(&ArtifactPath::staged(id)).await?;
+            self.ledger().release_upload(id).await?;
         }
         Ok(())
     }

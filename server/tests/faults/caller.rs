@@ -1,4 +1,5 @@
 //! What clients and workers say to the server.
+use std::net::IpAddr;
 use std::time::Duration;
 
 use guardsplat_proto::v1::artifact_service_client::ArtifactServiceClient;
@@ -13,7 +14,7 @@ use guardsplat_proto::v1::{
 };
 use sha2::{Digest, Sha256};
 use tokio::time::{Instant, sleep};
-use tonic::transport::Channel;
+use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 
 use crate::support::SOON;
@@ -58,7 +59,16 @@ impl Caller {
     /// One who is sent so many bytes of a stream ahead of what was read, if not as many as usual.
     pub fn with_window(url: &str, window: Option<u32>) -> Self {
         let endpoint = Channel::from_shared(url.to_owned()).unwrap();
-        let endpoint = endpoint.initial_stream_window_size(window);
+        Self::by(endpoint.initial_stream_window_size(window))
+    }
+
+    /// The same, who calls from another address.
+    pub fn at(url: &str, from: IpAddr, window: u32) -> Self {
+        let endpoint = Channel::from_shared(url.to_owned()).unwrap();
+        Self::by(endpoint.local_address(Some(from)).initial_stream_window_size(window))
+    }
+
+    fn by(endpoint: Endpoint) -> Self {
         let channel = endpoint.connect_timeout(Duration::from_secs(5)).connect_lazy();
         Self {
             jobs: JobServiceClient::new(channel.clone()),

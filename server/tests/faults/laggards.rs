@@ -18,7 +18,7 @@ use crate::stub::Stub;
 use crate::support::SOON;
 
 /// What healthy clients wait for, calling one after the other for so long.
-async fn healthy(place: &Place, inputs: &Arc<Inputs>, long: Duration) -> Quantiles {
+pub async fn healthy(place: &Place, inputs: &Arc<Inputs>, long: Duration) -> Quantiles {
     let clients: Vec<_> = (0..4)
         .map(|_| {
             let (caller, inputs) = (place.caller(), inputs.clone());
@@ -105,6 +105,8 @@ pub async fn do_not_hold_up_others(place: Place) {
         patience,
         "--watch-stall-seconds",
         patience,
+        "--max-transfers-per-caller",
+        "0",
         "--metrics-listen",
         &metrics,
     ];

@@ -7,6 +7,7 @@ mod away;
 mod caller;
 mod cancelling;
 mod duplicates;
+mod hoarders;
 mod laggards;
 mod load;
 mod place;
@@ -47,6 +48,9 @@ faults!(
     crate::load::a_thousand_jobs as a_thousand_jobs_are_done_in_their_order,
     crate::load::more_workers as more_workers_do_more,
     crate::laggards::do_not_hold_up_others as laggards_do_not_hold_up_others,
+    crate::hoarders::of_a_folder as hoarders_do_not_use_up_a_server_with_a_folder,
+    crate::hoarders::of_a_bucket as hoarders_do_not_use_up_a_server_with_a_bucket,
+    crate::hoarders::of_memory as hoarders_do_not_use_up_the_memory,
     crate::stopping::hands_back as a_server_that_stops_hands_back,
     crate::cancelling::ends_soon as cancelled_jobs_end_soon_and_stay_as_they_are,
     crate::away::the_database as the_database_goes_away_and_comes_back,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::caller::Caller;
 use crate::support::postgres::Cluster;
+use crate::support::s3::{BUCKET, Endpoint};
 use crate::support::{Bench, Server};
 
 /// Whether the numbers are those of docs/reliability.md.
@@ -67,6 +68,15 @@ impl Place {
             cluster,
             address: free_address(),
         }
+    }
+
+    /// Has servers keep artifacts in a bucket.
+    pub fn keeps_artifacts_in(&mut self, endpoint: &Endpoint) {
+        for (name, value) in endpoint.environment() {
+            self.bench.variable(&name, &value);
+        }
+        let url = format!("s3://{BUCKET}/artifacts");
+        self.bench.variable("GUARDSPLAT_ARTIFACTS", &url);
     }
 
     /// What the ledger is called in figures.

@@ -36,6 +36,8 @@ pub async fn until(ask: impl Fn() -> String, right: impl Fn(&str) -> bool) -> St
 pub struct Bench {
     folder: TempDir,
     variables: Vec<(String, String)>,
+    /// Most files that the server may have open, if that is not left to the system.
+    files: Option<u64>,
 }
 
 impl Bench {
@@ -43,7 +45,14 @@ impl Bench {
         Self {
             folder: TempDir::new().unwrap(),
             variables: Vec::new(),
+            files: None,
         }
+    }
+
+    /// Bounds the files, connections among them, that the server may have open.
+    #[allow(dead_code)] // the tests of faults do so
+    pub fn may_open(&mut self, files: u64) {
+        self.files = Some(files);
     }
 
     /// Sets a variable of the server's environment.
@@ -65,7 +74,15 @@ impl Bench {
     }
 
     fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_guardsplat-server"));
+        let program = env!("CARGO_BIN_EXE_guardsplat-server");
+        let mut command = match self.files {
+            None => Command::new(program),
+            Some(files) => {
+                let mut shell = Command::new("sh");
+                shell.args(["-c", &format!("ulimit -n {files} && exec \"$0\" \"$@\""), program]);
+                shell
+            }
+        };
         for (name, _) in std::env::vars_os() {
             if name.to_string_lossy().starts_with("GUARDSPLAT_") {
                 command.env_remove(name);

@@ -42,7 +42,7 @@ async fn what_was_written_is_read_from_any_byte_in_chunks(bench: Bench) {
     );
     for offset in [0, 1, CHUNK_BYTES, CHUNK_BYTES + 1, data.len() - 1, data.len()] {
         let read = get(store, &path, offset as u64).await.unwrap();
-        assert!(read.iter().all(|chunk| !chunk.is_empty() && chunk.len() <= CHUNK_BYTES));
+        assert!(read.iter().all(|chunk| !chunk.is_empty() && chunk.len() <= PIECE_BYTES));
         assert!(read.concat() == data[offset..], "from {offset}");
     }
     assert_eq!(store.read(&path, 0).await.unwrap().size(), data.len() as u64);
@@ -156,10 +156,10 @@ async fn a_reader_of_what_is_deleted_meanwhile_is_told(bench: Bench) {
     .await
     .unwrap();
     let mut reader = store.read(&path, 0).await.unwrap();
-    assert_eq!(reader.chunk().await.unwrap().unwrap().len(), CHUNK_BYTES);
+    assert_eq!(reader.piece().await.unwrap().unwrap().len(), PIECE_BYTES);
     store.delete(&path).await.unwrap();
     let end = loop {
-        match reader.chunk().await {
+        match reader.piece().await {
             // What was fetched together with the first.
             Ok(Some(_)) => {}
             end => break end,

@@ -96,7 +96,7 @@ async fn a_store_that_says_nothing_is_not_waited_for() {
     let bench = Bench::s3().await;
     let limit = Duration::from_millis(50);
     let nothing = std::future::pending::<object_store::Result<()>>();
-    let silent = bench.store.within(limit, nothing).await;
+    let silent = bench.store.in_time(limit, nothing).await;
     assert!(
         matches!(silent, Err(StoreError::Silent(said)) if said == limit),
         "{silent:?}"

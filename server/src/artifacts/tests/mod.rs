@@ -5,6 +5,7 @@ mod both;
 pub(crate) mod endpoint;
 mod faults;
 mod folder;
+mod memory;
 mod paths;
 mod s3;
 mod service;
@@ -111,13 +112,11 @@ async fn put(
 }
 
 async fn get(store: &ArtifactStore, path: &ArtifactPath, offset: u64) -> StoreResult<Vec<Vec<u8>>> {
-    store
-        .read(path, offset)
-        .await?
-        .into_stream()
-        .map_ok(|chunk| chunk.to_vec())
-        .try_collect()
-        .await
+    let (mut reader, mut pieces) = (store.read(path, offset).await?, Vec::new());
+    while let Some(piece) = reader.piece().await? {
+        pieces.push(piece.to_vec());
+    }
+    Ok(pieces)
 }
 
 /// Sent as any other program would: without a word of ours.

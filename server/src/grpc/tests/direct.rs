@@ -11,7 +11,9 @@ use guardsplat_proto::v1::{
 use tonic::{Code, Status};
 use uuid::Uuid;
 
-use super::harness::{MAX_ARTIFACT_BYTES, Server, invalid, metadata, not_found, refused, sha256, soon};
+use super::harness::{
+    MAX_ARTIFACT_BYTES, Server, invalid, metadata, not_found, refused, sha256, soon, upload_messages,
+};
 use super::stores::{bytes, download, server};
 use crate::access::DEFAULT_PROJECT;
 use crate::artifacts::ArtifactPath;
@@ -184,18 +186,46 @@ async fn limits_are_those_of_other_uploads() {
     }
     assert_eq!(not_found(finish(&server, "uploads/R1NTTA").await), "uploads/R1NTTA");
     // Both fit, but not together.
-    let mut answers = Vec::new();
-    for sent in [b"scene 1", b"scene 2"] {
-        let begun = start(&server, metadata("scene.ply", sent)).await.unwrap();
-        put(&begun, sent).await;
-        answers.push(begun);
-    }
-    finish(&server, &answers[0].upload).await.unwrap();
-    let second = finish(&server, &answers[1].upload).await;
+    let first = start(&server, metadata("scene.ply", b"scene 1")).await.unwrap();
+    put(&first, b"scene 1").await;
+    let second = start(&server, metadata("scene.ply", b"scene 2")).await;
     refused(second, Code::ResourceExhausted, "QUOTA_USED_UP");
+    finish(&server, &first.upload).await.unwrap();
     assert_eq!(endpoint.objects().len(), 1);
     let third = start(&server, metadata("scene.ply", b"scene 3")).await;
     refused(third, Code::ResourceExhausted, "QUOTA_USED_UP");
+}
+
+/// What is begun counts from then on, also for other uploads, and is given back when nothing more can come of it.
+#[tokio::test]
+async fn what_is_begun_counts_until_nothing_can_come_of_it() {
+    let endpoint = Endpoint::start().await;
+    let quota = Limits {
+        max_bytes_of_project: Some(10),
+        signed_url: Some(Duration::from_secs(2)),
+        abandoned_after: Duration::from_secs(60),
+        ..Limits::default()
+    };
+    let server = server(&endpoint, quota).await;
+    let used = async || server.ledger().usage(DEFAULT_PROJECT).await.unwrap().bytes();
+    let begun = start(&server, metadata("scene.ply", b"scene 1")).await.unwrap();
+    let beside = upload_messages(metadata("scene.ply", b"scene 2"), b"scene 2");
+    let beside = server
+        .artifacts
+        .clone()
+        .upload_artifact(tokio_stream::iter(beside))
+        .await;
+    refused(beside, Code::ResourceExhausted, "QUOTA_USED_UP");
+    // One that is refused may be sent again while its address is good, so its bytes stay reserved for so long.
+    put(&begun, b"scene 3").await;
+    assert_eq!(invalid(finish(&server, &begun.upload).await), ["upload"]);
+    put(&begun, b"scene 3").await;
+    server.api.end_reservations().await.unwrap();
+    assert_eq!((used().await, endpoint.objects().len()), (7, 1));
+    tokio::time::sleep(Duration::from_millis(2100)).await;
+    server.api.end_reservations().await.unwrap();
+    assert_eq!((used().await, endpoint.objects().len()), (0, 0));
+    server.upload("scene.ply", b"scene 2").await;
 }
 
 #[tokio::test]

@@ -29,7 +29,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use crate::access::{self, Scope};
 use crate::artifacts::ArtifactStore;
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{ListenerOptions, serve};
+use crate::grpc::listener::{ConnectionLimits, HANDSHAKE, ListenerOptions, serve};
 use crate::ledger::{Ledger, NewToken, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
@@ -133,6 +133,9 @@ impl Server {
         let door = ListenerOptions {
             guard,
             tls: None,
+            connections: ConnectionLimits::default(),
+            handshake: HANDSHAKE,
+            idle: None,
             measured: api.measured(),
         };
         let served = tokio::spawn(serve(routes, door, listener, shutdown));

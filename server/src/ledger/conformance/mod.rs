@@ -15,6 +15,7 @@ mod operations;
 mod outputs;
 mod queue;
 mod registry;
+mod reservations;
 mod retention;
 pub mod speed;
 mod submission;
@@ -35,6 +36,7 @@ pub(crate) use operations::*;
 pub(crate) use outputs::*;
 pub(crate) use queue::*;
 pub(crate) use registry::*;
+pub(crate) use reservations::*;
 pub(crate) use retention::*;
 pub(crate) use submission::*;
 pub(crate) use tokens::*;
@@ -146,6 +148,9 @@ macro_rules! conformance_suite {
             deliveries_come_in_pages_and_are_forgotten
             a_hook_may_go_while_its_jobs_end
             a_project_has_so_many_deliveries_waiting_and_no_more
+            bytes_are_reserved_until_the_artifact_is_there
+            reservations_end
+            reservations_at_once_stay_within_the_limit
             nothing_goes_by_itself
             uploads_go_when_they_were_not_used_for_long
             jobs_go_with_what_they_made

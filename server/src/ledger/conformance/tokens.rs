@@ -338,6 +338,7 @@ pub async fn what_a_project_takes_is_counted(factory: &dyn Factory) {
     let both = Usage {
         queued_jobs: 1,
         artifact_bytes: 20,
+        reserved_bytes: 0,
     };
     assert_eq!(used(THEIRS).await, both);
     ledger.delete_artifact(first, at(2)).await.unwrap();
@@ -345,6 +346,7 @@ pub async fn what_a_project_takes_is_counted(factory: &dyn Factory) {
     let less = Usage {
         queued_jobs: 0,
         artifact_bytes: 10,
+        reserved_bytes: 0,
     };
     assert_eq!(used(THEIRS).await, less);
 }

@@ -91,6 +91,8 @@ mod keys;
 mod leases;
 #[path = "../shared/registry.rs"]
 mod registry;
+#[path = "../shared/reservations.rs"]
+mod reservations;
 #[path = "../shared/retries.rs"]
 mod retries;
 #[path = "../shared/rows.rs"]

@@ -199,6 +199,11 @@ pub(super) fn steps() -> Vec<Migration> {
             include_str!("../../../migrations/postgres/0008_claims.sql"),
         ),
         step(
+            9,
+            "upload reservations",
+            include_str!("../../../migrations/postgres/0009_upload_reservations.sql"),
+        ),
+        step(
             10,
             "hardening",
             include_str!("../../../migrations/postgres/0010_hardening.sql"),

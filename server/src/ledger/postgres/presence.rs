@@ -67,12 +67,25 @@ async fn here(db: &mut PgConnection, now: i64) -> Result<()> {
 
 /// Names the lock under which the chain grows; it means nothing else, and is the database's own.
 const CHAIN_LOCK: i64 = 0x6775_6172_6473_706c;
+/// Of the locks under which projects reserve bytes.
+const PROJECT_LOCK: i32 = 0x6775_6172;
 
 /// Waits until nobody else makes the chain longer, in any server, and keeps it so until the transaction ends. What is
 /// read from here on is what others committed before.
 pub(super) async fn lock_chain(db: &mut PgConnection) -> Result<()> {
     sqlx::query("SELECT pg_advisory_xact_lock($1)")
         .bind(CHAIN_LOCK)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Waits until nobody else reserves bytes for this project, in any server, and keeps it so until the transaction ends. A
+/// lock of two numbers is another one than any of a single number.
+pub(super) async fn lock_project(db: &mut PgConnection, project: &str) -> Result<()> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1, hashtext($2))")
+        .bind(PROJECT_LOCK)
+        .bind(project)
         .execute(db)
         .await?;
     Ok(())

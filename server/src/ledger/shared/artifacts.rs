@@ -5,7 +5,7 @@ use sqlx::Row;
 
 use super::super::types::{ArtifactId, ArtifactRow, ArtifactState, JobId, NewArtifact, Origin};
 use super::super::{ArtifactLedger, LedgerError, Result, token};
-use super::{DbConnection, DbLedger, history, jobs, leases, rows};
+use super::{DbConnection, DbLedger, history, jobs, leases, reservations, rows};
 
 #[async_trait::async_trait]
 impl ArtifactLedger for DbLedger {
@@ -54,7 +54,10 @@ impl ArtifactLedger for DbLedger {
 
 pub(super) async fn create(db: &mut DbConnection, new: &NewArtifact, now: i64) -> Result<ArtifactRow> {
     let (project, job, token) = match &new.origin {
-        Origin::Upload { project } => (project.clone(), None, None),
+        Origin::Upload { project } => {
+            reservations::release(db, new.id).await?;
+            (project.clone(), None, None)
+        }
         Origin::Output { job, token } => {
             let token = token::hash(token);
             let leased = leases::leased_meanwhile(db, *job, &token).await?;

@@ -28,10 +28,11 @@ pub(super) const FAILED: &str = concat!(
     " WHERE state = 4 GROUP BY kind, failure_reason"
 );
 
-/// What a project takes; both from indexes alone. PostgreSQL's sum of bigints is of another type.
+/// What a project takes; all from indexes alone. PostgreSQL's sum of bigints is of another type.
 pub(super) const USAGE: &str = "SELECT \
     (SELECT count(*) FROM jobs WHERE project = $1 AND state = 1) AS queued_jobs, \
-    (SELECT CAST(coalesce(sum(size), 0) AS bigint) FROM artifacts WHERE project = $1 AND state IN (2, 3)) AS artifact_bytes";
+    (SELECT CAST(coalesce(sum(size), 0) AS bigint) FROM artifacts WHERE project = $1 AND state IN (2, 3)) AS artifact_bytes, \
+    (SELECT CAST(coalesce(sum(size), 0) AS bigint) FROM upload_reservations WHERE project = $1) AS reserved_bytes";
 
 #[async_trait::async_trait]
 impl Statistics for DbLedger {
@@ -72,11 +73,12 @@ async fn tally(db: &mut DbConnection) -> Result<Tally> {
     Ok(tally)
 }
 
-async fn usage(db: &mut DbConnection, project: &str) -> Result<Usage> {
+pub(super) async fn usage(db: &mut DbConnection, project: &str) -> Result<Usage> {
     let row = sqlx::query(USAGE).bind(project).fetch_one(db).await?;
     let number = |column| Ok::<_, LedgerError>(u64::try_from(row.try_get::<i64, _>(column)?).unwrap_or_default());
     Ok(Usage {
         queued_jobs: number("queued_jobs")?,
         artifact_bytes: number("artifact_bytes")?,
+        reserved_bytes: number("reserved_bytes")?,
     })
 }

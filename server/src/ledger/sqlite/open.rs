@@ -88,6 +88,11 @@ fn migrator() -> Migrator {
         step(9, "queue", include_str!("../../../migrations/sqlite/0009_queue.sql")),
         step(10, "claims", include_str!("../../../migrations/sqlite/0010_claims.sql")),
         step(
+            11,
+            "upload reservations",
+            include_str!("../../../migrations/sqlite/0011_upload_reservations.sql"),
+        ),
+        step(
             12,
             "hardening",
             include_str!("../../../migrations/sqlite/0012_hardening.sql"),

@@ -45,6 +45,7 @@ async fn tables_of_the_first_version_are_taken_along() {
     let usage = Usage {
         queued_jobs: 1,
         artifact_bytes: 7,
+        reserved_bytes: 0,
     };
     assert_eq!(ledger.usage(OURS).await.unwrap(), usage);
     assert_eq!(ledger.list_tokens(None, None, 5).await.unwrap(), []);
@@ -123,6 +124,7 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (tokens::OF_HASH, "tokens_hash_key", "bytea"),
         (tokens::OF_PROJECT, "tokens_by_project", page),
         (statistics::USAGE, "artifacts_by_project", "text"),
+        (statistics::USAGE, "upload_reservations_by_project", "text"),
         (QUEUE, "jobs_queue", ""),
         (hooks::HOOKS, "hooks_by_project", page),
         (

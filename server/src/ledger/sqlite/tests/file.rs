@@ -173,6 +173,7 @@ async fn a_file_of_the_first_version_is_taken_along() {
         "DROP TABLE deliveries",
         "DROP TABLE store_generation",
         "DROP TABLE hooks",
+        "DROP TABLE upload_reservations",
         "ALTER TABLE jobs DROP COLUMN asked_id",
         "ALTER TABLE keys DROP COLUMN state",
         "ALTER TABLE keys DROP COLUMN state_reason",
