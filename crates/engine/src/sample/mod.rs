@@ -68,7 +68,7 @@ pub fn cameras(kind: Kind, count: usize) -> Vec<Camera> {
             -0.55 * shapes::CEILING as f32,
             reach * b * angle.sin(),
         ];
-        let turned = angle + if i % 2 == 0 { std::f32::consts::PI } else { 1.2 };
+        let turned = angle + if i.is_multiple_of(2) { std::f32::consts::PI } else { 1.2 };
         let height = -(0.25 + 0.4 * (i % 5) as f32 / 4.0) * shapes::CEILING as f32;
         let target = [a * turned.cos(), height, b * turned.sin()];
         Camera::look_at(eye, target, [0.0, -1.0, 0.0], 0.9, 640, 480)
