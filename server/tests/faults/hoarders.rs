@@ -33,8 +33,8 @@ const BYTES: usize = 8 << 20;
 const STREAMS: usize = 50;
 /// Bytes that may be on the way to a reader.
 const WINDOW: u32 = 64 << 10;
-/// Mebibytes that the server may have in memory.
-const MOST: u64 = 256;
+/// Mebibytes that the server may have in memory: 256 megabytes.
+const MOST: u64 = 244;
 /// What is sent first on a connection of HTTP/2: the preface, and settings that say nothing.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
 

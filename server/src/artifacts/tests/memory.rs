@@ -56,7 +56,7 @@ async fn windows_grow_for_whoever_takes_them_and_no_further(bench: Bench) {
     for i in 0..3 * store.slow_window() / PIECE_BYTES {
         read.extend_from_slice(&reader.piece().await.unwrap().unwrap());
         assert!(MEMORY - store.memory().free() <= store.slow_window() as u64, "{i}");
-        if i % (store.slow_window() / PIECE_BYTES) == 1 {
+        if i % (store.slow_window() / PIECE_BYTES) == 0 {
             tokio::time::sleep(Duration::from_millis(1100)).await;
         }
     }
