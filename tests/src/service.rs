@@ -236,7 +236,7 @@ impl Service {
                 match entry.metadata() {
                     Ok(metadata) if metadata.is_dir() => folders.push(entry.path()),
                     // It says whose the others are.
-                    Ok(_) if entry.file_name() == "ledger" => {}
+                    Ok(_) if entry.file_name() == "ledger" || entry.file_name() == "generation" => {}
                     Ok(metadata) => sizes.push(metadata.len()),
                     Err(_) => {}
                 }
