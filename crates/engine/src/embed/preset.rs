@@ -81,9 +81,7 @@ impl Preset {
             pool_mebibytes: 1024,
             half_weights: false,
             size: 160,
-            // Pictures that people make of scenes have 800 pixels and more, and there a scene has detail that it has not at
-            // CLIP's size: smooth scenes gain two to four points (docs/evaluation.md).
-            enlarged: 9.0,
+            enlarged: 3.0,
             black_backgrounds: 0.1,
             lambda: LossWeights {
                 reconstruction: 1.0,
@@ -102,8 +100,8 @@ impl Preset {
             lpips_views: None,
             optimizer: Optimizer::PreconditionedSgd(PreconditionedSgdOptions::default()),
             balance: Some(LossWeightControl {
-                target_psnr_db: 39.6,
-                target_ssim: Some(0.9935),
+                target_psnr_db: 40.4,
+                target_ssim: Some(0.9945),
                 // Hardly a mark of 32 bits needs it, and of 64 bits those of smooth scenes.
                 yielding: Some(TargetRelaxation {
                     below: 0.93,
@@ -128,13 +126,12 @@ impl Preset {
                 min_steps: 100,
                 bit_accuracy: 0.998,
                 margin: 8.0,
-                psnr_db: 39.3,
+                psnr_db: 40.1,
                 patience: 2,
             }),
             verify: Verify {
                 views: 20,
-                // Twice CLIP's: as pictures are, larger than the views that it was made from.
-                size: Some(320),
+                size: None,
                 message_views: 5,
             },
             target: Target {
@@ -146,7 +143,6 @@ impl Preset {
         match self {
             Self::Standard => standard,
             Self::Draft => Settings {
-                enlarged: 3.0,
                 steps: 80,
                 pool_views: 100,
                 balance: Some(LossWeightControl {
@@ -171,6 +167,9 @@ impl Preset {
             // What is left over by a short message goes into what it stands. Views that are compressed or noisy in training
             // would cost four times the time for a little more against noise (docs/clip.md).
             Self::Robust => Settings {
+                // Pictures that people make of scenes have 800 pixels and more, and there a scene has detail that it has
+                // not at CLIP's size.
+                enlarged: 9.0,
                 steps: 320,
                 balance: standard.balance.map(|balance| LossWeightControl {
                     target_psnr_db: 39.2,
