@@ -43,9 +43,33 @@ struct Fields {
 
 /// What alone is read first, as the rest depends on it.
 #[derive(Deserialize)]
-struct Kind {
-    format: String,
+pub(crate) struct Kind {
+    pub format: String,
     version: u64,
+}
+
+impl Kind {
+    /// Sees that a text is a document of `format` in the one `version` that is known.
+    pub fn check(text: &str, format: &str, version: u8) -> Result<()> {
+        if text.len() > MAX_DOCUMENT_BYTES {
+            let reason = format!("it has {} bytes, at most {MAX_DOCUMENT_BYTES} are read", text.len());
+            return Err(Error::NotADocument(reason));
+        }
+        let kind: Self = serde_json::from_str(text).map_err(|error| Error::NotADocument(error.to_string()))?;
+        if kind.format != format {
+            return Err(Error::Field {
+                field: "format",
+                reason: format!("must be {format}"),
+            });
+        }
+        if kind.version != u64::from(version) {
+            return Err(Error::UnknownVersion {
+                found: kind.version,
+                known: version,
+            });
+        }
+        Ok(())
+    }
 }
 
 impl Document {
@@ -93,24 +117,8 @@ impl Document {
     /// # Errors
     /// `NotADocument`, `UnknownVersion`, `Field`, `NotAPublicKey`.
     pub fn from_json(text: &str) -> Result<Self> {
-        if text.len() > MAX_DOCUMENT_BYTES {
-            let reason = format!("it has {} bytes, at most {MAX_DOCUMENT_BYTES} are read", text.len());
-            return Err(Error::NotADocument(reason));
-        }
+        Kind::check(text, FORMAT, VERSION)?;
         let not = |error: serde_json::Error| Error::NotADocument(error.to_string());
-        let kind: Kind = serde_json::from_str(text).map_err(not)?;
-        if kind.format != FORMAT {
-            return Err(Error::Field {
-                field: "format",
-                reason: format!("must be {FORMAT}"),
-            });
-        }
-        if kind.version != u64::from(VERSION) {
-            return Err(Error::UnknownVersion {
-                found: kind.version,
-                known: VERSION,
-            });
-        }
         let fields: Fields = serde_json::from_str(text).map_err(not)?;
         let commitment = Commitment {
             sequence: fields.sequence,

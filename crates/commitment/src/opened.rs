@@ -2,6 +2,7 @@
 use secrecy::zeroize::Zeroizing;
 use serde::{Deserialize, Serialize};
 
+use crate::document::Kind;
 use crate::{
     BLINDING_BYTES, Document, Error, MAX_DOCUMENT_BYTES, NONCE_BYTES, OPENING_BYTES, Opening, PublicKey, Result,
 };
@@ -9,7 +10,7 @@ use crate::{
 /// What says that a document is one of these.
 const FORMAT: &str = "guardsplat.opened-commitment";
 /// The version that is made and read here.
-const VERSION: u64 = 1;
+const VERSION: u8 = 1;
 
 /// A signed commitment with the nonce and the blinding that it hid. Whoever has it can compute the asset's word.
 #[derive(Debug)]
@@ -32,13 +33,6 @@ struct Fields {
     blinding: String,
 }
 
-/// What alone is read first, as the rest depends on it.
-#[derive(Deserialize)]
-struct Kind {
-    format: String,
-    version: u64,
-}
-
 impl OpenedDocument {
     /// Whether a text says of itself that it is one of these.
     pub fn is_one(text: &str) -> bool {
@@ -54,7 +48,7 @@ impl OpenedDocument {
         let not = |error: serde_json::Error| Error::NotADocument(error.to_string());
         let fields = Fields {
             format: FORMAT.into(),
-            version: VERSION,
+            version: VERSION.into(),
             commitment: serde_json::from_str(&self.document.to_json()?).map_err(not)?,
             nonce: hex::encode(self.opening.nonce()),
             blinding: hex::encode(self.opening.blinding()),
@@ -67,24 +61,8 @@ impl OpenedDocument {
     /// # Errors
     /// `NotADocument`, `UnknownVersion`, `Field`, `NotAPublicKey`.
     pub fn from_json(text: &str) -> Result<Self> {
-        if text.len() > MAX_DOCUMENT_BYTES {
-            let reason = format!("it has {} bytes, at most {MAX_DOCUMENT_BYTES} are read", text.len());
-            return Err(Error::NotADocument(reason));
-        }
+        Kind::check(text, FORMAT, VERSION)?;
         let not = |error: serde_json::Error| Error::NotADocument(error.to_string());
-        let kind: Kind = serde_json::from_str(text).map_err(not)?;
-        if kind.format != FORMAT {
-            return Err(Error::Field {
-                field: "format",
-                reason: format!("must be {FORMAT}"),
-            });
-        }
-        if kind.version != VERSION {
-            return Err(Error::UnknownVersion {
-                found: kind.version,
-                known: VERSION as u8,
-            });
-        }
         let fields: Fields = serde_json::from_str(text).map_err(not)?;
         let mut bytes = Zeroizing::new([0; OPENING_BYTES]);
         let (nonce, blinding) = bytes.split_at_mut(NONCE_BYTES);

@@ -2,11 +2,11 @@
 use guardsplat_codeword::{MARK_CODE, Payload, Whitening, mark};
 use guardsplat_commitment::OpenedDocument;
 use guardsplat_proto::v1::registry_service_client::RegistryServiceClient;
-use guardsplat_proto::v1::{GetAssetRequest, RevealCommitmentRequest, RevealCommitmentResponse};
+use guardsplat_proto::v1::{Asset, GetAssetRequest, RevealCommitmentRequest, RevealCommitmentResponse};
 use tonic::{Code, Status};
 
 use super::calls::asking;
-use super::claims::{bench, framed, logits, of_asset};
+use super::claims::{Bench, bench, framed, logits, of_asset};
 use super::harness::{Server, refused};
 use super::registry::public_key;
 use crate::access::DEFAULT_PROJECT;
@@ -20,20 +20,18 @@ async fn reveal(door: &Server, token: &str, name: &str) -> Result<RevealCommitme
     answer.map(|answer| answer.into_inner())
 }
 
+async fn get(bench: &Bench, name: &str) -> Asset {
+    let request = GetAssetRequest { name: name.into() };
+    let answer = bench.server.registry.clone().get_asset(request).await;
+    answer.unwrap().into_inner()
+}
+
 #[tokio::test]
 async fn a_commitment_is_opened_by_admins_and_gives_away_one_word() {
     let bench = bench().await;
     let word = bench.word(0).await;
     let asset = &bench.assets[0].0;
-    let get = || GetAssetRequest { name: asset.clone() };
-    let known = bench
-        .server
-        .registry
-        .clone()
-        .get_asset(get())
-        .await
-        .unwrap()
-        .into_inner();
+    let known = get(&bench, asset).await;
     assert_eq!(known.reveal_time, None);
     let door = bench.server.with_a_door(Limits::default()).await;
     let shop = door.token(DEFAULT_PROJECT, &[Embed, Verify]).await;
@@ -61,14 +59,7 @@ async fn a_commitment_is_opened_by_admins_and_gives_away_one_word() {
     // Said again, the first time counts; and the asset and evidence of later claims tell of it.
     let again = reveal(&door, &admin, &known.commitment).await.unwrap();
     assert!(again == answer && again.reveal_time.is_some());
-    let known = bench
-        .server
-        .registry
-        .clone()
-        .get_asset(get())
-        .await
-        .unwrap()
-        .into_inner();
+    let known = get(&bench, asset).await;
     assert_eq!(known.reveal_time, answer.reveal_time);
     let (_, checked) = bench.claimed(of_asset(asset), vec![framed(0, logits(&word, 4))]).await;
     let history = checked.evidence.unwrap().verification.unwrap().history.unwrap();

@@ -29,17 +29,21 @@ fn lies_there(server: &Server) -> bool {
     server.ledger_files().iter().any(holds)
 }
 
-#[tokio::test]
-async fn a_seed_is_told_to_the_worker_only() {
-    let server = Server::start().await;
-    let asked = || Job {
+/// A job that makes a key from the seed.
+fn asked() -> Job {
+    Job {
         spec: Some(Spec::CreateKey(KeySpec {
             bits: 64,
             seed: Some(SEED),
             ..KeySpec::default()
         })),
         ..Job::default()
-    };
+    }
+}
+
+#[tokio::test]
+async fn a_seed_is_told_to_the_worker_only() {
+    let server = Server::start().await;
     let request = Uuid::new_v4().to_string();
     let made = server.submit(asked(), &request).await.unwrap().into_inner();
     let again = server.submit(asked(), &request).await.unwrap().into_inner();
@@ -71,14 +75,6 @@ async fn a_seed_is_told_to_the_worker_only() {
 #[tokio::test]
 async fn seeds_of_before_are_sealed_at_the_start() {
     let server = Server::start().await;
-    let asked = || Job {
-        spec: Some(Spec::CreateKey(KeySpec {
-            bits: 64,
-            seed: Some(SEED),
-            ..KeySpec::default()
-        })),
-        ..Job::default()
-    };
     let request = Uuid::new_v4().to_string();
     let made = server.submit(asked(), &request).await.unwrap().into_inner().name;
     let id = Uuid::try_parse(made.trim_start_matches("jobs/")).unwrap();
