@@ -40,7 +40,8 @@ pub fn check(spec: &JobSpec, limit: u64) -> Result<()> {
     problems.finish()
 }
 
-/// Pixels that an embedding draws: the steps of its preset, each of so many views.
+/// Pixels that an embedding draws: the steps of its preset, each of so many views. The engine's presets have the numbers
+/// (`crates/engine/src/embed/preset.rs`), and the server knows nothing of the engine.
 fn of_embed(spec: &EmbedSpec) -> u64 {
     let views = match spec.preset() {
         Preset::Unspecified | Preset::Standard => 240 * 8,

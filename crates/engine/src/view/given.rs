@@ -19,7 +19,7 @@ const HELD_OUT: usize = 8;
 const MOVED: f32 = 0.25;
 /// How far they turn, radians: 6 degrees.
 const TURNED: f32 = 0.1;
-/// Their fields of view, in that of their camera; and those of held-out views.
+/// Their fields of view, in that of their camera.
 const ZOOMED: std::ops::Range<f32> = 0.85..1.2;
 /// A training view is not at a held-out camera: farther from its place than this share of a distance, or turned away from
 /// it by [`TURNED`].
@@ -136,7 +136,8 @@ impl GivenViews {
             .fold(f32::INFINITY, f32::min);
         self.held_out.iter().all(|held| {
             let way = sub(view.centre(), held.centre());
-            let far = dot(way, way).sqrt() >= APART * spacing;
+            // Where all cameras are at one place none is far, and only their directions tell them apart.
+            let far = dot(way, way).sqrt() > APART * spacing;
             far || dot(view.rotation[2], held.rotation[2]) <= TURNED.cos()
         })
     }
@@ -278,6 +279,8 @@ mod tests {
         let given = GivenViews::new(&scene, &cameras).unwrap();
         for view in views(&given, 50) {
             assert_eq!(view.centre().map(f32::abs), [0.0; 3]);
+            let ahead = |held: &Camera| dot(view.rotation[2], held.rotation[2]);
+            assert!(given.held_out.iter().all(|held| ahead(held) <= TURNED.cos()));
             assert!(view.rotation.iter().flatten().all(|x| x.is_finite()));
         }
     }
