@@ -1,12 +1,10 @@
 //! Whether there is room for a job: in the queue, and for its scene in the memory that a job may take.
-use std::path::Path;
 use std::time::Duration;
 
-use guardsplat_scene::{HEAD, Summary};
+use guardsplat_scene::Summary;
 
-use crate::artifacts::{ArtifactPath, StoreError};
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, JobKind, ResourceRequirements};
+use crate::ledger::{ArtifactId, JobKind, JobSpec, ResourceRequirements};
 use crate::service::names::ResourceKind;
 use crate::service::submission::Submission;
 use crate::service::{Service, ownership};
@@ -94,34 +92,17 @@ impl Service {
             None => Ok(false),
         }
     }
-
-    /// What the first bytes of an artifact tell of a scene. What is none, or not there any more, is for others to
-    /// refuse, who know more of it.
-    async fn summary(&self, project: &str, id: ArtifactId) -> Result<Option<Summary>> {
-        let Some(row) = self.find_artifact(project, id).await? else {
-            return Ok(None);
-        };
-        let path = ArtifactPath::parse(&row.path)?;
-        let (head, size) = match self.store().head(&path, HEAD).await {
-            Err(StoreError::Gone { .. }) => return Ok(None),
-            head => head?,
-        };
-        let name = ResourceKind::Artifact.name(id);
-        Ok(
-            guardsplat_scene::summary(Path::new(&name), &head, size).unwrap_or_else(|refusal| {
-                tracing::debug!(%refusal, "not known to be a scene");
-                None
-            }),
-        )
-    }
 }
 
 /// The artifact that is a scene, or may be one: a worker takes several suspects for pictures.
 fn scene_of(submission: &Submission) -> Option<ArtifactId> {
-    match (submission.spec.kind(), &submission.inputs[..]) {
-        (JobKind::Embed | JobKind::Verify, [scene]) => Some(*scene),
-        _ => None,
-    }
+    let scenes = match &submission.spec {
+        JobSpec::Embed(_) => 1,
+        JobSpec::Verify(spec) => spec.suspects.len(),
+        JobSpec::CreateKey(_) => 0,
+    };
+    // Cameras come after it.
+    submission.inputs.first().copied().filter(|_| scenes == 1)
 }
 
 /// Bytes that a scene takes at least, and probably.

@@ -40,6 +40,7 @@ pub(crate) mod quota;
 pub mod rate_limit;
 pub(crate) mod registry;
 pub mod retention;
+pub(crate) mod scene_summaries;
 pub(crate) mod seeds;
 pub(crate) mod stages;
 pub(crate) mod store_generation;
@@ -152,6 +153,7 @@ struct Shared {
     reports: progress::ProgressThrottle,
     placement: placement::Placement,
     positions: queue_positions::QueuePositions,
+    summaries: scene_summaries::SceneSummaries,
     watches: Arc<concurrency_limit::ConcurrencyLimit>,
     transfers: Arc<concurrency_limit::ConcurrencyLimit>,
 }
@@ -182,6 +184,7 @@ impl Service {
             reports: progress::ProgressThrottle::default(),
             placement: placement::Placement::default(),
             positions: queue_positions::QueuePositions::default(),
+            summaries: scene_summaries::SceneSummaries::default(),
             watches: Arc::default(),
             transfers: Arc::default(),
         };

@@ -96,6 +96,24 @@ async fn a_scene_that_cannot_fit_is_refused_with_the_numbers() {
     server.submit(embed(&scene, &key), "").await.unwrap();
 }
 
+/// Jobs of one scene do not wait for the store each.
+#[tokio::test]
+async fn a_scene_is_looked_at_once() {
+    let server = Server::with(up_to(6)).await;
+    let key = server.key(16, b"key file").await;
+    let before = server.files();
+    let scene = server.upload("scene.ply", &ply(GAUSSIANS, GAUSSIANS)).await.name;
+    let first = does_not_fit(server.submit(embed(&scene, &key), "").await);
+    let files = server.files();
+    let new: Vec<_> = files.iter().filter(|file| !before.contains(file)).collect();
+    assert_eq!(new.len(), 1);
+    std::fs::remove_file(new[0]).unwrap();
+    assert_eq!(does_not_fit(server.submit(embed(&scene, &key), "").await), first);
+    // A server that did not see it can't say.
+    let server = server.restart(up_to(6)).await;
+    server.submit(embed(&scene, &key), "").await.unwrap();
+}
+
 /// What it is is said by those who read all of it.
 #[tokio::test]
 async fn what_is_not_clearly_a_large_scene_is_taken() {
