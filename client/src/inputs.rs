@@ -22,7 +22,7 @@ pub enum Input {
 }
 
 impl Input {
-    /// A scene, whatever its file is called.
+    /// A scene, or cameras, whatever the file is called.
     pub fn scene(text: &str) -> Self {
         match resource_names::artifact_or_file(text) {
             Some(name) => Self::Artifact(name),

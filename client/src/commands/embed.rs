@@ -84,6 +84,9 @@ pub struct Arguments {
         hide_possible_values = true
     )]
     robust_to: Vec<Distortion>,
+    /// Where the scene's viewers are: cameras.json (3DGS) or transforms.json (NeRF), or artifacts/ID; around it unless given
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<String>,
     /// Decides views, backgrounds and augmentation
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
@@ -137,7 +140,9 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     let asset = arguments.asset.as_deref().map(resource_names::asset).transpose()?;
     let message = arguments.message.as_deref().map(|given| key::message(&key, given));
     let message = message.transpose()?;
-    let inputs = inputs::send(context, &[input]).await?;
+    let cameras = arguments.cameras.as_deref().map(inputs::Input::scene);
+    let inputs: Vec<_> = std::iter::once(input).chain(cameras).collect();
+    let inputs = inputs::send(context, &inputs).await?;
     let spec = spec(
         arguments,
         &key,
@@ -171,8 +176,9 @@ fn check_format(input: &Path, output: Option<&Path>) -> Result<()> {
 
 fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs: &inputs::Inputs) -> Spec {
     let mut spec = EmbedSpec {
-        // One input was given, and one name came back.
+        // As many names came back as inputs were given.
         scene: inputs.names.first().cloned().unwrap_or_default(),
+        cameras: inputs.names.get(1).cloned().unwrap_or_default(),
         key: key.name.clone(),
         message,
         asset,

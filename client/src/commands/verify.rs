@@ -32,6 +32,9 @@ pub struct Arguments {
     /// Side of these views in pixels; CLIP's input unless given
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
+    /// Where a scene's viewers are, a file as `embed` was given, or artifacts/ID; around it unless given
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<String>,
     /// Decides the views of a scene
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
@@ -80,9 +83,14 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         Some(given) => owner::find(context, given).await?.name,
         None => String::new(),
     };
-    let inputs = inputs::send(context, &found).await?;
+    let cameras = arguments.cameras.as_deref().map(inputs::Input::scene);
+    let inputs: Vec<_> = found.into_iter().chain(cameras).collect();
+    let inputs = inputs::send(context, &inputs).await?;
+    let mut suspects = inputs.names.clone();
+    let cameras = arguments.cameras.as_ref().and_then(|_| suspects.pop());
     let spec = Spec::Verify(VerifySpec {
-        suspects: inputs.names.clone(),
+        suspects,
+        cameras: cameras.unwrap_or_default(),
         key: key.name.clone(),
         message: message.unwrap_or_default(),
         asset: asset.unwrap_or_default(),

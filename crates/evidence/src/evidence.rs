@@ -125,4 +125,6 @@ pub enum Role {
     Original,
     /// The scene after it was marked.
     Marked,
+    /// Where the scene's viewers are: cameras that it was marked for, or read at.
+    Cameras,
 }

@@ -41,13 +41,15 @@ impl Service {
 
 /// What a job reads.
 fn inputs(job: &JobRow) -> Result<Vec<ArtifactId>> {
-    let names = match &job.spec {
-        JobSpec::Embed(spec) => std::slice::from_ref(&spec.scene),
-        JobSpec::Verify(spec) => &spec.suspects,
-        JobSpec::CreateKey(_) => &[],
+    let (names, cameras) = match &job.spec {
+        JobSpec::Embed(spec) => (std::slice::from_ref(&spec.scene), spec.cameras.as_str()),
+        JobSpec::Verify(spec) => (&spec.suspects[..], spec.cameras.as_str()),
+        JobSpec::CreateKey(_) => (&[][..], ""),
     };
     names
         .iter()
+        .map(String::as_str)
+        .chain(Some(cameras).filter(|name| !name.is_empty()))
         .map(|name| ResourceKind::Artifact.parse("name", name))
         .collect()
 }

@@ -27,7 +27,7 @@ pub struct Submission {
     pub display_name: String,
     /// What it does.
     pub spec: JobSpec,
-    /// Artifacts it reads.
+    /// Artifacts it reads: the scene or the suspects, and then its cameras, where there are any.
     pub inputs: Vec<ArtifactId>,
     /// The key it needs, and the field that named it.
     pub key: Option<KeyId>,
@@ -130,8 +130,9 @@ fn embed(spec: &EmbedSpec, problems: &mut Violations) -> Result<Option<Wanted>> 
     distortions(&spec.robust_to, problems);
     side("job.embed.size", spec.size, problems);
     let message = (!spec.message.is_empty()).then(|| ("job.embed.message", spec.message.clone()));
+    let cameras = cameras("job.embed.cameras", &spec.cameras, problems)?;
     Ok(scene.map(|scene| Wanted {
-        inputs: vec![scene],
+        inputs: std::iter::once(scene).chain(cameras).collect(),
         key,
         message,
         claim,
@@ -182,6 +183,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
         "must be 1 to 10000, or 0 for 20",
     );
     side("job.verify.size", spec.size, problems);
+    inputs.extend(cameras("job.verify.cameras", &spec.cameras, problems)?);
     let claim = problems.take(claims::of_verify(spec))?.flatten();
     let message = (!spec.message.is_empty()).then(|| ("job.verify.message", spec.message.clone()));
     Ok(Some(Wanted {
@@ -190,6 +192,14 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
         message,
         claim,
     }))
+}
+
+/// A file of cameras, where one is named.
+fn cameras(field: &str, name: &str, problems: &mut Violations) -> Result<Option<ArtifactId>> {
+    match name {
+        "" => Ok(None),
+        name => problems.take(ResourceKind::Artifact.parse(field, name)),
+    }
 }
 
 fn create_key(spec: &KeySpec, problems: &mut Violations) {

@@ -1,6 +1,7 @@
 //! The service as its users have it: the real server, workers and client, as processes. Most tests use a tiny CLIP with
 //! random weights, with which a mark is hardly read, but made and read as with any other.
 mod bad_input;
+mod cameras;
 mod claims;
 mod crashes;
 mod languages;

@@ -29,6 +29,9 @@ pub struct Arguments {
     /// Counts the Gaussians that so many training views show; takes a while
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: Option<u32>,
+    /// Where the scene's viewers are, as for `embed`: a file (cameras.json or transforms.json), or a folder of COLMAP
+    #[arg(long, value_name = "PATH")]
+    cameras: Option<PathBuf>,
     /// Leaves out rows with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
@@ -53,6 +56,7 @@ struct Report {
     sh_degree_learned: usize,
     colours_rounded: bool,
     extent: Option<Where>,
+    cameras: Option<Viewers>,
     views: Option<u32>,
     seen_gaussians: Option<usize>,
     memory_limit_bytes: u64,
@@ -67,6 +71,15 @@ struct Where {
     radius: f32,
     up: [f32; 3],
     on_ground: bool,
+}
+
+/// Cameras that were given.
+#[derive(Serialize)]
+struct Viewers {
+    training: usize,
+    held_out: usize,
+    /// How near a training view comes to an opaque Gaussian; none where no Gaussian is.
+    clearance: Option<f32>,
 }
 
 /// What a command will need of the memory.
@@ -100,14 +113,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
     let scene = Scene::read_within(&arguments.scene, bad_rows, limits.left(&rest))?;
     let gaussians = &scene.gaussians;
+    let cameras = super::cameras(arguments.cameras.as_deref())?;
     let size = SceneSize::of(&scene);
     let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));
-    let (mut extent, mut embed, mut seen) = (None, None, None);
+    let (mut extent, mut embed, mut seen, mut viewers) = (None, None, None, None);
     // Of nothing there is nothing to be seen.
     if !gaussians.is_empty() {
         extent = Some(Extent::of(gaussians)?);
         let settings = Preset::Standard.settings();
-        let view = measure_view_on_cpu(gaussians, &settings, &[])?;
+        let view = measure_view_on_cpu(gaussians, &settings, &cameras)?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
         let clip = 4 * clip.parameters() as u64;
         let models = ModelBytes {
@@ -115,7 +129,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             verifying: clip,
         };
         embed = Some(predict_memory(size, view, &settings, models));
-        seen = arguments.views.map(|views| count_seen(gaussians, views)).transpose()?;
+        let sampler = ViewSampler::among(gaussians, 0, &cameras)?;
+        seen = (arguments.views.map(|views| count_seen(gaussians, &sampler, views))).transpose()?;
+        viewers = sampler.given().map(|given| Viewers {
+            training: given.training_cameras(),
+            held_out: given.held_out_cameras(),
+            clearance: Some(given.clearance()).filter(|distance| distance.is_finite()),
+        });
     }
     let report = Report {
         format: scene.format().name(),
@@ -133,6 +153,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             up: extent.up,
             on_ground: extent.on_ground,
         }),
+        cameras: viewers,
         views: arguments.views,
         seen_gaussians: seen,
         memory_limit_bytes: limits.memory,
@@ -148,8 +169,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// How many Gaussians so many training views show.
-fn count_seen(gaussians: &Gaussians, views: u32) -> Result<usize> {
-    let sampler = ViewSampler::new(gaussians, 0)?;
+fn count_seen(gaussians: &Gaussians, sampler: &ViewSampler, views: u32) -> Result<usize> {
     let mut seen = vec![false; gaussians.len()];
     for index in 0..u64::from(views) {
         let camera = sampler.camera(Split::Training, index, SIDE);
@@ -193,6 +213,15 @@ fn tell(report: &Report) {
             );
         }
         None => line("extent", "none: there is nothing to see or mark".into()),
+    }
+    if let Some(cameras) = &report.cameras {
+        let near = cameras.clearance.map_or_else(String::new, |distance| {
+            format!("; views come no nearer than {distance:.3} to what is opaque")
+        });
+        line(
+            "cameras",
+            format!("{} to train at, {} held out{near}", cameras.training, cameras.held_out),
+        );
     }
     if let (Some(views), Some(seen)) = (report.views, report.seen_gaussians) {
         let share = 100.0 * seen as f64 / report.gaussians.max(1) as f64;

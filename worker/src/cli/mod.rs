@@ -1,4 +1,5 @@
 //! The command line: what there is to say, and what the process exits with.
+mod cameras;
 mod display;
 mod embed;
 mod evaluate;
@@ -66,6 +67,8 @@ enum Command {
     Render(render::Arguments),
     /// Tells what a scene file holds, and whether marking it fits in memory
     Inspect(inspect::Arguments),
+    /// Turns cameras of one kind into another, such as those of COLMAP into a file for the service
+    Cameras(cameras::Arguments),
     /// Makes a small scene to try things with
     Sample(sample::Arguments),
     /// Weights of other CLIP models and of LPIPS
@@ -165,6 +168,7 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Inspect(arguments) => inspect::run(&arguments)?,
         Command::Evaluate(arguments) => evaluate::run(&arguments)?,
+        Command::Cameras(arguments) => cameras::run(&arguments)?,
         Command::Sample(arguments) => sample::run(&arguments)?,
         Command::Models(command) => models::run(command)?,
         Command::Run(arguments) => run::run(arguments),
@@ -222,7 +226,8 @@ mod tests {
             "embed IN OUT --key K --message 0123abcd --force --report R --ignore-bad-rows",
             "verify A B C --key K --message 0123abcd --json --memory 1 --ignore-bad-rows",
             "render IN DIR --ignore-bad-rows --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
-            "inspect SCENE --json --memory 7 --views 16 --ignore-bad-rows",
+            "inspect SCENE --json --cameras F --memory 7 --views 16 --ignore-bad-rows",
+            "cameras colmap/sparse/0 cameras.json",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
             "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",
             "models list",

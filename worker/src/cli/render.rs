@@ -40,7 +40,7 @@ pub struct Arguments {
     /// How many views; with --cameras, its first ones, all unless given
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), required_unless_present = "cameras")]
     views: Option<u32>,
-    /// Cameras from a file (cameras.json or transforms.json) instead of ones spread around the scene
+    /// Cameras from a file (cameras.json or transforms.json) or a folder of COLMAP instead of ones spread around the scene
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
     /// Side in pixels, 512 unless given; for cameras from a file, their longer side, as in the file unless given

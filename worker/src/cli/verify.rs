@@ -42,7 +42,7 @@ pub struct Arguments {
     /// What is behind a scene, or shows through transparent pixels
     #[arg(long, value_enum, default_value = "white")]
     background: Background,
-    /// Where a scene's viewers are, from a file (cameras.json or transforms.json), as `embed` was told; around it unless given
+    /// Where a scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP, as `embed` was told; around it unless given
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
     /// Decides the views of a scene

@@ -136,6 +136,10 @@ fn renamed(error: EngineError, known_as: &[(PathBuf, String)]) -> EngineError {
             path: name(path),
             reason,
         },
+        EngineError::BadCameras { path, reason } => EngineError::BadCameras {
+            path: name(path),
+            reason,
+        },
         EngineError::Io { path, source } => EngineError::Io {
             path: name(path),
             source,

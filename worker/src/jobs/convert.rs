@@ -1,4 +1,5 @@
 //! Between the API's messages and the engine's types.
+use std::path::Path;
 use std::time::Duration;
 
 use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
@@ -10,6 +11,7 @@ use guardsplat_engine::message::Key;
 use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::scene::{BadRows, Ignored};
+use guardsplat_engine::view::{Camera, read_cameras};
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::progress::Stage;
@@ -69,7 +71,12 @@ fn robust_to(numbers: &[i32]) -> Result<RobustTo> {
     numbers.iter().map(kind).collect()
 }
 
-/// The views that a verification asks for.
+/// Cameras of a file that was fetched; none without one.
+pub fn cameras(file: Option<&Path>) -> Result<Vec<Camera>> {
+    Ok(file.map(read_cameras).transpose()?.unwrap_or_default())
+}
+
+/// The views that a verification asks for, without its cameras.
 pub fn views(spec: &api::VerifySpec) -> Result<Views> {
     let within = |field: &str, value: u32, low: u32, high: u32| match value {
         0 => Ok(None),
@@ -240,9 +247,10 @@ pub fn failure(error: &Error) -> (api::Failure, bool) {
         Error::BadJob(_) => (Reason::InvalidInput, false),
         Error::Panicked(_) | Error::Stuck(_) => (Reason::Internal, true),
         Error::Engine(error) => match error {
-            EngineError::BadScene { .. } | EngineError::BadPicture { .. } | EngineError::BadOption { .. } => {
-                (Reason::InvalidInput, false)
-            }
+            EngineError::BadScene { .. }
+            | EngineError::BadPicture { .. }
+            | EngineError::BadCameras { .. }
+            | EngineError::BadOption { .. } => (Reason::InvalidInput, false),
             // Another worker may have more memory, but nothing says that one is there.
             EngineError::DoesNotFit { .. } => (Reason::InvalidInput, false),
             EngineError::Device { .. } => (Reason::WorkerLost, true),

@@ -34,7 +34,11 @@ struct Marked {
 /// Fetches scene and key, marks, stores the marked scene and a picture of what changed.
 pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Finished> {
     let settings = convert::settings(spec)?;
-    let input = attempt.download(&[&spec.scene]).await?.swap_remove(0);
+    let cameras_file = Some(spec.cameras.as_str()).filter(|name| !name.is_empty());
+    let names: Vec<&str> = std::iter::once(spec.scene.as_str()).chain(cameras_file).collect();
+    let mut inputs = attempt.download(&names).await?;
+    let cameras_file = cameras_file.and_then(|_| inputs.pop());
+    let input = inputs.swap_remove(0);
     let key_file = attempt.download_key().await?;
     // Its format, and so its name, is known when it is there.
     let output = attempt.folder.join("marked");
@@ -49,6 +53,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         let message = key.message(&message)?;
+        let cameras = convert::cameras(cameras_file.as_deref())?;
         let device = cache.device().to_owned();
         let engine = cache.engine(&name, &key, rate, stop)?;
         let job = Job {
@@ -56,7 +61,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
             output: &output,
             message: &message,
             settings: &settings,
-            cameras: &[],
+            cameras: &cameras,
             force,
             bad_rows,
         };

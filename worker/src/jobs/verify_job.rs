@@ -25,21 +25,25 @@ struct Verified {
 
 /// Fetches suspects and key, reads and compares.
 pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<Outcome> {
-    let views = convert::views(spec)?;
+    let mut views = convert::views(spec)?;
     if spec.suspects.is_empty() || spec.suspects.len() > MAX_PICTURES {
         let count = spec.suspects.len();
         return Err(Error::BadJob(format!(
             "suspects: {count} are outside 1 to {MAX_PICTURES}"
         )));
     }
-    let names: Vec<&str> = spec.suspects.iter().map(String::as_str).collect();
-    let paths = attempt.download(&names).await?;
+    let cameras_file = Some(spec.cameras.as_str()).filter(|name| !name.is_empty());
+    let suspects = spec.suspects.iter().map(String::as_str);
+    let names: Vec<&str> = suspects.chain(cameras_file).collect();
+    let mut paths = attempt.download(&names).await?;
+    let cameras_file = cameras_file.and_then(|_| paths.pop());
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
     let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
     let rate = attempt.lease.false_positive_rate;
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
+        views.cameras = convert::cameras(cameras_file.as_deref())?;
         let source = find_source(&paths)?;
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);

@@ -132,7 +132,7 @@ impl<'a> Run<'a> {
         settings: &'a Settings,
         sampler: ViewSampler,
     ) -> Result<(Self, Coverage)> {
-        let among_cameras = sampler.is_among_cameras();
+        let among_cameras = sampler.given().is_some();
         let mut pool = ViewPool::new(sampler, settings);
         let coverage = pool.cover(engine, &scene.gaussians)?;
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());

@@ -5,6 +5,7 @@
 //! object with `frames`, each a `transform_matrix` whose camera axes are those of OpenGL (x right, y up, z backward),
 //! and intrinsics for all frames or one: `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`.
 use super::camera::Camera;
+use super::colmap;
 use super::json::{self, Fields, Length, List, Outline, Scalar};
 use super::vector::{cross, dot};
 use crate::error::{Error, Result};
@@ -22,7 +23,7 @@ const MAX_SIDE: f64 = 16384.0;
 /// Side of a picture of the NeRF synthetic set, whose files do not state it.
 const BLENDER_SIDE: f64 = 800.0;
 
-/// Reads cameras of either kind, told apart by their contents.
+/// Reads cameras of either kind, told apart by their contents; of a folder, those of a COLMAP model.
 ///
 /// Principal points that are not stated are the centre; sizes that a `transforms.json` does not state are 800 by 800,
 /// those of the NeRF synthetic set.
@@ -32,6 +33,9 @@ const BLENDER_SIDE: f64 = 800.0;
 /// camera in it, a field missing or not a finite number, a side outside 1 to 16384, a focal length not above zero, a
 /// rotation that is none (unequal or skewed axes, a mirror).
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>> {
+    if path.is_dir() {
+        return colmap::read(path);
+    }
     let bad = |reason: String| Error::BadCameras {
         path: path.into(),
         reason,
@@ -106,7 +110,7 @@ fn from_entry(own: &Fields) -> Result<Camera, String> {
     let axes = std::array::from_fn(|k| [rows[0][k], rows[1][k], rows[2][k]]);
     let size = [need(&own.width, "width")?, need(&own.height, "height")?];
     let principal = [number(&own.cx, "cx")?, number(&own.cy, "cy")?];
-    build(
+    assemble(
         axes,
         position,
         [need(&own.fx, "fx")?, need(&own.fy, "fy")?],
@@ -133,11 +137,11 @@ fn from_frame(own: &Fields, shared: &Fields) -> Result<Camera, String> {
         .or(from_angle(find(|f| &f.camera_angle_y, "camera_angle_y")?, height))
         .unwrap_or(fx);
     let principal = [find(|f| &f.cx, "cx")?, find(|f| &f.cy, "cy")?];
-    build(axes, position, [fx, fy], principal, [width, height])
+    assemble(axes, position, [fx, fy], principal, [width, height])
 }
 
 /// Checks and assembles: `axes` are the camera's x, y and z in the world.
-fn build(
+pub(super) fn assemble(
     axes: [[f64; 3]; 3],
     position: [f64; 3],
     focal: [f64; 2],

@@ -81,6 +81,21 @@ impl GivenViews {
         Ok(given)
     }
 
+    /// Cameras that training views are around.
+    pub fn training_cameras(&self) -> usize {
+        self.training.len()
+    }
+
+    /// Cameras that are held out.
+    pub fn held_out_cameras(&self) -> usize {
+        self.held_out.len()
+    }
+
+    /// How near a training view comes to the centre of an opaque Gaussian at least; infinity where there is none.
+    pub fn clearance(&self) -> f32 {
+        self.clearance
+    }
+
     /// A training view, `size` by `size` pixels.
     pub(super) fn training(&self, index: u64, size: u32, random: &mut impl Rng) -> Camera {
         let own = (index % self.training.len() as u64) as usize;

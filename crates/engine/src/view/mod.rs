@@ -1,5 +1,6 @@
 //! Views: cameras from the scene itself or from a file.
 mod camera;
+mod colmap;
 mod extent;
 mod files;
 mod given;

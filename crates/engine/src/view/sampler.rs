@@ -104,9 +104,9 @@ impl ViewSampler {
         self.ring = Some(elevation);
     }
 
-    /// Whether views are around cameras that were given.
-    pub fn is_among_cameras(&self) -> bool {
-        self.given.is_some()
+    /// The cameras that views are around, where such were given.
+    pub fn given(&self) -> Option<&GivenViews> {
+        self.given.as_deref()
     }
 
     /// Where and how large the scene is.

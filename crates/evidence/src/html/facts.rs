@@ -38,6 +38,7 @@ fn role(role: Role) -> &'static str {
         Role::Suspect => "suspect",
         Role::Original => "original",
         Role::Marked => "marked scene",
+        Role::Cameras => "cameras",
     }
 }
 

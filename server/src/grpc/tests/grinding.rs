@@ -162,6 +162,13 @@ async fn every_reading_of_a_file_is_paid_for() {
     // Another file has not been read; what had been read with the key is told.
     let (result, history) = claimed_of(&bench, b"another", first(), read()).await;
     assert_eq!((paid(&result), history.readings_of_key), ((1, Some(3)), 4));
+    // From other places it is another reading; from the same ones, sent again, the same.
+    for name in ["cameras.json", "again.json"] {
+        let cameras = bench.server.upload(name, b"[]").await.name;
+        let spec = VerifySpec { cameras, ..first() };
+        let (result, history) = claimed_of(&bench, b"a scene", spec, read()).await;
+        assert_eq!((paid(&result), history.readings_of_key), ((4, Some(12)), 5));
+    }
     // A reading of several files pays for those of each.
     let mut suspects = Vec::new();
     for bytes in [&b"a scene"[..], b"another"] {
@@ -169,7 +176,7 @@ async fn every_reading_of_a_file_is_paid_for() {
     }
     let spec = VerifySpec { suspects, ..first() };
     let (result, _) = bench.claimed(spec, vec![framed(0, read())]).await;
-    assert_eq!(paid(&result), (5, Some(15)));
+    assert_eq!(paid(&result), (6, Some(18)));
 }
 
 /// A claim pays for all assets of the key, so whoever marks is held to as much.

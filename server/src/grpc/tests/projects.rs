@@ -206,6 +206,13 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
                 (verify_spec(&own.artifact, &other.key), &other.key),
                 (
                     verify(VerifySpec {
+                        cameras: other.artifact.clone(),
+                        ..VerifySpec::default()
+                    }),
+                    &other.artifact,
+                ),
+                (
+                    verify(VerifySpec {
                         asset: other.asset.clone(),
                         ..VerifySpec::default()
                     }),

@@ -55,6 +55,8 @@ async fn every_wrong_field_is_named() {
         (embed(|s| s.key = "keys/mine".into()), "job.embed.key"),
         (embed(|s| s.message.clear()), "job.embed.message"),
         (embed(|s| s.preset = 17), "job.embed.preset"),
+        (embed(|s| s.cameras = "cameras.json".into()), "job.embed.cameras"),
+        (verify(|s| s.cameras = s.key.clone()), "job.verify.cameras"),
         (embed(|s| s.robust_to = vec![6, 0]), "job.embed.robust_to[1]"),
         (embed(|s| s.robust_to = vec![6, 13, 6]), "job.embed.robust_to[2]"),
         (embed(|s| s.size = 15), "job.embed.size"),
@@ -277,6 +279,18 @@ async fn a_request_with_the_same_bytes_is_the_same_request() {
         let again = submit(verify(wrong.map(String::as_str)), &pictures).await;
         refused(again, Code::AlreadyExists, "REQUEST_ID_REUSED");
     }
+    // Cameras are no suspect.
+    let seen = Spec::Verify(VerifySpec {
+        suspects: vec![first.clone()],
+        key: key.clone(),
+        cameras: other.clone(),
+        ..Default::default()
+    });
+    refused(
+        submit(of(seen), &pictures).await,
+        Code::AlreadyExists,
+        "REQUEST_ID_REUSED",
+    );
     // What is gone is known by its name, and nothing else is taken for it.
     server
         .jobs

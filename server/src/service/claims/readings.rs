@@ -1,9 +1,9 @@
 //! Which reading of a suspect a job makes, and what there was before it: whoever has one suspect read again and again, with
-//! other views or other keys, pays for each.
+//! other views, cameras or keys, pays for each.
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::ledger::{JobRow, JobSpec, KeyRow, NewReading, ReadBefore};
+use crate::ledger::{ArtifactRow, JobRow, JobSpec, KeyRow, NewReading, ReadBefore};
 use crate::service::names::ResourceKind;
 use crate::service::{Service, clock};
 
@@ -19,9 +19,7 @@ impl Service {
         };
         let mut files = Vec::with_capacity(spec.suspects.len());
         for name in &spec.suspects {
-            let id = ResourceKind::Artifact.parse("job.verify.suspects", name)?;
-            let row = self.ledger().get_any_artifact(id).await?;
-            let row = row.ok_or_else(|| ResourceKind::Artifact.not_found(id))?;
+            let row = self.file("job.verify.suspects", name).await?;
             files.push((row.sha256, row.create_time));
         }
         files.sort();
@@ -36,6 +34,11 @@ impl Service {
         hash.update([spec.ignore_bad_rows.into()]);
         // Each has 64 digits, so no two lists give the same bytes.
         files.iter().for_each(|(sha256, _)| hash.update(sha256.as_bytes()));
+        if !spec.cameras.is_empty() {
+            let cameras = self.file("job.verify.cameras", &spec.cameras).await?;
+            hash.update(b"cameras\0");
+            hash.update(cameras.sha256.as_bytes());
+        }
         let id = hash.finalize().into();
         let new = NewReading {
             id,
@@ -46,5 +49,11 @@ impl Service {
         self.ledger().note_reading(new, clock::now()).await?;
         let before = self.ledger().before(id).await?;
         before.ok_or_else(|| failed("the ledger has none of its files"))
+    }
+
+    async fn file(&self, field: &str, name: &str) -> Result<ArtifactRow> {
+        let id = ResourceKind::Artifact.parse(field, name)?;
+        let row = self.ledger().get_any_artifact(id).await?;
+        row.ok_or_else(|| ResourceKind::Artifact.not_found(id))
     }
 }

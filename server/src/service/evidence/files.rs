@@ -27,6 +27,7 @@ impl Files {
         for name in &spec.suspects {
             inputs.push(input(api, "job.verify.suspects", name, Role::Suspect).await?);
         }
+        inputs.extend(cameras(api, "job.verify.cameras", &spec.cameras).await?);
         Ok(Self { inputs })
     }
 
@@ -37,9 +38,18 @@ impl Files {
         };
         let original = input(api, "job.embed.scene", &spec.scene, Role::Original).await?;
         let marked = input(api, "embed_result.scene", &result.scene, Role::Marked).await?;
+        let cameras = cameras(api, "job.embed.cameras", &spec.cameras).await?;
         Ok(Self {
-            inputs: vec![original, marked],
+            inputs: [original, marked].into_iter().chain(cameras).collect(),
         })
+    }
+}
+
+/// Where a job was told that viewers are.
+async fn cameras(api: &Service, field: &str, name: &str) -> Result<Option<Input>> {
+    match name {
+        "" => Ok(None),
+        name => input(api, field, name, Role::Cameras).await.map(Some),
     }
 }
 
