@@ -83,6 +83,7 @@ mod tests {
                         name: place.to_string(),
                         views: 1,
                         logits: if place == 0 { logits.clone() } else { vec![0.0; 64] },
+                        tries: count,
                     })
                     .collect();
                 let claim = Claim {

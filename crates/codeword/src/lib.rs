@@ -17,6 +17,7 @@ mod limits;
 mod message;
 mod reading;
 mod search;
+mod shares;
 mod whiten;
 
 /// The code that assets are marked with: 2 bits of version, 10 of the key and 24 of the payload number in 64.
@@ -32,4 +33,5 @@ pub use limits::{MAX_BITS, VERSION};
 pub use message::{Message, MessageLength};
 pub use reading::Reading;
 pub use search::{Hit, Index};
+pub use shares::shares;
 pub use whiten::{Mark, NONCE_BYTES, Whitening, mark};

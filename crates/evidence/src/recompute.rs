@@ -33,7 +33,16 @@ impl Evidence {
 impl Verification {
     fn recompute(&self, findings: &mut Vec<Finding>) {
         let Some(decision) = &self.decision else { return };
-        findings.push(Finding::of("hypotheses", decision.hypotheses, self.tried.hypotheses()));
+        let payable = self.tried.parts().into_iter().map(|tries| self.tried.hypotheses(tries));
+        let payable: Vec<u64> = payable.collect();
+        let paid = payable.iter().find(|hypotheses| **hypotheses == decision.hypotheses);
+        let paid = *paid.or(payable.first()).unwrap_or(&1);
+        findings.push(Finding::of("hypotheses", decision.hypotheses, paid));
+        findings.push(Finding::of(
+            "no more tried than the rate pays for",
+            true,
+            self.tried.rate_given() <= 1.0 + 1e-9,
+        ));
         let fresh = Decision::new(
             decision.bits,
             decision.matched,

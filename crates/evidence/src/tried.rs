@@ -39,6 +39,10 @@ pub struct HypothesisGroup {
     /// Whether these were pooled with the others into one reading, which is then decided once. Otherwise each is an
     /// attempt of its own, and paid for.
     pub pooled: bool,
+    /// Of how many equal parts of the rate each variant has one, so that it pays as one of so many hypotheses; absent in
+    /// reports before version 3, where all readings paid alike, and where they were pooled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tries: Option<u64>,
 }
 
 /// What was done to a picture before it was read.
@@ -57,6 +61,9 @@ pub enum HypothesisKind {
     Scaling,
     /// Brightness, gamma, contrast or saturation changed back.
     Tone,
+    /// What was done to tones, and which part shows the scene, estimated from the picture and the key alone. Not before
+    /// version 3.
+    Estimated,
 }
 
 impl Tried {
@@ -67,6 +74,7 @@ impl Tried {
                 kind: HypothesisKind::AsGiven,
                 variants: 1,
                 pooled: false,
+                tries: Some(1),
             }],
             owners: 1,
             assets: 1,
@@ -86,10 +94,28 @@ impl Tried {
         self.assets.max(all).max(1)
     }
 
-    /// Hypotheses that are paid for: each reading against each asset, as often as the suspect was read.
-    pub fn hypotheses(&self) -> u64 {
+    /// Hypotheses that a reading with one of `tries` parts of the rate pays for: as many, against each asset, as often as
+    /// the suspect was read.
+    pub fn hypotheses(&self, tries: u64) -> u64 {
         let times = self.paid.map_or(1, |paid| paid.readings.max(1));
-        self.readings().saturating_mul(self.assets_paid()).saturating_mul(times)
+        tries.saturating_mul(self.assets_paid()).saturating_mul(times)
+    }
+
+    /// The parts of the rate that a reading may have one of. Before version 3 there were as many as readings.
+    pub fn parts(&self) -> Vec<u64> {
+        let apart = self.framings.iter().filter(|group| !group.pooled);
+        let parts: Vec<u64> = apart.filter_map(|group| group.tries).collect();
+        match parts.is_empty() {
+            true => vec![self.readings()],
+            false => parts,
+        }
+    }
+
+    /// How much of the rate all readings have together: 1 at most, or too much was tried.
+    pub fn rate_given(&self) -> f64 {
+        let apart = self.framings.iter().filter(|group| !group.pooled);
+        let parts = apart.filter_map(|group| Some(f64::from(group.variants) / group.tries? as f64));
+        parts.sum()
     }
 }
 
@@ -99,8 +125,13 @@ mod tests {
 
     #[test]
     fn every_attempt_counts_and_pooled_ones_do_not() {
-        assert_eq!(Tried::once().hypotheses(), 1);
-        let framing = |kind, variants, pooled| HypothesisGroup { kind, variants, pooled };
+        assert_eq!((Tried::once().parts(), Tried::once().hypotheses(1)), (vec![1], 1));
+        let framing = |kind, variants, pooled| HypothesisGroup {
+            kind,
+            variants,
+            pooled,
+            tries: None,
+        };
         let tried = Tried {
             framings: vec![
                 framing(HypothesisKind::AsGiven, 1, false),
@@ -111,7 +142,8 @@ mod tests {
             assets: 10,
             paid: None,
         };
-        assert_eq!(tried.hypotheses(), 40);
+        // As before version 3.
+        assert_eq!((tried.parts(), tried.hypotheses(4)), (vec![4], 40));
         // One asset that was named out of a thousand, in the third reading of the suspect.
         let named = Tried {
             assets: 1,
@@ -121,11 +153,32 @@ mod tests {
             }),
             ..tried.clone()
         };
-        assert_eq!(named.hypotheses(), 4 * 1000 * 3);
+        assert_eq!(named.hypotheses(4), 4 * 1000 * 3);
         let endless = Tried {
             assets: u64::MAX,
             ..tried
         };
-        assert_eq!(endless.hypotheses(), u64::MAX);
+        assert_eq!(endless.hypotheses(2), u64::MAX);
+    }
+
+    #[test]
+    fn shares_are_no_more_than_the_rate() {
+        let group = |kind, variants, tries| HypothesisGroup {
+            kind,
+            variants,
+            pooled: false,
+            tries: Some(tries),
+        };
+        let mut tried = Tried {
+            framings: vec![
+                group(HypothesisKind::AsGiven, 1, 2),
+                group(HypothesisKind::Estimated, 1, 4),
+                group(HypothesisKind::Tone, 50, 200),
+            ],
+            ..Tried::once()
+        };
+        assert_eq!((tried.parts(), tried.rate_given()), (vec![2, 4, 200], 1.0));
+        tried.framings[2].variants = 51;
+        assert!(tried.rate_given() > 1.0);
     }
 }

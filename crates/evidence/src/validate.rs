@@ -3,9 +3,10 @@
 //! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
 use crate::embedding::Embedding;
 use crate::error::{Error, Result};
-use crate::evidence::{Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
+use crate::evidence::{ALIKE_VERSION, Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
 use crate::history::History;
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
+use crate::tried::{HypothesisKind, Tried};
 use crate::verification::{Decision, Reason, Verification};
 use guardsplat_codeword::Verdict;
 
@@ -48,6 +49,8 @@ impl Evidence {
             }
         }
         self.validate_version()?;
+        let mut tried = self.verification.iter().map(|found| &found.tried);
+        tried.try_for_each(|tried| self.validate_shares(tried))?;
         self.verification.iter().try_for_each(Verification::validate)?;
         self.embedding.iter().try_for_each(Embedding::validate)?;
         self.validate_views()
@@ -87,6 +90,24 @@ impl Evidence {
             Some((field, _)) => Err(Error::field(field, "version 1 has no such thing")),
             None => Ok(()),
         }
+    }
+
+    /// Whether it says what each reading paid for, since version 3, where not all pay alike.
+    fn validate_shares(&self, tried: &Tried) -> Result<()> {
+        let field = || "verification.tried.framings".to_owned();
+        let shared = self.version > ALIKE_VERSION;
+        for group in &tried.framings {
+            let reason = match (group.tries, group.pooled) {
+                (Some(0), _) => "a part of the rate is one of at least one",
+                (Some(_), _) if !shared => "readings share the rate since version 3",
+                (Some(_), true) => "what was pooled has no part of the rate",
+                (None, false) if shared => "each reading has a part of the rate since version 3",
+                _ if group.kind == HypothesisKind::Estimated && !shared => "an estimate is told since version 3",
+                _ => continue,
+            };
+            return Err(Error::field(field(), reason));
+        }
+        Ok(())
     }
 
     fn validate_views(&self) -> Result<()> {

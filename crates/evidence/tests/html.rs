@@ -133,7 +133,7 @@ fn the_verdict_comes_first_and_says_how_sure_it_is() {
         verdict.contains("Owner Atelier Morgenrot, asset Garden statue, payload c0ffee42c0ffee42."),
         "{verdict}"
     );
-    // P(Bin(64, 1/2) ≥ 62) = 2081/2⁶⁴ = 1.128e-16, 5 readings times 10 assets: 5.64e-15.
+    // P(Bin(64, 1/2) ≥ 62) = 2081/2⁶⁴ = 1.128e-16, half of the rate, times 10 assets: 2.26e-15.
     assert!(
         verdict.contains("62 of 64 bits agree, read from 20 views."),
         "{verdict}"
@@ -144,15 +144,15 @@ fn the_verdict_comes_first_and_says_how_sure_it_is() {
     );
     let readings = text(&found, ".reading");
     assert!(
-        readings.contains("less than one in a hundred trillion cases, with all 50 attempts"),
+        readings.contains("less than one in a hundred trillion cases, with all 20 attempts"),
         "{readings}"
     );
     assert!(readings.contains("X ~ Binomial(64, ½)"), "{readings}");
     assert!(readings.contains("pad is secret and uniform"), "{readings}");
-    assert!(readings.contains("p = 5.64 · 10−15"), "{readings}");
+    assert!(readings.contains("p = 2.26 · 10−15"), "{readings}");
     let numbers = text(&found, "table.facts");
     assert!(numbers.contains("Threshold in bits54 of 64"), "{numbers}");
-    assert!(text(&found, "section p").contains("5 × 10 × 1 = 50 hypotheses"));
+    assert!(text(&found, "section p").contains("2 × 10 × 1 = 20 hypotheses"));
     assert_eq!(all(&found, "rect.cell").len(), 64);
     assert_eq!(all(&found, "rect.differs").len(), 2);
     assert_eq!(all(&found, "path.cross").len(), 2, "seen without colour");

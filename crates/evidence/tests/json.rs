@@ -3,7 +3,9 @@
 #[path = "../examples/samples/mod.rs"]
 mod samples;
 
-use guardsplat_evidence::{Answer, Error, Evidence, Signed, check, limits, sign};
+use guardsplat_evidence::{
+    Answer, Decision, Error, Evidence, HypothesisGroup, HypothesisKind, Signed, check, limits, sign,
+};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -44,7 +46,7 @@ fn the_order_of_fields_is_fixed() {
     let json = samples::matching().to_json().unwrap();
     assert!(
         json.starts_with(
-            "{\"schema\":\"guardsplat.evidence\",\"version\":2,\"audience\":\"owner\",\"kind\":\"verify\""
+            "{\"schema\":\"guardsplat.evidence\",\"version\":3,\"audience\":\"owner\",\"kind\":\"verify\""
         )
     );
     let place = |field: &str| json.rfind(&format!("\"{field}\":")).unwrap();
@@ -111,14 +113,14 @@ proptest! {
 #[test]
 fn another_version_is_named_before_its_fields_are_looked_at() {
     let json = samples::matching().to_json().unwrap();
-    let newer = json.replace("\"version\":2,", "\"version\":3,\"something\":{\"new\":[1,2]},");
+    let newer = json.replace("\"version\":3,", "\"version\":4,\"something\":{\"new\":[1,2]},");
     let error = Evidence::from_json(newer.as_bytes()).unwrap_err();
-    assert!(matches!(error, Error::UnknownVersion { found: 3, known: 2 }), "{error}");
-    assert!(error.to_string().contains("version 3"), "{error}");
+    assert!(matches!(error, Error::UnknownVersion { found: 4, known: 3 }), "{error}");
+    assert!(error.to_string().contains("version 4"), "{error}");
     let signed = sign(&samples::matching(), &samples::key())
         .unwrap()
         .json
-        .replace("\"version\":2", "\"version\":7");
+        .replace("\"version\":3", "\"version\":7");
     let error = Evidence::from_json(signed.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 7, .. }), "{error}");
 }
@@ -238,6 +240,51 @@ fn what_was_signed_before_is_genuine_still() {
         let read = evidence.verification.as_ref().unwrap();
         assert_eq!((read.tried.paid, read.history.as_ref()), (None, None), "{name}");
     }
+}
+
+/// A report as version 2 had it: five readings that pay alike for ten assets.
+fn of_version_2() -> Evidence {
+    let mut evidence = samples::matching();
+    evidence.version = 2;
+    let verification = evidence.verification.as_mut().unwrap();
+    let framings = &mut verification.tried.framings;
+    framings.retain(|group| group.kind != HypothesisKind::Estimated);
+    framings.iter_mut().for_each(|group| group.tries = None);
+    let decision = verification.decision.as_mut().unwrap();
+    *decision = Decision::new(64, 62, Some(2), 5 * 10, decision.threshold);
+    evidence
+}
+
+#[test]
+fn readings_of_version_2_pay_alike() {
+    let signed = sign(&of_version_2(), &samples::key()).unwrap();
+    let checked = check(signed.json.as_bytes(), &samples::key().verifying_key());
+    assert!(
+        matches!(checked.answer, Answer::Genuine) && checked.holds(),
+        "{:#?}",
+        checked.findings
+    );
+    let refused = |change: fn(&mut HypothesisGroup), evidence: &Evidence| {
+        let mut evidence = evidence.clone();
+        let framings = &mut evidence.verification.as_mut().unwrap().tried.framings;
+        change(&mut framings[0]);
+        matches!(evidence.to_json(), Err(Error::BadField { field, .. }) if field == "verification.tried.framings")
+    };
+    assert!(refused(|group| group.tries = Some(5), &of_version_2()));
+    assert!(refused(|group| group.kind = HypothesisKind::Estimated, &of_version_2()));
+    assert!(refused(|group| group.tries = None, &samples::matching()));
+    assert!(refused(|group| group.tries = Some(0), &samples::matching()));
+    assert!(refused(|group| group.pooled = true, &samples::matching()));
+}
+
+#[test]
+fn more_than_the_rate_is_not_given() {
+    let mut evidence = samples::matching();
+    let verification = evidence.verification.as_mut().unwrap();
+    verification.tried.framings[1].variants = 2;
+    let wrong: Vec<_> = evidence.recompute().into_iter().filter(|f| !f.agrees).collect();
+    assert_eq!(wrong.len(), 1, "{wrong:?}");
+    assert!(wrong[0].what.contains("than the rate pays for"), "{wrong:?}");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! claim, and [`guardsplat_codeword::Claim`] decides once.
 use guardsplat_codeword::{
     Claim, Code, HypothesisReading, Message, NONCE_BYTES, Payload, ReadPayload, Reading, Scheme, Target, Whitening,
-    chance, mark,
+    chance, mark, shares,
 };
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::names::{NONE, SCENE, UNMARKED};
@@ -203,17 +203,19 @@ impl Suspect {
                 Self::AsGiven(_) => None,
             })
             .collect();
-        let reading = |logits: Vec<f32>| HypothesisReading {
+        let reading = |(logits, tries): (Vec<f32>, u64)| HypothesisReading {
             name: String::new(),
             views: views.len() as u32,
             logits,
+            tries,
         };
         if searched.is_empty() {
             let given = views.iter().map(|view| view.as_given().to_vec()).collect();
-            return Ok(vec![reading(PooledLogits::new(given)?.summed)]);
+            return Ok(vec![reading((PooledLogits::new(given)?.summed, 1))]);
         }
-        let read = hypotheses(engine, &searched)?;
-        Ok(read.into_iter().map(|(_, logits)| reading(logits.summed)).collect())
+        let (read, logits): (Vec<_>, Vec<_>) = hypotheses(engine, &searched)?.into_iter().unzip();
+        let logits = logits.into_iter().map(|logits| logits.summed);
+        Ok(logits.zip(shares(&read)).map(reading).collect())
     }
 }
 
@@ -303,6 +305,7 @@ mod tests {
             name: String::new(),
             views: 1,
             logits: logits.collect(),
+            tries: 1,
         }
     }
 
@@ -319,7 +322,7 @@ mod tests {
         let (one, read) = decide(&[reading(&word, 4)], &target, DEFAULT_FALSE_POSITIVE_RATE).unwrap();
         assert!(read && one < 1e-9, "{one}");
         let (two, _) = decide(
-            &[reading(&word, 32), reading(&word, 4)],
+            &[reading(&word, 32), reading(&word, 4)].map(|reading| HypothesisReading { tries: 2, ..reading }),
             &target,
             DEFAULT_FALSE_POSITIVE_RATE,
         )

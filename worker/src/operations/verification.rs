@@ -1,5 +1,5 @@
 //! What a verification finds: reads scenes and pictures, and says whether the message is there.
-use guardsplat_codeword::{Hypothesis, Message, Verdict};
+use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
     Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, estimates, hypotheses, read_scene,
@@ -162,8 +162,8 @@ pub struct Compared {
 }
 
 /// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read under every
-/// other hypothesis besides. Half of the rate of false positives is for pictures as they are, the other half for all others
-/// together, so that those who change nothing hardly pay for those who do.
+/// other hypothesis besides, and each pays by its share of the rate ([`shares`]): half is for pictures as they are, so that
+/// those who change nothing hardly pay for those who do.
 pub fn read_and_compare(
     engine: &Engine,
     source: &Source,
@@ -185,9 +185,10 @@ pub fn read_and_compare(
     let Some(message) = message else {
         return Ok(best);
     };
-    let halves = if source.pictures.is_empty() { 1 } else { 2 };
-    let as_given = best.reading.compare(message, &engine.acceptance_rule(halves))?;
-    let decided = halves == 1 || as_given.decision.verdict != Verdict::NoMatch;
+    // Without pictures there is nothing to guess. With them the first reading has what it would have among all.
+    let given = if source.pictures.is_empty() { 1 } else { 2 };
+    let as_given = best.reading.compare(message, &engine.acceptance_rule(given))?;
+    let decided = given == 1 || as_given.decision.verdict != Verdict::NoMatch;
     let mut p_value = as_given.decision.p_value;
     best.comparison = Some(as_given);
     if decided {
@@ -199,9 +200,9 @@ pub fn read_and_compare(
         ..
     } = read_hypotheses(engine, source, views, &mut shown, progress)?;
     (best.hypotheses, best.estimates) = (read.len(), estimates);
-    let rule = engine.acceptance_rule(halves * read.len().saturating_sub(1).max(1));
-    for (hypothesis, reading) in read.into_iter().skip(1) {
-        let comparison = reading.compare(message, &rule)?;
+    let tries = shares(&read.iter().map(|(hypothesis, _)| *hypothesis).collect::<Vec<_>>());
+    for ((hypothesis, reading), tries) in read.into_iter().zip(tries).skip(1) {
+        let comparison = reading.compare(message, &engine.acceptance_rule(tries as usize))?;
         if comparison.decision.p_value < p_value {
             p_value = comparison.decision.p_value;
             (best.reading, best.hypothesis, best.comparison) = (reading, hypothesis, Some(comparison));

@@ -115,6 +115,7 @@ fn p_value(method: Method, decoder: &Decoder, rng: &mut ChaCha8Rng) -> f64 {
             name: String::new(),
             views: VIEWS as u32,
             logits,
+            tries: hypotheses as u64,
         });
     }
     if method == Method::ViewsAsTrials {

@@ -19,7 +19,7 @@ pub struct Answer {
     pub bits: u32,
     /// The threshold in bits: matches that the rate needs with so many hypotheses; `None` when no number would do.
     pub needed_bits: Option<u32>,
-    /// Hypotheses tried: readings times targets times other tries.
+    /// Hypotheses that the best reading pays for: its `tries` times targets times other tries.
     pub hypotheses: u64,
     /// The best hypothesis; `None` when nothing was compared.
     pub best: Option<Comparison>,
@@ -29,7 +29,7 @@ pub struct Answer {
     pub reason: Option<String>,
 }
 
-/// The reading and the target that agree best; of equal ones the first reading, then the first target.
+/// The reading and the target with the least p-value; of equal ones the first reading, then the first target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The reading's name: what was undone before.
@@ -45,7 +45,7 @@ pub struct Comparison {
     pub undecided_bits: u32,
     /// P(Bin(bits, 1/2) >= matched bits): the p-value if this were the only hypothesis.
     pub p_alone: f64,
-    /// The p-value: that, times the hypotheses tried, at most 1.
+    /// The p-value: that, times the hypotheses that this reading pays for, at most 1.
     pub p_value: f64,
 }
 

@@ -2,8 +2,9 @@
 //!
 //! Pictures are read under each [`Hypothesis`](crate::Hypothesis) about what was done to them (nothing, cropped, turned,
 //! mirrored …), and each gives one word, decided once from logits that were summed over views before. The best pair of a
-//! reading and a target is judged by the [`AcceptanceRule`], which counts all hypotheses: readings, targets, and whatever else the caller tried. Error correction reads the payload of
-//! a match afterwards, and never decides.
+//! reading and a target is judged by the [`AcceptanceRule`], which counts all hypotheses: targets, whatever else the caller
+//! tried, and readings, each by its share of the rate ([`shares`](crate::shares)). Error correction reads the payload of a
+//! match afterwards, and never decides.
 mod answer;
 mod read;
 #[cfg(test)]
@@ -27,6 +28,9 @@ pub struct HypothesisReading {
     pub views: u32,
     /// Logits, one a bit, summed over the views. 0 and NaN leave a bit undecided: see [`Reading`].
     pub logits: Vec<f32>,
+    /// Of how many equal parts of the rate this reading has one, at least 1: all readings of a claim together have no more
+    /// than the rate ([`shares`](crate::shares)).
+    pub tries: u64,
 }
 
 /// A registered word that the suspect may carry.
@@ -57,10 +61,24 @@ pub struct Claim<'a> {
     pub rate: f64,
 }
 
-/// The pair with the most matches, the first of equal ones.
+/// What a reading pays, and needs.
+struct Terms {
+    reading: Reading,
+    rule: AcceptanceRule,
+    needed: Option<u32>,
+}
+
+impl Terms {
+    /// Whether it could be a match, whatever the targets are.
+    fn can_match(&self) -> bool {
+        self.needed.is_some_and(|needed| self.reading.decided_bits() >= needed)
+    }
+}
+
+/// The pair with the least p-value, the first of equal ones.
 struct Winner<'a> {
     read: &'a HypothesisReading,
-    reading: Reading,
+    terms: &'a Terms,
     target: &'a Target,
     matched: u32,
 }
@@ -78,54 +96,56 @@ impl Claim<'_> {
     /// [`Error::Hypotheses`] for counts that contradict the lists or whose product is above 2^64 - 1.
     pub fn test(&self) -> Result<Tested> {
         chance::check_rate(self.rate)?;
-        let hypotheses = self.hypotheses()?;
-        let readings = self.decided()?;
+        let others = self.other_hypotheses()?;
+        let terms = self.terms(others)?;
         self.check_targets()?;
         let bits = self.scheme.length().bits();
-        let rule = AcceptanceRule {
+        // Of nothing that was read, what one reading would need is told.
+        let alone = AcceptanceRule {
             false_positive_rate: self.rate,
-            hypotheses,
+            hypotheses: others,
         };
-        let needed = rule.least_matches(bits)?;
         let mut answer = Answer {
             verdict: Verdict::Inconclusive,
             rate: self.rate,
             bits,
-            needed_bits: needed,
-            hypotheses,
+            needed_bits: alone.least_matches(bits)?,
+            hypotheses: others,
             best: None,
             payload: None,
             reason: None,
         };
+        let undecided = |answer| {
+            Ok(Tested {
+                answer,
+                confidences: None,
+            })
+        };
         if self.targets.is_empty() {
             answer.verdict = Verdict::UnknownKey;
             answer.reason = Some("no word is registered for the key that was named".into());
-            return Ok(Tested {
-                answer,
-                confidences: None,
-            });
+            return undecided(answer);
         }
-        let Some(winner) = self.winner(&readings)? else {
+        let Some(winner) = self.winner(&terms)? else {
             answer.reason = Some("no picture was read".into());
-            return Ok(Tested {
-                answer,
-                confidences: None,
-            });
+            return undecided(answer);
         };
+        let Terms { reading, rule, needed } = winner.terms;
+        (answer.needed_bits, answer.hypotheses) = (*needed, rule.hypotheses);
         answer.best = Some(Comparison {
             hypothesis: winner.read.name.clone(),
             views: winner.read.views,
             target: winner.target.id.clone(),
             matched_bits: winner.matched,
-            undecided_bits: winner.reading.undecided_bits(),
+            undecided_bits: reading.undecided_bits(),
             p_alone: chance::tail(bits, winner.matched)?,
             p_value: rule.p_value(bits, winner.matched)?,
         });
-        let decided = readings.iter().map(Reading::decided_bits).max().unwrap_or(0);
-        match needed {
-            None => answer.reason = Some(too_short(bits, hypotheses, self.rate)?),
-            Some(needed) if decided < needed => {
-                answer.reason = Some(too_few_decided(decided, bits, needed));
+        match *needed {
+            None => answer.reason = Some(too_short(bits, rule.hypotheses, self.rate)?),
+            Some(needed) if !terms.iter().any(Terms::can_match) => {
+                let decided = terms.iter().map(|terms| terms.reading.decided_bits()).max();
+                answer.reason = Some(too_few_decided(decided.unwrap_or(0), bits, needed));
             }
             Some(needed) if winner.matched >= needed => {
                 answer.verdict = Verdict::Match;
@@ -133,13 +153,12 @@ impl Claim<'_> {
             }
             Some(_) => answer.verdict = Verdict::NoMatch,
         }
-        let confidences = Some(Confidences::of(&winner.reading, &winner.read.logits));
+        let confidences = Some(Confidences::of(reading, &winner.read.logits));
         Ok(Tested { answer, confidences })
     }
 
-    /// Readings times targets times other tries. None of a kind counts as one, so that limits are told for nothing too.
-    fn hypotheses(&self) -> Result<u64> {
-        let bad = |field, reason: String| Error::Hypotheses { field, reason };
+    /// Targets times other tries. No targets count as one, so that limits are told for nothing too.
+    fn other_hypotheses(&self) -> Result<u64> {
         let given = self.targets.len() as u64;
         let targets = self.targets_tried.unwrap_or(given);
         if targets < given {
@@ -149,20 +168,34 @@ impl Claim<'_> {
         if self.other_tries == 0 {
             return Err(bad("other tries", "0 is below 1: this claim counts".into()));
         }
-        let readings = self.readings.len().max(1) as u64;
-        let product = readings
-            .checked_mul(targets.max(1))
-            .and_then(|n| n.checked_mul(self.other_tries));
-        product.ok_or_else(|| bad("hypotheses", "more than 2^64 - 1 were tried".into()))
+        let product = targets.max(1).checked_mul(self.other_tries);
+        product.ok_or_else(too_many)
     }
 
-    fn decided(&self) -> Result<Vec<Reading>> {
-        let read = |read: &HypothesisReading| {
+    /// What each reading pays.
+    fn terms(&self, others: u64) -> Result<Vec<Terms>> {
+        if let Some(read) = self.readings.iter().find(|read| read.tries == 0) {
+            return Err(bad("tries", format!("0 is below 1: reading {:?} counts", read.name)));
+        }
+        let parts: f64 = self.readings.iter().map(|read| 1.0 / read.tries as f64).sum();
+        if parts > 1.0 + 1e-9 {
+            return Err(bad(
+                "tries",
+                format!("the readings have {parts} times the rate together"),
+            ));
+        }
+        let bits = self.scheme.length().bits();
+        let terms = |read: &HypothesisReading| {
             let reading = Reading::from_logits(&read.logits)?;
             reading.require(&format!("reading {:?}", read.name), self.scheme.length())?;
-            Ok(reading)
+            let rule = AcceptanceRule {
+                false_positive_rate: self.rate,
+                hypotheses: read.tries.checked_mul(others).ok_or_else(too_many)?,
+            };
+            let needed = rule.least_matches(bits)?;
+            Ok(Terms { reading, rule, needed })
         };
-        self.readings.iter().map(read).collect()
+        self.readings.iter().map(terms).collect()
     }
 
     fn check_targets(&self) -> Result<()> {
@@ -176,24 +209,36 @@ impl Claim<'_> {
         Ok(())
     }
 
-    fn winner(&self, readings: &[Reading]) -> Result<Option<Winner<'_>>> {
-        let mut best: Option<Winner<'_>> = None;
-        for (read, reading) in self.readings.iter().zip(readings) {
+    fn winner<'a>(&'a self, terms: &'a [Terms]) -> Result<Option<Winner<'a>>> {
+        let bits = self.scheme.length().bits();
+        let mut best: Option<(Winner<'a>, (bool, f64))> = None;
+        for (read, terms) in self.readings.iter().zip(terms) {
             for target in self.targets {
-                let matched = reading.matches(&target.word)?;
-                if best.as_ref().is_none_or(|best| matched > best.matched) {
-                    let reading = *reading;
-                    best = Some(Winner {
+                let matched = terms.reading.matches(&target.word)?;
+                // What can't match whatever it reads comes last. Not cut at 1, so that of bad ones the better is told.
+                let p_value = chance::tail(bits, matched)? * terms.rule.hypotheses as f64;
+                let rank = (terms.needed.is_none(), p_value);
+                if best.as_ref().is_none_or(|(_, least)| rank < *least) {
+                    let winner = Winner {
                         read,
-                        reading,
+                        terms,
                         target,
                         matched,
-                    });
+                    };
+                    best = Some((winner, rank));
                 }
             }
         }
-        Ok(best)
+        Ok(best.map(|(winner, _)| winner))
     }
+}
+
+fn bad(field: &'static str, reason: String) -> Error {
+    Error::Hypotheses { field, reason }
+}
+
+fn too_many() -> Error {
+    bad("hypotheses", "more than 2^64 - 1 were tried".into())
 }
 
 fn too_short(bits: u32, hypotheses: u64, rate: f64) -> Result<String> {

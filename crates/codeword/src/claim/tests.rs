@@ -17,7 +17,15 @@ fn reading(name: &str, logits: Vec<f32>) -> HypothesisReading {
         name: name.into(),
         views: 4,
         logits,
+        tries: 1,
     }
+}
+
+/// Readings that share the rate alike.
+fn alike(mut readings: Vec<HypothesisReading>) -> Vec<HypothesisReading> {
+    let tries = readings.len() as u64;
+    readings.iter_mut().for_each(|read| read.tries = tries);
+    readings
 }
 
 /// Logits of a word, the first `wrong` of them on the wrong side and unsure.
@@ -88,10 +96,10 @@ fn a_short_key_is_inconclusive_and_says_what_it_can_reach() {
 #[test]
 fn all_hypotheses_count() {
     let word = Message::from_u64(0x0123_4567_89ab_cdef);
-    let readings = [
+    let readings = alike(vec![
         reading("as given", vec![-1.0; 64]),
         reading("mirrored", logits(&word, 13)),
-    ];
+    ]);
     let targets = [
         target("theirs", Message::from_u64(!0)),
         target("ours", word),
@@ -323,6 +331,84 @@ fn what_does_not_fit_together_is_an_error() {
     assert_eq!(text(many), "hypotheses: more than 2^64 - 1 were tried");
 }
 
+/// A reading with half of the rate needs fewer matches than one of many with the other half; the least p-value wins, not
+/// the most matches.
+#[test]
+fn readings_pay_by_their_shares() {
+    let word = Message::from_u64(0x0123_4567_89ab_cdef);
+    let targets = [target("ours", word)];
+    let with = |given: usize, guessed: usize| {
+        let guess = |i: usize| HypothesisReading {
+            tries: 2 * 500,
+            ..reading("guess", logits(&word, if i == 0 { guessed } else { 32 }))
+        };
+        let given = HypothesisReading {
+            tries: 2,
+            ..reading("as given", logits(&word, given))
+        };
+        let readings: Vec<_> = std::iter::once(given).chain((0..500).map(guess)).collect();
+        let answer = claim(raw(64), &readings, &targets).test().unwrap().answer;
+        let best = answer.best.unwrap();
+        (answer.verdict, best.hypothesis, answer.hypotheses, answer.needed_bits)
+    };
+    let (given, guess) = ("as given".to_owned(), "guess".to_owned());
+    assert_eq!(with(12, 12), (Verdict::Match, given.clone(), 2, Some(52)));
+    assert_eq!(with(13, 12), (Verdict::NoMatch, given, 2, Some(52)));
+    assert_eq!(with(32, 9), (Verdict::NoMatch, guess.clone(), 1000, Some(56)));
+    assert_eq!(with(32, 8), (Verdict::Match, guess, 1000, Some(56)));
+    // Together they have the rate, and not more.
+    let more = [reading("as given", vec![1.0; 64]), reading("again", vec![1.0; 64])];
+    let error = claim(raw(64), &more, &targets).test().unwrap_err().to_string();
+    assert_eq!(error, "tries: the readings have 2 times the rate together");
+    let mut none = more;
+    none[1].tries = 0;
+    assert!(claim(raw(64), &none, &targets).test().is_err());
+}
+
+/// Wrong claims have small p-values no more often than they may, whatever the shares, though readings depend on each other.
+#[test]
+fn shares_keep_wrong_claims_rare() {
+    let mut seed = 1_u64;
+    let mut word = || {
+        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        Message::from_u64(mixed ^ (mixed >> 31))
+    };
+    let shares = [2, 4, 12, 12, 12];
+    // Each reading differs from the first in a few bits: all are of one suspect.
+    let base = word();
+    let readings: Vec<_> = shares
+        .iter()
+        .enumerate()
+        .map(|(i, &tries)| HypothesisReading {
+            tries,
+            ..reading("any", logits(&base, 2 * i))
+        })
+        .collect();
+    let mut p_values: Vec<f64> = (0..20_000)
+        .map(|_| {
+            let targets = [target("theirs", word())];
+            claim(raw(64), &readings, &targets)
+                .test()
+                .unwrap()
+                .answer
+                .best
+                .unwrap()
+                .p_value
+        })
+        .collect();
+    p_values.sort_by(f64::total_cmp);
+    for rate in [0.3, 0.1, 0.03, 0.01] {
+        let share = p_values.partition_point(|p| *p <= rate) as f64 / 20_000.0;
+        assert!(
+            share <= rate + 3.0 * (rate / 20_000.0_f64).sqrt(),
+            "{share} of claims at {rate}"
+        );
+        assert!(share > 0.1 * rate, "{share} of claims at {rate}: nothing was tested");
+    }
+}
+
 #[test]
 fn answers_come_back_from_json_without_confidences() {
     let targets = [target("ours", Message::from_u64(0))];
@@ -347,6 +433,7 @@ proptest! {
     ) {
         let full = |mut logits: Vec<f32>| { if logits.len() > 3 { logits.resize(64, 0.5) }; logits };
         let readings: Vec<HypothesisReading> = readings.into_iter().map(|logits| reading("any", full(logits))).collect();
+        let readings = alike(readings);
         let targets: Vec<Target> = targets
             .into_iter()
             .map(|(word, pad)| Target { pad: pad.map(Message::from_u64), ..target("any", Message::from_u64(word)) })

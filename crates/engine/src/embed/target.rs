@@ -142,6 +142,7 @@ mod tests {
                     name: "as given".into(),
                     views: 1,
                     logits,
+                    tries: rule.hypotheses,
                 };
                 // Other hypotheses read nothing, and are paid for.
                 let none = HypothesisReading {

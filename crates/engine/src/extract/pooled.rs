@@ -223,6 +223,7 @@ mod tests {
                     name: "as given".into(),
                     views: 1,
                     logits,
+                    tries: 1,
                 }],
                 targets: &[Target {
                     id: "asset".into(),

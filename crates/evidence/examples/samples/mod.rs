@@ -31,14 +31,20 @@ pub fn all() -> Vec<(&'static str, Evidence)> {
 
 /// A match found by a search over ten assets in several framings.
 pub fn matching() -> Evidence {
-    let framing = |kind, variants, pooled| HypothesisGroup { kind, variants, pooled };
+    let framing = |kind, variants, tries: Option<u64>| HypothesisGroup {
+        kind,
+        variants,
+        pooled: tries.is_none(),
+        tries,
+    };
     let tried = Tried {
         framings: vec![
-            framing(HypothesisKind::AsGiven, 1, false),
-            framing(HypothesisKind::Crop, 5, true),
-            framing(HypothesisKind::QuarterTurn, 3, false),
-            framing(HypothesisKind::Mirrored, 1, false),
-            framing(HypothesisKind::Scaling, 2, true),
+            framing(HypothesisKind::AsGiven, 1, Some(2)),
+            framing(HypothesisKind::Estimated, 1, Some(4)),
+            framing(HypothesisKind::Crop, 5, None),
+            framing(HypothesisKind::QuarterTurn, 3, Some(16)),
+            framing(HypothesisKind::Mirrored, 1, Some(16)),
+            framing(HypothesisKind::Scaling, 2, None),
         ],
         owners: 2,
         assets: 10,
@@ -150,7 +156,13 @@ pub fn verify(verification: Verification) -> Evidence {
 /// A verification that compared 64 bits, so many of which agree.
 pub fn decided(matched: u32, mut tried: Tried) -> Verification {
     tried.paid.get_or_insert(Multiplicity { assets: 1, readings: 1 });
-    let decision = Decision::new(64, matched, Some((64 - matched).min(3)), tried.hypotheses(), 1e-6);
+    let decision = Decision::new(
+        64,
+        matched,
+        Some((64 - matched).min(3)),
+        tried.hypotheses(tried.parts()[0]),
+        1e-6,
+    );
     let verdict = decision.verdict();
     Verification {
         verdict,

@@ -14,6 +14,7 @@ mod harness;
 mod hook_floods;
 mod hooks;
 mod housekeeping;
+mod http_paths;
 mod jobs;
 mod key_states;
 mod keys;

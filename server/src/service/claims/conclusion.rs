@@ -120,7 +120,7 @@ impl Service {
         let files = Files::of_suspects(self, job).await?;
         let read = Read {
             decided: &decided,
-            framings: hypotheses::kinds(&told.readings),
+            framings: hypotheses::kinds(&told.readings, &readings),
         };
         evidence::of_verification(&facts, files, &read)
     }
@@ -142,7 +142,7 @@ impl Service {
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,
-            framings: hypotheses::kinds(&told.readings),
+            framings: hypotheses::kinds(&told.readings, &readings),
         });
         let facts = Facts {
             job,

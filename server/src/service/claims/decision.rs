@@ -21,6 +21,18 @@ struct Words {
     tried: Tried,
 }
 
+/// Readings with one share of the rate each, for among them the most matches are the least p-value.
+fn of_equal_shares(read: &[HypothesisReading], readings: &[Reading]) -> Vec<Vec<Reading>> {
+    let mut groups: Vec<(u64, Vec<Reading>)> = Vec::new();
+    for (read, reading) in read.iter().zip(readings) {
+        match groups.iter_mut().find(|(tries, _)| *tries == read.tries) {
+            Some((_, group)) => group.push(*reading),
+            None => groups.push((read.tries, vec![*reading])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
+}
+
 impl Service {
     /// Decides a claim on `read`, whose logits are of the key's length. Of a suspect it is said what there was `before`; a
     /// scene that was just marked has nothing.
@@ -52,14 +64,16 @@ impl Service {
         let failed = |error| Error::internal("deciding a claim", error);
         let readings = read.iter().map(|read| Reading::from_logits(&read.logits));
         let readings = readings.collect::<Result<Vec<_>, _>>().map_err(failed)?;
-        // Whatever else agrees as well would be judged alike.
-        let nearest = words.index.nearest(&readings, 1).map_err(failed)?;
-        let found = nearest.first().and_then(|hit| words.assets.get(hit.row as usize));
-        let best = match found {
-            Some(&id) => Some(self.best(key, id).await?),
-            None => None,
-        };
-        let targets: Vec<_> = best.iter().map(|best| best.target.clone()).collect();
+        let mut nearest = Vec::new();
+        for alike in of_equal_shares(read, &readings) {
+            // Whatever else agrees as well would be judged alike.
+            let found = words.index.nearest(&alike, 1).map_err(failed)?;
+            let found = found.first().and_then(|hit| words.assets.get(hit.row as usize));
+            if let Some(&id) = found.filter(|id| !nearest.iter().any(|best: &Best| best.asset.id == **id)) {
+                nearest.push(self.best(key, id).await?);
+            }
+        }
+        let targets: Vec<_> = nearest.iter().map(|best| best.target.clone()).collect();
         let named = matches!(claim, Claim::Asset(_));
         let claim = guardsplat_codeword::Claim {
             scheme: Scheme::Coded { code: CODE },
@@ -74,8 +88,9 @@ impl Service {
             let reason = "no asset is registered that the claim could be about, for this key".to_owned();
             tested.answer.reason = Some(reason);
         }
-        let name = tested.answer.best.as_ref().map(|best| best.hypothesis.as_str());
-        let read = read.iter().find(|read| Some(read.name.as_str()) == name);
+        let found = tested.answer.best.as_ref();
+        let read = found.and_then(|found| read.iter().find(|read| read.name == found.hypothesis));
+        let best = found.and_then(|found| nearest.into_iter().find(|best| best.target.id == found.target));
         let assets_of_owner = match &best {
             Some(best) => self.ledger().count_assets(key.id, Some(best.owner.id)).await?,
             None => 0,

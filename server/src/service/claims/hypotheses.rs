@@ -65,12 +65,16 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
         }
     }
     problems.finish()?;
-    let read = |reading: &FramedReading| HypothesisReading {
-        name: hypothesis(reading).to_string(),
+    let read: Vec<Hypothesis> = readings.iter().map(hypothesis).collect();
+    let shares = guardsplat_codeword::shares(&read);
+    let pairs = readings.iter().zip(&read).zip(shares);
+    let read = pairs.map(|((reading, hypothesis), tries)| HypothesisReading {
+        name: hypothesis.to_string(),
         views: reading.views,
         logits: reading.logits.clone(),
-    };
-    Ok(readings.iter().map(read).collect())
+        tries,
+    });
+    Ok(read.collect())
 }
 
 /// What is undone, as a worker tells it.
@@ -104,10 +108,11 @@ fn channels(undone: &Undone) -> [f32; 3] {
     [undone.red, undone.green, undone.blue]
 }
 
-/// Hypotheses by kinds, for the report: as much as was done counts under what changes most.
-pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::HypothesisGroup> {
-    use evidence::HypothesisKind::{AsGiven, Crop, Mirrored, QuarterTurn, Tone};
+/// Hypotheses by kinds, for the report, with what each pays: as much as was done counts under what changes most.
+pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evidence::HypothesisGroup> {
+    use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
+        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) => Estimated,
         _ if reading.undone.is_some() => Tone,
         _ if reading.part.is_some() => Crop,
         (true, ..) => Crop,
@@ -115,13 +120,25 @@ pub fn kinds(readings: &[FramedReading]) -> Vec<evidence::HypothesisGroup> {
         (_, _, 0) => AsGiven,
         _ => QuarterTurn,
     };
-    let count = |wanted| readings.iter().filter(|reading| kind(reading) == wanted).count() as u32;
-    let each = [AsGiven, Tone, QuarterTurn, Mirrored, Crop].map(|kind| evidence::HypothesisGroup {
-        kind,
-        variants: count(kind),
-        pooled: false,
-    });
-    each.into_iter().filter(|group| group.variants > 0).collect()
+    let mut groups: Vec<evidence::HypothesisGroup> = Vec::new();
+    for wanted in [AsGiven, Estimated, Tone, QuarterTurn, Mirrored, Crop] {
+        for (_, read) in told.iter().zip(readings).filter(|(told, _)| kind(told) == wanted) {
+            let tries = Some(read.tries);
+            match groups
+                .iter_mut()
+                .find(|group| group.kind == wanted && group.tries == tries)
+            {
+                Some(group) => group.variants += 1,
+                None => groups.push(evidence::HypothesisGroup {
+                    kind: wanted,
+                    variants: 1,
+                    pooled: false,
+                    tries,
+                }),
+            }
+        }
+    }
+    groups
 }
 
 #[cfg(test)]
@@ -174,7 +191,10 @@ mod tests {
         let names: HashSet<_> = checked(&all(), 64).unwrap().into_iter().map(|f| f.name).collect();
         assert_eq!(names.len(), 16);
         assert!(names.contains("as given") && names.contains("turned by 270 degrees, mirrored, without borders"));
-        let counts: Vec<_> = kinds(&all()).iter().map(|framing| framing.variants).collect();
+        let counts: Vec<_> = kinds(&all(), &checked(&all(), 64).unwrap())
+            .iter()
+            .map(|framing| framing.variants)
+            .collect();
         assert_eq!(counts, [1, 3, 4, 8]);
     }
 
@@ -184,7 +204,10 @@ mod tests {
         let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
         assert_eq!(names[1], "brightness x 0.81 undone");
         assert_eq!(names.iter().collect::<HashSet<_>>().len(), 3);
-        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        let counts: Vec<_> = kinds(&readings, &checked(&readings, 64).unwrap())
+            .iter()
+            .map(|framing| framing.variants)
+            .collect();
         assert_eq!(counts, [1, 2]);
         assert!(checked(&[brightened(0.81), brightened(0.81)], 64).is_err());
         assert!(checked(&[brightened(0.0)], 64).is_err() && checked(&[brightened(f32::NAN)], 64).is_err());
@@ -223,7 +246,10 @@ mod tests {
         let readings = [reading(0, false, false), estimated];
         let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
         assert_eq!(names[1], "tones and part estimated from each picture");
-        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        let counts: Vec<_> = kinds(&readings, &checked(&readings, 64).unwrap())
+            .iter()
+            .map(|framing| framing.variants)
+            .collect();
         assert_eq!(counts, [1, 1]);
     }
 
@@ -232,7 +258,10 @@ mod tests {
         let readings = [reading(0, false, false), part(3, 0, 6), part(4, 0, 6)];
         let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
         assert_eq!(names[1], "50 % of its sides from 25 % right and 0 % down");
-        let counts: Vec<_> = kinds(&readings).iter().map(|framing| framing.variants).collect();
+        let counts: Vec<_> = kinds(&readings, &checked(&readings, 64).unwrap())
+            .iter()
+            .map(|framing| framing.variants)
+            .collect();
         assert_eq!(counts, [1, 2]);
         assert!(checked(&[part(3, 0, 6), part(3, 0, 6)], 64).is_err());
         for outside in [

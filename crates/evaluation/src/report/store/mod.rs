@@ -9,9 +9,13 @@ use serde::Serialize;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Name of the file of records in a store's folder; one JSON object a line.
 pub const FILE: &str = "results.jsonl";
+/// How often, and after what time, it is tried to have the file for oneself.
+const TRIES: u32 = 20;
+const PAUSE: Duration = Duration::from_millis(25);
 
 /// A folder of results that is open for writing, by nobody else.
 #[derive(Debug)]
@@ -47,10 +51,18 @@ impl Store {
         let mut options = OpenOptions::new();
         let file = options.read(true).append(true).create(true).open(&path);
         let mut file = file.map_err(Error::io(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(Error::Locked { path }),
-            Err(TryLockError::Error(source)) => return Err(Error::Io { path, source }),
+        // A program that is being started holds what is open here until it runs: that is no other evaluation.
+        let mut tries = 0;
+        loop {
+            match file.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if tries < TRIES => {
+                    tries += 1;
+                    std::thread::sleep(PAUSE);
+                }
+                Err(TryLockError::WouldBlock) => return Err(Error::Locked { path }),
+                Err(TryLockError::Error(source)) => return Err(Error::Io { path, source }),
+            }
         }
         let (records, mut length) = Records::parse(&mut file, &path)?;
         let mut repair = || -> std::io::Result<()> {

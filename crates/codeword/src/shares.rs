@@ -1,0 +1,85 @@
+//! How the rate of false positives is shared among the readings of one suspect.
+//!
+//! Most suspects are as they were given, and what was done to others can mostly be estimated; guesses come last, and many
+//! at once. So half of the rate is for files as given, half of the rest for the estimate, and all that is left for guesses,
+//! alike. A reading with one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend
+//! on what was read and not on any message, and together are no more than the rate (a weighted union bound, Holm 1979).
+use crate::hypothesis::{Hypothesis, PhotometricCorrection};
+
+/// Kinds of hypotheses, as they are shared with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    AsGiven,
+    Estimated,
+    Guessed,
+}
+
+fn kind(hypothesis: &Hypothesis) -> Kind {
+    match *hypothesis {
+        given if given == Hypothesis::default() => Kind::AsGiven,
+        estimated if estimated.correction == PhotometricCorrection::Estimated => Kind::Estimated,
+        _ => Kind::Guessed,
+    }
+}
+
+/// For each reading of a suspect, of how many equal parts of the rate it has one.
+pub fn shares(hypotheses: &[Hypothesis]) -> Vec<u64> {
+    let kinds: Vec<Kind> = hypotheses.iter().map(kind).collect();
+    let count = |wanted| kinds.iter().filter(|kind| **kind == wanted).count() as u64;
+    let there = [Kind::AsGiven, Kind::Estimated, Kind::Guessed].map(|kind| (kind, count(kind)));
+    let there: Vec<_> = there.into_iter().filter(|(_, count)| *count > 0).collect();
+    let of = |wanted: Kind| {
+        let place = there.iter().position(|(kind, _)| *kind == wanted).unwrap_or(0);
+        // The last kind has as much as the one before it: all that is left.
+        let halvings = (place + 1).min(there.len().saturating_sub(1));
+        (1_u64 << halvings) * count(wanted)
+    };
+    kinds.iter().map(|kind| of(*kind)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hypothesis::Tone;
+
+    fn guess(i: usize) -> Hypothesis {
+        Hypothesis {
+            correction: PhotometricCorrection::Tone(Tone::Brightness(0.5 + i as f32 / 100.0)),
+            ..Hypothesis::default()
+        }
+    }
+
+    #[test]
+    fn the_whole_rate_is_shared_and_no_more() {
+        for estimates in 0..3 {
+            for guesses in [0, 1, 2, 7, 177] {
+                for given in [0, 1] {
+                    let all: Vec<_> = std::iter::repeat_n(Hypothesis::default(), given)
+                        .chain(std::iter::repeat_n(Hypothesis::estimated(), estimates))
+                        .chain((0..guesses).map(guess))
+                        .collect();
+                    let shares = shares(&all);
+                    assert_eq!(shares.len(), all.len());
+                    let sum: f64 = shares.iter().map(|&tries| 1.0 / tries as f64).sum();
+                    assert!(
+                        all.is_empty() || (sum - 1.0).abs() < 1e-9,
+                        "{given} {estimates} {guesses}: {shares:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_likely_pays_little() {
+        let given = Hypothesis::default();
+        assert_eq!(shares(&[given]), [1]);
+        assert_eq!(shares(&[given, Hypothesis::estimated()]), [2, 2]);
+        assert_eq!(
+            shares(&[given, Hypothesis::estimated(), guess(1), guess(2)]),
+            [2, 4, 8, 8]
+        );
+        assert_eq!(shares(&[guess(1), given, guess(2)]), [4, 2, 4]);
+        assert_eq!(shares(&[guess(1), guess(2), guess(3)]), [3, 3, 3]);
+    }
+}
