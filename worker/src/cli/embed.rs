@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if settings.lambda.lpips > 0.0 && !engine.has_lpips() {
         eprintln!("note: without the weights of LPIPS (`models add`) the loss goes without it");
     }
-    let cameras = super::cameras(arguments.cameras.as_deref())?;
+    let cameras = load::cameras(arguments.cameras.as_deref())?;
     let job = Job {
         input: &arguments.input,
         output: &arguments.output,

@@ -15,6 +15,7 @@ use guardsplat_engine::view::{Extent, Split, ViewSampler};
 use serde::Serialize;
 
 use super::{Budget, Exit, print_json, print_line};
+use crate::operations::load;
 
 /// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
 const SIDE: u32 = 160;
@@ -113,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
     let scene = Scene::read_within(&arguments.scene, bad_rows, limits.left(&rest))?;
     let gaussians = &scene.gaussians;
-    let cameras = super::cameras(arguments.cameras.as_deref())?;
+    let cameras = load::cameras(arguments.cameras.as_deref())?;
     let size = SceneSize::of(&scene);
     let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));
     let (mut extent, mut embed, mut seen, mut viewers) = (None, None, None, None);

@@ -12,11 +12,9 @@ mod sample;
 mod verify;
 
 use std::io::IsTerminal;
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use guardsplat_engine::view::{Camera, read_cameras};
 use guardsplat_engine::{Error, Result};
 use tracing_subscriber::EnvFilter;
 
@@ -78,11 +76,6 @@ enum Command {
     Evaluate(Box<evaluate::Arguments>),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
-}
-
-/// Cameras of a file; none without one.
-fn cameras(file: Option<&Path>) -> Result<Vec<Camera>> {
-    Ok(file.map(read_cameras).transpose()?.unwrap_or_default())
 }
 
 /// How much memory a command may take.

@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         size: arguments.size,
         background: arguments.background.rgb(),
         seed: arguments.seed,
-        cameras: super::cameras(arguments.cameras.as_deref())?,
+        cameras: load::cameras(arguments.cameras.as_deref())?,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
     let mut display = Display::new("reading");

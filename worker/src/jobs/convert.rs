@@ -1,5 +1,4 @@
 //! Between the API's messages and the engine's types.
-use std::path::Path;
 use std::time::Duration;
 
 use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
@@ -11,7 +10,6 @@ use guardsplat_engine::message::Key;
 use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::scene::{BadRows, Ignored};
-use guardsplat_engine::view::{Camera, read_cameras};
 use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::progress::Stage;
@@ -69,11 +67,6 @@ fn robust_to(numbers: &[i32]) -> Result<RobustTo> {
         })
     };
     numbers.iter().map(kind).collect()
-}
-
-/// Cameras of a file that was fetched; none without one.
-pub fn cameras(file: Option<&Path>) -> Result<Vec<Camera>> {
-    Ok(file.map(read_cameras).transpose()?.unwrap_or_default())
 }
 
 /// The views that a verification asks for, without its cameras.

@@ -15,8 +15,8 @@ use super::attempt::{Attempt, Outcome as Finished};
 use super::convert;
 use super::error::{Error, Result};
 use super::transfer::Content;
-use crate::operations::comparison_sheet;
 use crate::operations::thumbnails::small_png;
+use crate::operations::{comparison_sheet, load};
 
 /// Views of the evidence.
 const SHOWN: usize = 3;
@@ -53,7 +53,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         let message = key.message(&message)?;
-        let cameras = convert::cameras(cameras_file.as_deref())?;
+        let cameras = load::cameras(cameras_file.as_deref())?;
         let device = cache.device().to_owned();
         let engine = cache.engine(&name, &key, rate, stop)?;
         let job = Job {

@@ -10,6 +10,7 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
+use crate::operations::load;
 use crate::operations::thumbnails::Thumbnails;
 use crate::operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
 
@@ -43,7 +44,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
     let rate = attempt.lease.false_positive_rate;
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
-        views.cameras = convert::cameras(cameras_file.as_deref())?;
+        views.cameras = load::cameras(cameras_file.as_deref())?;
         let source = find_source(&paths)?;
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);

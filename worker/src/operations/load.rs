@@ -1,4 +1,5 @@
-//! Loads what embedding and verifying need: what reads pictures, and the engine for a key, which loads the rest when it is used.
+//! Loads what embedding and verifying need: cameras, what reads pictures, and the engine for a key, which loads the rest when
+//! it is used.
 use std::path::{Path, PathBuf};
 
 use guardsplat_engine::clip::{Clip, Parts};
@@ -7,7 +8,13 @@ use guardsplat_engine::extract::{Engine, HiddenExtractor};
 use guardsplat_engine::memory::Limits;
 use guardsplat_engine::message::{ClipIdentity, Decoding, Key};
 use guardsplat_engine::models::{LPIPS, Models, WEIGHTS};
+use guardsplat_engine::view::{Camera, read_cameras};
 use guardsplat_engine::{Error, Result};
+
+/// Cameras of a file or folder; none without one.
+pub fn cameras(path: Option<&Path>) -> Result<Vec<Camera>> {
+    Ok(path.map(read_cameras).transpose()?.unwrap_or_default())
+}
 
 /// What the CLIP in the repository is called.
 pub const SHIPPED: &str = "guardsplat";

@@ -2,6 +2,7 @@
 use super::TILE;
 use crate::scene::Gaussians;
 use crate::view::Camera;
+use crate::view::vector;
 use bytemuck::{Pod, Zeroable};
 
 /// Gaussians at this view depth or nearer are not drawn.
@@ -199,26 +200,9 @@ impl Projector {
 fn rotation(q: [f32; 4]) -> [[f64; 3]; 3] {
     let q = q.map(f64::from);
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let [w, x, y, z] = if norm > 0.0 && norm.is_finite() {
+    vector::rotation(if norm > 0.0 && norm.is_finite() {
         q.map(|v| v / norm)
     } else {
         [1.0, 0.0, 0.0, 0.0]
-    };
-    [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    ]
+    })
 }

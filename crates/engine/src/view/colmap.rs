@@ -7,6 +7,7 @@ use std::path::Path;
 
 use super::camera::Camera;
 use super::files::assemble;
+use super::vector::rotation;
 use crate::error::{Error, Result};
 
 /// Models by their numbers: the name, how many parameters there are, and how many of the first are focal lengths. Lenses
@@ -91,26 +92,8 @@ fn placed(pose: &Pose, cameras: &HashMap<u32, Intrinsics>) -> Result<Camera, Str
     let told = |reason: String| format!("image {}: {reason}", pose.name.escape_ascii());
     let lens = cameras.get(&pose.camera);
     let lens = lens.ok_or_else(|| told(format!("there is no camera {}", pose.camera)))?;
-    let [w, x, y, z] = pose.rotation;
-    let length = (w * w + x * x + y * y + z * z).sqrt();
-    let [w, x, y, z] = [w, x, y, z].map(|v| v / length);
-    let axes = [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    ];
+    let length = pose.rotation.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let axes = rotation(pose.rotation.map(|v| v / length));
     // The centre c has R c + t = 0.
     let position = std::array::from_fn(|c| -(0..3).map(|r| axes[r][c] * pose.translation[r]).sum::<f64>());
     let principal = lens.principal.map(Some);

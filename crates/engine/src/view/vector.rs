@@ -51,3 +51,24 @@ pub(crate) fn frame(up: [f32; 3]) -> [[f32; 3]; 3] {
     let east = perpendicular(up);
     [east, cross(up, east), up]
 }
+
+/// The matrix, by rows, of a rotation by a quaternion (w, x, y, z) of length 1.
+pub(crate) fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
+    [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
+    ]
+}
