@@ -10,6 +10,7 @@ pub mod models;
 pub mod picture;
 pub mod quality;
 pub mod sample;
+mod simd;
 pub mod splat;
 pub mod stop;
 #[doc(hidden)]

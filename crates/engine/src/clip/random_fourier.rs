@@ -115,21 +115,19 @@ impl Scale {
     }
 
     fn of(&self, weight: Tensor<4>, phases: Tensor<1>, pictures: Tensor<4>) -> Tensor<2> {
+        let filters = weight.reshape([-1, 3]); // the kernel is one pixel
+        let n = self.surround;
+        if n == 1 {
+            return mean_sines(pictures, filters, phases, self.size);
+        }
         let x = match self.size {
             1 => pictures,
             n => avg_pool2d(pictures, AvgPoolOptions::new([n; 2]).with_stride([n; 2])),
         };
-        let x = match self.surround {
-            1 => x,
-            n => {
-                let inside = AvgPoolOptions::new([n; 2])
-                    .with_stride([1; 2])
-                    .with_padding([n / 2; 2])
-                    .with_count_include_pad(false);
-                x.clone() - avg_pool2d(x, inside)
-            }
-        };
-        let filters = weight.reshape([-1, 3]); // the kernel is one pixel
-        mean_sines(x, filters, phases)
+        let inside = AvgPoolOptions::new([n; 2])
+            .with_stride([1; 2])
+            .with_padding([n / 2; 2])
+            .with_count_include_pad(false);
+        mean_sines(x.clone() - avg_pool2d(x, inside), filters, phases, 1)
     }
 }

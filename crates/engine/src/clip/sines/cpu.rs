@@ -1,42 +1,35 @@
-//! Mean sines on the CPU: chunks of pixels over all cores, eight to sixteen at a time in vector registers.
+//! Mean sines on the CPU: chunks of pixels over all cores, a vector register of them at a time.
 //!
-//! Sums have an order that depends on sizes alone, and no multiplication is fused with an addition, so the bytes are
-//! the same whatever the number of threads and the width of the registers.
+//! Sums have an order that depends on sizes alone, so the bytes are the same whatever the number of threads. Between
+//! processors with and without fused multiplication and addition they differ in their last bits.
 use burn::backend::{Flex, TensorMetadata};
 use burn::tensor::{Shape, TensorData};
 use rayon::prelude::*;
 
-use super::{FloatTensor, MeanSines, MeanSinesBackward, TURN};
+use super::kernel::{Block, Differentiate, LANES, Slope, Sums, Wave};
+use super::pool::Squares;
+use super::{FloatTensor, MeanSines, MeanSinesBackward};
+use crate::simd::Instructions;
 
 /// Pixels of a task: their three colours fit the first cache.
 const CHUNK: usize = 1024;
-/// Pixels that are computed together.
-const LANES: usize = 16;
-
-/// Coefficients of r, r^3, r^5... of sin r: the minimax polynomial over [-pi, pi], within 1.2e-9, in f32 within 5e-7.
-const SINE: [f32; 7] = [
-    1.0,
-    -1.666_666_4e-1,
-    8.333_310_5e-3,
-    -1.984_015_1e-4,
-    2.752_937_5e-6,
-    -2.467_626_1e-8,
-    1.344_908_5e-10,
-];
-
-type Lanes = [f32; LANES];
+/// A cosine is the sine so many turns on.
+const QUARTER: f64 = 0.25;
 
 impl MeanSines for Flex {
     fn mean_sines(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self> {
-        let [views, filters_count] = [pictures.shape()[0], phases.shape()[0]];
-        let (pictures, filters, phases) = (floats(pictures), floats(filters), floats(phases));
-        let waves = waves(&filters, &phases, 0.0);
-        let means = means(&pictures, views, &waves);
-        FloatTensor::<Self>::from_data(TensorData::new(means, Shape::new([views, filters_count])))
+        let (squares, views) = (squares(&pictures, side), pictures.shape()[0]);
+        let shape = Shape::new([views, phases.shape()[0]]);
+        let [pictures, filters, phases] = [pictures, filters, phases].map(|t| t.to_contiguous());
+        let waves = waves(filters.storage(), phases.storage(), 0.0);
+        let pictures = squares.means(pictures.storage());
+        let means = means(Instructions::widest(), &pictures, views, &waves);
+        FloatTensor::<Self>::from_data(TensorData::new(means, shape))
     }
 }
 
@@ -46,42 +39,59 @@ impl MeanSinesBackward for Flex {
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
         gradient: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self> {
-        let shape = pictures.shape();
-        let (pictures, filters) = (floats(pictures), floats(filters));
-        // The derivative of sine is the sine a quarter turn on.
-        let waves = waves(&filters, &floats(phases), std::f32::consts::FRAC_PI_2);
-        let found = gradients(&pictures, shape[0], &waves, &floats(gradient));
-        FloatTensor::<Self>::from_data(TensorData::new(found, shape))
+        let (squares, shape) = (squares(&pictures, side), pictures.shape());
+        let tensors = [pictures, filters, phases, gradient];
+        let [pictures, filters, phases, gradient] = tensors.map(|t| t.to_contiguous());
+        let filters: &[f32] = filters.storage();
+        let waves = waves(filters, phases.storage(), QUARTER);
+        let pictures = squares.means(pictures.storage());
+        let instructions = Instructions::widest();
+        let found = gradients(instructions, &pictures, shape[0], &waves, filters, gradient.storage());
+        FloatTensor::<Self>::from_data(TensorData::new(squares.spread(found), shape))
     }
 }
 
-/// A tensor's numbers, row by row.
-fn floats(tensor: FloatTensor<Flex>) -> Vec<f32> {
-    tensor.to_contiguous().storage::<f32>().to_vec()
+/// Means and their gradient to the pictures with chosen instructions.
+#[cfg(test)]
+pub(super) fn with(
+    instructions: Instructions,
+    pictures: &[f32],
+    views: usize,
+    filters: &[f32],
+    phases: &[f32],
+    gradient: &[f32],
+) -> (Vec<f32>, Vec<f32>) {
+    let sines = waves(filters, phases, 0.0);
+    let cosines = waves(filters, phases, QUARTER);
+    (
+        means(instructions, pictures, views, &sines),
+        gradients(instructions, pictures, views, &cosines, filters, gradient),
+    )
 }
 
-/// A filter and its phase.
-struct Wave {
-    filter: [f32; 3],
-    phase: f32,
+fn squares(pictures: &FloatTensor<Flex>, side: usize) -> Squares {
+    let shape = pictures.shape();
+    Squares {
+        height: shape[2],
+        width: shape[3],
+        side,
+    }
 }
 
-fn waves(filters: &[f32], phases: &[f32], shift: f32) -> Vec<Wave> {
-    let wave = |(filter, phase): (&[f32; 3], &f32)| Wave {
-        filter: *filter,
-        phase: phase + shift,
-    };
-    filters.as_chunks::<3>().0.iter().zip(phases).map(wave).collect()
+fn waves(filters: &[f32], phases: &[f32], shift: f64) -> Vec<Wave> {
+    let wave = |(filter, phase): (&[f32; 3], &f32)| Wave::new(filter, *phase, shift);
+    filters.as_chunks().0.iter().zip(phases).map(wave).collect()
 }
 
-/// Pixels `first..first + count` of a planar picture, padded with zeros to whole blocks: `[blocks][3]` of lanes.
-fn blocks(picture: &[f32], first: usize, count: usize) -> Vec<[Lanes; 3]> {
+/// Pixels `first..first + count` of a planar picture, padded with zeros to whole blocks.
+fn blocks(picture: &[f32], first: usize, count: usize) -> Vec<Block> {
     let pixels = picture.len() / 3;
     let block = |start: usize| {
-        let mut block = [[0.0; LANES]; 3];
+        let mut block = Block([[0.0; LANES]; 3]);
         let end = (start + LANES).min(first + count);
-        for (channel, lanes) in block.iter_mut().enumerate() {
+        for (channel, lanes) in block.0.iter_mut().enumerate() {
             let plane = &picture[channel * pixels..][start..end];
             lanes[..plane.len()].copy_from_slice(plane);
         }
@@ -91,7 +101,7 @@ fn blocks(picture: &[f32], first: usize, count: usize) -> Vec<[Lanes; 3]> {
 }
 
 /// `[views][waves]`.
-fn means(pictures: &[f32], views: usize, waves: &[Wave]) -> Vec<f32> {
+fn means(instructions: Instructions, pictures: &[f32], views: usize, waves: &[Wave]) -> Vec<f32> {
     let len = pictures.len() / views.max(1);
     let pixels = len / 3;
     let chunks = pixels.div_ceil(CHUNK);
@@ -101,9 +111,13 @@ fn means(pictures: &[f32], views: usize, waves: &[Wave]) -> Vec<f32> {
             let picture = &pictures[task / chunks * len..][..len];
             let first = task % chunks * CHUNK;
             let count = CHUNK.min(pixels - first);
-            let blocks = blocks(picture, first, count);
             let mut sums = vec![0.0; waves.len()];
-            pulp::Arch::new().dispatch(|| add_sines(&blocks, count, waves, &mut sums));
+            instructions.run(Sums {
+                blocks: &blocks(picture, first, count),
+                count,
+                waves,
+                sums: &mut sums,
+            });
             sums
         })
         .collect();
@@ -115,95 +129,52 @@ fn means(pictures: &[f32], views: usize, waves: &[Wave]) -> Vec<f32> {
     (0..views * waves.len()).map(mean).collect()
 }
 
-/// Sums over the first `count` pixels of blocks, a wave after the other.
-#[inline(always)]
-fn add_sines(blocks: &[[Lanes; 3]], count: usize, waves: &[Wave], sums: &mut [f32]) {
-    let whole = count / LANES;
-    for (wave, sum) in waves.iter().zip(sums) {
-        let mut lanes = [0.0; LANES];
-        for block in &blocks[..whole] {
-            let sines = sines(block, wave);
-            for (lane, sine) in lanes.iter_mut().zip(sines) {
-                *lane += sine;
-            }
-        }
-        if let Some(block) = blocks.get(whole) {
-            let sines = sines(block, wave);
-            for (lane, sine) in lanes.iter_mut().zip(sines).take(count % LANES) {
-                *lane += sine;
-            }
-        }
-        *sum = lanes.iter().sum();
-    }
-}
-
-/// `[views][3][pixels]`, for gradients `[views][waves]`.
-fn gradients(pictures: &[f32], views: usize, waves: &[Wave], gradient: &[f32]) -> Vec<f32> {
+/// `[views][3][pixels]`, for gradients `[views][waves]` and filters in radians.
+fn gradients(
+    instructions: Instructions,
+    pictures: &[f32],
+    views: usize,
+    waves: &[Wave],
+    filters: &[f32],
+    gradient: &[f32],
+) -> Vec<f32> {
     let len = pictures.len() / views.max(1);
     let pixels = len / 3;
     let chunks = pixels.div_ceil(CHUNK);
-    let parts: Vec<Vec<[Lanes; 3]>> = (0..views * chunks)
+    let slopes: Vec<Slope> = (0..views * waves.len())
+        .map(|i| {
+            let wave = i % waves.len();
+            let factor = gradient[i] / pixels as f32;
+            Slope {
+                wave: waves[wave],
+                weights: std::array::from_fn(|c| filters[3 * wave + c] * factor),
+            }
+        })
+        .collect();
+    let parts: Vec<Vec<Block>> = (0..views * chunks)
         .into_par_iter()
         .map(|task| {
-            let picture = &pictures[task / chunks * len..][..len];
+            let view = task / chunks;
             let first = task % chunks * CHUNK;
-            let mut blocks = blocks(picture, first, CHUNK.min(pixels - first));
-            let gradient = &gradient[task / chunks * waves.len()..][..waves.len()];
-            pulp::Arch::new().dispatch(|| differentiate(&mut blocks, waves, gradient, 1.0 / pixels as f32));
+            let mut blocks = blocks(&pictures[view * len..][..len], first, CHUNK.min(pixels - first));
+            instructions.run(Differentiate {
+                blocks: &mut blocks,
+                slopes: &slopes[view * waves.len()..][..waves.len()],
+            });
             blocks
         })
         .collect();
     let mut out = vec![0.0; pictures.len()];
-    let tasks = parts.iter().enumerate();
-    for (task, blocks) in tasks {
+    for (task, blocks) in parts.iter().enumerate() {
         let first = task % chunks * CHUNK;
         let picture = &mut out[task / chunks * len..][..len];
-        for (index, block) in blocks.iter().enumerate() {
+        for (index, Block(block)) in blocks.iter().enumerate() {
             let start = first + index * LANES;
             let count = LANES.min(pixels - start);
             for (channel, lanes) in block.iter().enumerate() {
                 picture[channel * pixels + start..][..count].copy_from_slice(&lanes[..count]);
             }
         }
-    }
-    out
-}
-
-/// Puts gradients in the place of colours.
-#[inline(always)]
-fn differentiate(blocks: &mut [[Lanes; 3]], waves: &[Wave], gradient: &[f32], scale: f32) {
-    for block in blocks {
-        let mut sums = [[0.0; LANES]; 3];
-        for (wave, gradient) in waves.iter().zip(gradient) {
-            let cosines = sines(block, wave);
-            for (sum, weight) in sums.iter_mut().zip(wave.filter) {
-                let weight = weight * gradient * scale;
-                for (sum, cosine) in sum.iter_mut().zip(cosines) {
-                    *sum += weight * cosine;
-                }
-            }
-        }
-        *block = sums;
-    }
-}
-
-/// Sine of a wave at the pixels of a block.
-#[inline(always)]
-fn sines(block: &[Lanes; 3], wave: &Wave) -> Lanes {
-    /// Adding and subtracting 1.5 * 2^23 rounds to a whole number.
-    const ROUND: f32 = 12_582_912.0;
-    let [red, green, blue] = wave.filter;
-    let mut out = [0.0; LANES];
-    for (i, out) in out.iter_mut().enumerate() {
-        let angle = red * block[0][i] + green * block[1][i] + blue * block[2][i] + wave.phase;
-        let turns = (angle * std::f32::consts::FRAC_1_PI * 0.5 + ROUND) - ROUND;
-        let r = angle - turns * TURN[0] - turns * TURN[1];
-        let z = r * r;
-        let mut value = SINE[6];
-        for coefficient in SINE[..6].iter().rev() {
-            value = value * z + coefficient;
-        }
-        *out = value * r;
     }
     out
 }

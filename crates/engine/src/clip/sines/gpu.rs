@@ -1,6 +1,7 @@
 //! Mean sines on the GPU: CubeCL kernels on burn's buffers. Every sum has a fixed order.
 // The launch functions that the macro makes carry no documentation.
 #![allow(missing_docs)]
+use burn::backend::ops::ModuleOps;
 use burn::backend::{Cube, TensorMetadata};
 use burn::tensor::Shape;
 use burn_cubecl::kernel::into_contiguous;
@@ -110,8 +111,9 @@ impl MeanSines for Cube {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self> {
-        let [pictures, filters, phases] = [pictures, filters, phases].map(into_contiguous);
+        let [pictures, filters, phases] = [averaged(pictures, side), filters, phases].map(into_contiguous);
         let shape = pictures.shape();
         let (views, waves) = (shape[0], phases.shape()[0]);
         let pixels = shape[2] * shape[3];
@@ -145,8 +147,11 @@ impl MeanSinesBackward for Cube {
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
         gradient: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self> {
-        let [pictures, filters, phases, gradient] = [pictures, filters, phases, gradient].map(into_contiguous);
+        let all = pictures.clone();
+        let tensors = [averaged(pictures, side), filters, phases, gradient];
+        let [pictures, filters, phases, gradient] = tensors.map(into_contiguous);
         let shape = pictures.shape();
         let pixels = shape[2] * shape[3];
         let client = pictures.client.clone();
@@ -164,7 +169,18 @@ impl MeanSinesBackward for Cube {
             pixels as u32,
             1.0 / pixels as f32,
         );
-        out
+        match side {
+            1 => out,
+            n => Self::avg_pool2d_backward(all, out, [n; 2], [n; 2], [0; 2], true, false),
+        }
+    }
+}
+
+/// Means of squares of pictures.
+fn averaged(pictures: CubeTensor, side: usize) -> CubeTensor {
+    match side {
+        1 => pictures,
+        n => Cube::avg_pool2d(pictures, [n; 2], [n; 2], [0; 2], true, false),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Mean over a picture's pixels of the sine of a linear function of their colour, as one differentiable operation.
 //!
-//! `out[b][n] = mean over p of sin(filters[n] . pictures[b][:, p] + phases[n])`. Written with burn's tensors it takes
+//! `out[b][n] = mean over p of sin(filters[n] . pictures[b][:, p] + phases[n])`, where p are pixels or means of squares of
+//! them. Written with burn's tensors it takes
 //! a number for every filter and pixel to memory and back several times, which was three quarters of the time of an embedding; here
 //! a pixel is read once and its sines are added up where they are computed. The backward pass computes the cosines anew
 //! instead of keeping the sines.
@@ -9,6 +10,8 @@
 //! promises nothing there.
 mod cpu;
 mod gpu;
+mod kernel;
+mod pool;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -18,14 +21,15 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::Tensor;
 
-/// 2 pi in two parts: multiples of the first by less than 2^15 are exact.
+/// 2 pi in two parts, for the GPU: multiples of the first by less than 2^15 are exact.
 const TURN: [f32; 2] = [6.281_25, 1.935_307_2e-3];
 
-/// Mean sines `[b, n]` of pictures `[b, 3, h, w]` for filters `[n, 3]` and phases `[n]`. Differentiable in the pictures;
-/// filters and phases are constants. Good to 1e-5 for arguments up to 10,000 radians.
-pub(super) fn mean_sines(pictures: Tensor<4>, filters: Tensor<2>, phases: Tensor<1>) -> Tensor<2> {
+/// Mean sines `[b, n]` of pictures `[b, 3, h, w]`, averaged over squares of `side` pixels first, for filters `[n, 3]` and
+/// phases `[n]`. Differentiable in the pictures; filters and phases are constants. Good to 1e-5 for arguments of some
+/// hundreds of radians.
+pub(super) fn mean_sines(pictures: Tensor<4>, filters: Tensor<2>, phases: Tensor<1>, side: usize) -> Tensor<2> {
     let (filters, phases) = (filters.into_dispatch(), phases.into_dispatch());
-    Tensor::from_dispatch(Dispatch::mean_sines(pictures.into_dispatch(), filters, phases))
+    Tensor::from_dispatch(Dispatch::mean_sines(pictures.into_dispatch(), filters, phases, side))
 }
 
 /// The operation on every backend.
@@ -35,6 +39,7 @@ trait MeanSines: Backend {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self>;
 }
 
@@ -45,6 +50,7 @@ trait MeanSinesBackward: Backend {
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
         gradient: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self>;
 }
 
@@ -53,15 +59,15 @@ trait MeanSinesBackward: Backend {
 struct ToPictures;
 
 impl<B: MeanSines + MeanSinesBackward> Backward<B, 1> for ToPictures {
-    /// Pictures, filters, phases.
-    type State = [FloatTensor<B>; 3];
+    /// Pictures, filters, phases, and the side of squares.
+    type State = ([FloatTensor<B>; 3], usize);
 
     fn backward(self, ops: Ops<Self::State, 1>, gradients: &mut Gradients, _: &mut Checkpointer) {
         let gradient = gradients.consume::<B>(&ops.node);
-        let [pictures, filters, phases] = ops.state;
+        let ([pictures, filters, phases], side) = ops.state;
         let [parent] = ops.parents;
         if let Some(parent) = parent {
-            let found = B::mean_sines_backward(pictures, filters, phases, gradient);
+            let found = B::mean_sines_backward(pictures, filters, phases, gradient, side);
             gradients.register::<B>(parent.id, found);
         }
     }
@@ -72,13 +78,14 @@ impl<B: MeanSines + MeanSinesBackward, C: CheckpointStrategy> MeanSines for Auto
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
+        side: usize,
     ) -> FloatTensor<Self> {
         let (pictures, node) = pictures.into_parts();
         let (filters, _) = filters.into_parts();
         let (phases, _) = phases.into_parts();
-        let out = B::mean_sines(pictures.clone(), filters.clone(), phases.clone());
+        let out = B::mean_sines(pictures.clone(), filters.clone(), phases.clone(), side);
         match ToPictures.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(graph) => graph.finish([pictures, filters, phases], out),
+            OpsKind::Tracked(graph) => graph.finish(([pictures, filters, phases], side), out),
             OpsKind::UnTracked(graph) => graph.finish(out),
         }
     }

@@ -4,8 +4,10 @@ use burn::tensor::{Device, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Pictures, filters, phases and a gradient, as flat lists, and their sizes `[views, height, width, waves]`.
+/// Pictures, filters, phases and a gradient, as flat lists, their sizes `[views, height, width, waves]`, and the side of
+/// the squares that are averaged.
 struct Case {
+    side: usize,
     sizes: [usize; 4],
     pictures: Vec<f32>,
     filters: Vec<f32>,
@@ -14,13 +16,14 @@ struct Case {
 }
 
 /// Colours within 2.5 of 0, angles within about `3 * 2.5 * norm`.
-fn case(sizes: [usize; 4], norm: f32) -> Case {
+fn case(sizes: [usize; 4], norm: f32, side: usize) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut random = |count: usize, range: f32| -> Vec<f32> {
         (0..count).map(|_| range * (2.0 * rng.random::<f32>() - 1.0)).collect()
     };
     let [views, height, width, waves] = sizes;
     Case {
+        side,
         sizes,
         pictures: random(views * 3 * height * width, 2.5),
         filters: random(3 * waves, norm),
@@ -39,7 +42,7 @@ fn computed(case: &Case, device: &Device) -> [Vec<f32>; 2] {
     let filters = Tensor::<2>::from_data(tensor(&case.filters, vec![waves, 3]), &device);
     let phases = Tensor::<1>::from_data(tensor(&case.phases, vec![waves]), &device);
     let gradient = Tensor::<2>::from_data(tensor(&case.gradient, vec![views, waves]), &device);
-    let means = mean_sines(pictures.clone(), filters, phases);
+    let means = mean_sines(pictures.clone(), filters, phases, case.side);
     let found = (means.clone() * gradient).sum().backward();
     let numbers = |data: TensorData| data.iter::<f32>().collect();
     [
@@ -51,19 +54,30 @@ fn computed(case: &Case, device: &Device) -> [Vec<f32>; 2] {
 /// The same in f64, written down as the formula stands.
 fn reference(case: &Case) -> [Vec<f64>; 2] {
     let [views, height, width, waves] = case.sizes;
-    let pixels = height * width;
+    let side = case.side;
+    let (rows, columns) = (height / side, width / side);
+    let share = 1.0 / (side * side) as f64;
     let mut means = vec![0.0; views * waves];
     let mut to_pictures = vec![0.0; case.pictures.len()];
     for view in 0..views {
-        for pixel in 0..pixels {
-            let at = |channel: usize| (view * 3 + channel) * pixels + pixel;
+        for square in 0..rows * columns {
+            let (top, left) = (square / columns * side, square % columns * side);
+            let inside = |channel: usize| {
+                let plane = (view * 3 + channel) * height * width;
+                (0..side * side).map(move |i| plane + (top + i / side) * width + left + i % side)
+            };
+            let colour = |channel: usize| inside(channel).map(|at| f64::from(case.pictures[at])).sum::<f64>() * share;
+            let colours: [f64; 3] = std::array::from_fn(colour);
             for wave in 0..waves {
                 let filter = |channel: usize| f64::from(case.filters[3 * wave + channel]);
-                let dot: f64 = (0..3).map(|c| filter(c) * f64::from(case.pictures[at(c)])).sum();
+                let dot: f64 = (0..3).map(|c| filter(c) * colours[c]).sum();
                 let angle = dot + f64::from(case.phases[wave]);
-                means[view * waves + wave] += angle.sin() / pixels as f64;
-                let slope = f64::from(case.gradient[view * waves + wave]) * angle.cos() / pixels as f64;
-                (0..3).for_each(|c| to_pictures[at(c)] += slope * filter(c));
+                let pixels = (rows * columns) as f64;
+                means[view * waves + wave] += angle.sin() / pixels;
+                let slope = f64::from(case.gradient[view * waves + wave]) * angle.cos() / pixels;
+                for channel in 0..3 {
+                    inside(channel).for_each(|at| to_pictures[at] += slope * filter(channel) * share);
+                }
             }
         }
     }
@@ -77,18 +91,24 @@ fn largest_gap(found: &[f32], expected: &[f64]) -> f64 {
 }
 
 fn agrees(device: &Device) {
-    // Less than a block of lanes, less than a chunk, several chunks with a rest.
-    for sizes in [[1, 3, 2, 1], [2, 9, 31, 5], [3, 47, 53, 20]] {
+    // Less than a block of lanes, less than a chunk, several chunks with a rest; squares that do not fill a picture.
+    for (sizes, side) in [
+        ([1, 3, 2, 1], 1),
+        ([2, 9, 31, 5], 1),
+        ([3, 47, 53, 20], 1),
+        ([2, 47, 53, 20], 2),
+        ([1, 9, 31, 5], 4),
+    ] {
         for norm in [1.0, 23.0, 400.0] {
-            let case = case(sizes, norm);
+            let case = case(sizes, norm, side);
             let ([means, slopes], [true_means, true_slopes]) = (computed(&case, device), reference(&case));
             // An angle of a is rounded to a * 6e-8 before any sine is taken.
             let tolerance = 2e-6 + 7.5 * f64::from(norm) * 2e-7;
             let gap = largest_gap(&means, &true_means);
-            assert!(gap < tolerance, "{sizes:?} {norm}: {gap}");
+            assert!(gap < tolerance, "{sizes:?} {side} {norm}: {gap}");
             let largest = true_slopes.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             let gap = largest_gap(&slopes, &true_slopes) / largest;
-            assert!(gap < 4.0 * tolerance, "{sizes:?} {norm}: {gap}");
+            assert!(gap < 4.0 * tolerance, "{sizes:?} {side} {norm}: {gap}");
         }
     }
 }
@@ -111,7 +131,7 @@ fn wgpu_agrees_with_the_formula() {
 
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
-    let case = case([2, 47, 53, 20], 23.0);
+    let case = case([2, 47, 53, 20], 23.0, 2);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| computed(&case, &Device::flex()))
@@ -121,8 +141,24 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn what_is_no_number_stays_none() {
-    let mut case = case([1, 4, 4, 2], 10.0);
+    let mut case = case([1, 4, 4, 2], 10.0, 1);
     case.pictures[3] = f32::NAN;
     let [means, _] = computed(&case, &Device::flex());
     assert!(means.iter().all(|m| m.is_nan()));
+}
+
+#[test]
+fn every_instruction_set_is_within_the_tolerance_of_features() {
+    let [views, height, width, waves] = [1, 64, 64, 32];
+    let case = case([views, height, width, waves], 60.0, 1);
+    let [true_means, true_slopes] = reference(&case);
+    let largest = true_slopes.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    for set in crate::simd::Instructions::present() {
+        let (means, slopes) = cpu::with(set, &case.pictures, views, &case.filters, &case.phases, &case.gradient);
+        let gaps = [
+            largest_gap(&means, &true_means),
+            largest_gap(&slopes, &true_slopes) / largest,
+        ];
+        assert!(gaps[0] < 3e-6 && gaps[1] < 1e-4, "{set:?} {gaps:?}");
+    }
 }
