@@ -1,9 +1,11 @@
 //! The part of the loss that is computed on pictures: reconstruction and message, and its gradient to the pictures.
 //!
 //! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
-//! of a step.
+//! of a step. On the CPU likeness and its gradient are computed by loops of our own, and only what reads the message, and
+//! LPIPS, is a graph.
 use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::image_augmentation::ImageAugmentation;
 use super::loss_weight_controller::LossWeightFactors;
@@ -13,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
-use crate::quality::{Ssim, batch, unbatch};
+use crate::quality::{Likeness, LikenessWeights, Ssim, batch, likeness_with_gradient, unbatch};
 
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {
@@ -60,28 +62,41 @@ impl<'a> Loss<'a> {
     ) -> Result<Evaluated> {
         let device = &self.engine.compute.device;
         let lambda = &self.settings.lambda;
+        let weight = lambda.reconstruction * factors.reconstruction;
         let views = pictures.len();
         let leaf = batch(pictures, &device.clone().autodiff())?.require_grad();
         // What a file can hold; beyond it nothing is seen, so there is no gradient either.
         let marked = leaf.clone().clamp(0.0, 1.0);
-        let original = batch(references, device)?.clamp(0.0, 1.0);
-        let original = Tensor::from_inner(original);
+        let original = || Ok::<_, Error>(Tensor::from_inner(batch(references, device)?.clamp(0.0, 1.0)));
 
-        let difference = marked.clone() - original.clone();
-        let l1 = difference.clone().abs().mean();
-        let l2 = difference.square().mean();
-        let ssim = -self.ssim.mean(original.clone(), marked.clone()) + 1.0;
-        let mut reconstruction = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * (lambda.ssim * factors.ssim);
-        let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
-        let lpips = match lpips {
-            Some(lpips) => {
-                let (original, marked) = (self.some(step, original), self.some(step, marked.clone()));
-                let distance = lpips.per_view(original, marked)?.mean();
-                reconstruction = reconstruction + distance.clone() * lambda.lpips;
-                Some(distance)
-            }
-            None => None,
+        let mut total = Vec::new();
+        let mut parts = Vec::new();
+        let by_hand = if self.engine.on_cpu() {
+            let weights = LikenessWeights {
+                l1: weight * lambda.l1,
+                l2: weight * lambda.l2,
+                ssim: -weight * lambda.ssim * factors.ssim,
+            };
+            let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
+            Some(likeness_with_gradient(&pairs, weights))
+        } else {
+            let original = original()?;
+            let difference = marked.clone() - original.clone();
+            let l1 = difference.clone().abs().mean();
+            let l2 = difference.square().mean();
+            let ssim = -self.ssim.mean(original, marked.clone()) + 1.0;
+            let terms = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * (lambda.ssim * factors.ssim);
+            total.push(terms * weight);
+            parts.extend([l1, ssim]);
+            None
         };
+        let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
+        if let Some(lpips) = lpips {
+            let (original, marked) = (self.some(step, original()?), self.some(step, marked.clone()));
+            let distance = lpips.per_view(original, marked)?.mean();
+            total.push(distance.clone() * (lambda.lpips * weight));
+            parts.push(distance);
+        }
         let seen = self.settings.augmentation.apply(marked, rng);
         let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
@@ -89,18 +104,22 @@ impl<'a> Loss<'a> {
         let targets = Tensor::<2>::from_data(targets, device);
         let softened = logits.clone() / lambda.temperature;
         let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
-        let total =
-            reconstruction * (lambda.reconstruction * factors.reconstruction) + message.clone() * lambda.message;
+        parts.push(message.clone());
+        let total = total.into_iter().fold(message * lambda.message, |sum, term| sum + term);
 
         // One transfer for all terms.
-        let mut parts = vec![l1, ssim, message];
-        parts.extend(lpips);
-        let values = self.engine.to_host(Tensor::cat(parts, 0).inner())?;
+        let mut values = self.engine.to_host(Tensor::cat(parts, 0).inner())?;
+        let message = values.pop().unwrap_or(f32::NAN);
+        let lpips = lpips.and_then(|_| values.pop());
+        let [l1, ssim] = match &by_hand {
+            Some((views, _)) => mean_terms(views),
+            None => [values[0], values[1]],
+        };
         let terms = LossTerms {
-            l1: values[0],
-            ssim: values[1],
-            message: values[2],
-            lpips: values.get(3).copied(),
+            l1,
+            ssim,
+            message,
+            lpips,
             offset: 0.0,
         };
         check_finite(step, &terms)?;
@@ -110,9 +129,16 @@ impl<'a> Loss<'a> {
             device: self.engine.compute.name.clone(),
             reason: "the loss has no gradient to the pictures".into(),
         })?;
-        let gradients = unbatch(gradient)?;
-        let sum: f32 = gradients.iter().flat_map(|g| &g.pixels).map(|g| g.abs()).sum();
-        finite(step, "gradient", sum)?;
+        let mut gradients = unbatch(gradient)?;
+        if let Some((_, likeness)) = by_hand {
+            gradients.par_iter_mut().zip(likeness).for_each(|(gradient, likeness)| {
+                let both = gradient.pixels.iter_mut().zip(likeness);
+                both.for_each(|(sum, term)| *sum += term);
+            });
+        }
+        let of_view = |gradient: &Picture| gradient.pixels.iter().map(|g| g.abs()).sum::<f32>();
+        let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
+        finite(step, "gradient", sums.iter().sum())?;
         let logits = self.engine.to_host(logits.inner())?;
         let right = logits
             .iter()
@@ -136,6 +162,12 @@ impl<'a> Loss<'a> {
         let places = Tensor::<1, Int>::from_data(TensorData::new(places, [count]), &pictures.device());
         pictures.select(0, places)
     }
+}
+
+/// L1 and 1 - SSIM, the means over views.
+fn mean_terms(views: &[Likeness]) -> [f32; 2] {
+    let mean = |of: fn(&Likeness) -> f64| views.iter().map(of).sum::<f64>() / views.len() as f64;
+    [mean(|view| view.l1) as f32, (1.0 - mean(|view| view.ssim)) as f32]
 }
 
 fn check_finite(step: usize, terms: &LossTerms) -> Result<()> {

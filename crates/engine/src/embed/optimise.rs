@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::adam::{Adam, Penalty};
 use super::early_stopping::EarlyStopping;
@@ -251,8 +252,8 @@ fn mean_psnr(references: &[&Picture], pictures: &[&Picture]) -> f64 {
         let mse = squares.sum::<f64>() / a.pixels.len() as f64;
         -10.0 * mse.log10()
     };
-    let views = references.iter().zip(pictures);
-    views.map(of).sum::<f64>() / pictures.len() as f64
+    let views: Vec<f64> = references.par_iter().zip(pictures).map(of).collect();
+    views.iter().sum::<f64>() / pictures.len() as f64
 }
 
 #[cfg(test)]

@@ -149,6 +149,11 @@ impl Engine {
         Ok(self.lpips.get())
     }
 
+    /// Whether tensors live in the host's memory, where loops of our own reach them.
+    pub(crate) fn on_cpu(&self) -> bool {
+        on_cpu(&self.compute)
+    }
+
     /// Bytes of the weights of all models that a job uses; `with_lpips` says whether that is one of them.
     pub fn model_bytes(&self, with_lpips: bool) -> u64 {
         let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len());
@@ -216,7 +221,7 @@ impl Engine {
 
     /// What a view that is drawn repeatedly keeps: weights where they are used and fit, in `half` precision if asked for.
     pub fn weight_cache(&self, size: u32, half: bool) -> WeightCache {
-        if on_cpu(&self.compute) {
+        if self.on_cpu() {
             cpu_weight_cache(size, half)
         } else {
             WeightCache::None
@@ -244,7 +249,7 @@ impl Engine {
             self.stop.check()?;
             work(item)
         };
-        if on_cpu(&self.compute) {
+        if self.on_cpu() {
             items.par_iter().map(work).collect()
         } else {
             items.iter().map(work).collect()

@@ -1,13 +1,13 @@
 //! Pictures to tensors and back.
 use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 
-/// Stacks pictures of one size into `[b, 3, height, width]`, values as they are.
-///
-/// Fails without pictures, when sizes differ, and when a picture's pixels do not fit its size.
-pub fn batch(pictures: &[&Picture], device: &Device) -> Result<Tensor<4>> {
+/// That there are pictures, all of one size that is not empty, with as many numbers as that needs. The error says what
+/// is not so.
+pub(super) fn comparable(pictures: &[&Picture]) -> Result<()> {
     let bad = |reason| {
         Err(Error::BadOption {
             field: "pictures",
@@ -17,29 +17,42 @@ pub fn batch(pictures: &[&Picture], device: &Device) -> Result<Tensor<4>> {
     let Some(first) = pictures.first() else {
         return bad("there are none".into());
     };
-    let (width, height) = (first.width as usize, first.height as usize);
-    let area = width * height;
+    let (width, height) = (first.width, first.height);
+    let area = width as usize * height as usize;
     if area == 0 {
         return bad(format!("a picture of {width} x {height} pixels has none"));
     }
-    let mut values: Vec<f32> = Vec::with_capacity(pictures.len() * 3 * area);
     for picture in pictures {
-        if (picture.width, picture.height) != (first.width, first.height) {
+        let (other_width, other_height, len) = (picture.width, picture.height, picture.pixels.len());
+        if (other_width, other_height) != (width, height) {
             return bad(format!(
-                "sizes differ: {width} x {height} and {} x {}",
-                picture.width, picture.height
+                "sizes differ: {width} x {height} and {other_width} x {other_height}"
             ));
         }
-        if picture.pixels.len() != 3 * area {
-            return bad(format!(
-                "{} values are not {width} x {height} pixels",
-                picture.pixels.len()
-            ));
-        }
-        for channel in 0..3 {
-            values.extend(picture.pixels.iter().skip(channel).step_by(3));
+        if len != 3 * area {
+            return bad(format!("{len} values are not {width} x {height} pixels"));
         }
     }
+    Ok(())
+}
+
+/// Stacks pictures of one size into `[b, 3, height, width]`, values as they are.
+///
+/// Fails without pictures, when sizes differ, and when a picture's pixels do not fit its size.
+pub fn batch(pictures: &[&Picture], device: &Device) -> Result<Tensor<4>> {
+    comparable(pictures)?;
+    let (width, height) = (pictures[0].width as usize, pictures[0].height as usize);
+    let area = width * height;
+    let mut values = vec![0.0_f32; pictures.len() * 3 * area];
+    let planes = values.par_chunks_exact_mut(3 * area).zip(pictures);
+    planes.for_each(|(planes, picture)| {
+        let (red, rest) = planes.split_at_mut(area);
+        let (green, blue) = rest.split_at_mut(area);
+        let places = red.iter_mut().zip(green).zip(blue);
+        for (((red, green), blue), pixel) in places.zip(picture.pixels.as_chunks::<3>().0) {
+            [*red, *green, *blue] = *pixel;
+        }
+    });
     Ok(Tensor::from_data(
         TensorData::new(values, [pictures.len(), 3, height, width]),
         device,
@@ -55,19 +68,26 @@ pub fn unbatch(tensor: Tensor<4>) -> Result<Vec<Picture>> {
             reason: format!("{channels} channels instead of 3"),
         });
     }
-    let pixels = tensor
-        .permute([0, 2, 3, 1])
-        .try_into_vec_as::<f32>()
-        .map_err(|e| Error::Device {
-            device: "pictures".into(),
-            reason: e.to_string(),
-        })?;
-    let picture = |chunk: &[f32]| Picture {
-        width: width as u32,
-        height: height as u32,
-        pixels: chunk.to_vec(),
+    let values = tensor.try_into_vec_as::<f32>().map_err(|e| Error::Device {
+        device: "pictures".into(),
+        reason: e.to_string(),
+    })?;
+    let area = height * width;
+    let picture = |planes: &[f32]| {
+        let (red, rest) = planes.split_at(area);
+        let (green, blue) = rest.split_at(area);
+        let mut pixels = vec![0.0; 3 * area];
+        let places = pixels.as_chunks_mut::<3>().0.iter_mut();
+        for (pixel, ((red, green), blue)) in places.zip(red.iter().zip(green).zip(blue)) {
+            *pixel = [*red, *green, *blue];
+        }
+        Picture {
+            width: width as u32,
+            height: height as u32,
+            pixels,
+        }
     };
-    Ok(pixels.chunks_exact((3 * height * width).max(1)).map(picture).collect())
+    Ok(values.par_chunks_exact((3 * area).max(1)).map(picture).collect())
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ pub fn measure(pairs: &[(Picture, Picture)], lpips: Option<&Lpips>, device: &Dev
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let similarity = |(a, b): &(Picture, Picture)| -> Result<f64> {
         stop.check()?;
-        ssim(a, b, device)
+        ssim(a, b)
     };
     let ssim = mean(pairs.iter().map(similarity).collect::<Result<_>>()?);
     let distance = |lpips: &Lpips, (a, b): &(Picture, Picture)| -> Result<f64> {

@@ -4,15 +4,18 @@ pub mod batch;
 pub mod compare;
 mod exr;
 pub mod files;
+mod likeness;
 pub mod lpips;
 mod lpips_weights;
 pub mod measure;
 pub mod psnr;
 pub mod ssim;
+mod window;
 
 pub use batch::{batch, unbatch};
 pub use compare::{contact_sheet, difference};
 pub use files::{PictureFormat, decode_picture, encode_picture, is_picture, read_picture, write_picture};
+pub(crate) use likeness::{Likeness, LikenessWeights, likeness_with_gradient};
 pub use lpips::Lpips;
 pub use measure::{Quality, measure};
 pub use psnr::{MeanPsnr, Psnr, mean_psnr, psnr};

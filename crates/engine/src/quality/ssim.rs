@@ -5,14 +5,14 @@
 //! every device, which small convolutions do not.
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::batch::batch;
-use crate::error::{Error, Result};
+use super::batch::comparable;
+use super::likeness::mean_ssim;
+use super::window::{RADIUS, weight};
+use crate::error::Result;
 use crate::picture::Picture;
 
-const RADIUS: usize = 5;
-const SIGMA: f64 = 1.5;
-const C1: f32 = 0.01 * 0.01;
-const C2: f32 = 0.03 * 0.03;
+pub(super) const C1: f32 = 0.01 * 0.01;
+pub(super) const C2: f32 = 0.03 * 0.03;
 
 /// Blur matrices for pictures of one size on one device.
 #[derive(Clone, Debug)]
@@ -25,12 +25,10 @@ pub struct Ssim {
 
 /// The n x n matrix of a Gaussian window with zeros beyond the border.
 fn band(n: usize, device: &Device) -> Tensor<2> {
-    let weight = |distance: usize| (-((distance * distance) as f64) / (2.0 * SIGMA * SIGMA)).exp();
-    let sum: f64 = weight(0) + 2.0 * (1..=RADIUS).map(weight).sum::<f64>();
     let mut matrix = vec![0.0_f32; n * n];
     for i in 0..n {
         for j in i.saturating_sub(RADIUS)..n.min(i + RADIUS + 1) {
-            matrix[i * n + j] = (weight(i.abs_diff(j)) / sum) as f32;
+            matrix[i * n + j] = weight(i.abs_diff(j)) as f32;
         }
     }
     Tensor::from_data(TensorData::new(matrix, [n, n]), device)
@@ -78,17 +76,11 @@ impl Ssim {
     }
 }
 
-/// SSIM of two pictures of one size. Fails when sizes differ or the device does.
-pub fn ssim(original: &Picture, marked: &Picture, device: &Device) -> Result<f64> {
-    let device = device.clone().without_autodiff();
-    let both = batch(&[original, marked], &device)?;
-    let [_, _, h, w] = both.dims();
-    let value = Ssim::new(h, w, &device).mean(both.clone().slice(0..1), both.slice(1..2));
-    let value = value.try_into_scalar::<f32>();
-    value.map(f64::from).map_err(|e| Error::Device {
-        device: "ssim".into(),
-        reason: e.to_string(),
-    })
+/// SSIM of two pictures of one size, the mean over pixels and colours of pictures clamped to [0, 1]. Fails when sizes
+/// differ and on pictures without pixels.
+pub fn ssim(original: &Picture, marked: &Picture) -> Result<f64> {
+    comparable(&[original, marked])?;
+    Ok(mean_ssim(original, marked))
 }
 
 #[cfg(test)]
@@ -97,6 +89,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::quality::batch;
 
     fn random(width: u32, height: u32, seed: u64) -> Picture {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -153,7 +146,7 @@ mod tests {
         for (w, h, amount) in [(23, 17, 0.2), (4, 30, 0.5), (1, 1, 0.1)] {
             let a = random(w, h, 1);
             let b = noisy(&a, amount, 2);
-            let (value, expected) = (ssim(&a, &b, &Device::flex()).unwrap(), reference(&a, &b));
+            let (value, expected) = (ssim(&a, &b).unwrap(), reference(&a, &b));
             assert!((value - expected).abs() < 1e-5, "{w} x {h}: {value} {expected}");
         }
     }
@@ -162,20 +155,20 @@ mod tests {
     fn identical_and_constant_pictures_have_one_and_noise_lowers_it() {
         let a = random(32, 32, 3);
         let device = Device::flex();
-        assert!((ssim(&a, &a, &device).unwrap() - 1.0).abs() < 1e-6);
+        assert!((ssim(&a, &a).unwrap() - 1.0).abs() < 1e-6);
         for value in [0.0, 0.5, 1.0] {
             let grey = Picture {
                 pixels: vec![value; 32 * 32 * 3],
                 ..a
             };
-            assert!((ssim(&grey, &grey, &device).unwrap() - 1.0).abs() < 1e-5);
+            assert!((ssim(&grey, &grey).unwrap() - 1.0).abs() < 1e-5);
         }
         let falling: Vec<f64> = [0.0, 0.1, 0.3, 0.9]
             .iter()
-            .map(|&n| ssim(&a, &noisy(&a, n, 4), &device).unwrap())
+            .map(|&n| ssim(&a, &noisy(&a, n, 4)).unwrap())
             .collect();
         assert!(falling.windows(2).all(|w| w[0] > w[1]), "{falling:?}");
-        assert!(ssim(&a, &random(16, 32, 1), &device).is_err());
+        assert!(ssim(&a, &random(16, 32, 1)).is_err());
     }
 
     #[test]
@@ -210,7 +203,7 @@ mod tests {
         let right = batch(&[&b, &c], &device).unwrap();
         let both = metric.per_view(left, right).try_into_vec_as::<f32>().unwrap();
         for (value, (x, y)) in both.iter().zip([(&a, &b), (&b, &c)]) {
-            assert!((f64::from(*value) - ssim(x, y, &device).unwrap()).abs() < 1e-6);
+            assert!((f64::from(*value) - ssim(x, y).unwrap()).abs() < 1e-6);
         }
     }
 }
