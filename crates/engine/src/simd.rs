@@ -1,7 +1,7 @@
 //! Loops compiled for several instruction sets, of which the widest is run that the processor has.
 //!
-//! Loops are plain Rust over arrays of lanes, which the compiler turns into vector instructions; only choosing between
-//! the sets needs unsafe code. Every set has AVX-512's or AVX2's fused multiplication and addition, or neither: sums of
+//! Loops are plain Rust over arrays of lanes, which the compiler turns into vector instructions. `pulp` brings AVX2; its
+//! AVX-512 is a feature that has burn built anew for processors that few have, so that set alone is here. Every set has AVX-512's or AVX2's fused multiplication and addition, or neither: sums of
 //! products then differ in their last bit between sets. On one machine the same set is always chosen.
 
 /// A loop, with what it works on.
@@ -22,18 +22,18 @@ pub(crate) fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
 }
 
 /// Vector instructions that this processor has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Instructions(Set);
 
 /// Private, so that nobody names a set that was not found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Set {
     /// 16 lanes, fused.
     #[cfg(target_arch = "x86_64")]
     Avx512,
     /// 8 lanes, fused.
     #[cfg(target_arch = "x86_64")]
-    Avx2,
+    Avx2(pulp::x86::V3),
     /// What every processor of the architecture has: SSE2, NEON.
     Baseline,
 }
@@ -43,8 +43,12 @@ impl Instructions {
     pub fn present() -> impl Iterator<Item = Self> {
         #[cfg(target_arch = "x86_64")]
         let found = [
-            (is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")).then_some(Set::Avx512),
-            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(Set::Avx2),
+            (is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("fma"))
+            .then_some(Set::Avx512),
+            pulp::x86::V3::try_new().map(Set::Avx2),
             Some(Set::Baseline),
         ];
         #[cfg(not(target_arch = "x86_64"))]
@@ -64,33 +68,39 @@ impl Instructions {
             // SAFETY: `present` found these instructions, and nothing else makes this variant.
             #[cfg(target_arch = "x86_64")]
             Set::Avx512 => unsafe { avx512(work) },
-            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => unsafe { avx2(work) },
+            Set::Avx2(set) => set.vectorize(Fused(work)),
             Set::Baseline => work.run::<{ cfg!(target_arch = "aarch64") }>(),
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
 fn avx512<V: Vectorised>(work: V) -> V::Output {
     work.run::<true>()
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2<V: Vectorised>(work: V) -> V::Output {
-    work.run::<true>()
+struct Fused<V>(V);
+
+#[cfg(target_arch = "x86_64")]
+impl<V: Vectorised> pulp::NullaryFnOnce for Fused<V> {
+    type Output = V::Output;
+
+    #[inline(always)]
+    fn call(self) -> V::Output {
+        self.0.run::<true>()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    struct Fused;
+    struct Product;
 
-    impl Vectorised for Fused {
+    impl Vectorised for Product {
         type Output = f32;
 
         #[inline(always)]
@@ -103,10 +113,13 @@ mod tests {
     #[test]
     fn wide_sets_keep_what_rounding_a_product_would_lose() {
         for set in Instructions::present() {
-            let left = set.run(Fused);
-            let fused = set != Instructions(Set::Baseline) || cfg!(target_arch = "aarch64");
+            let left = set.run(Product);
+            let fused = !matches!(set.0, Set::Baseline) || cfg!(target_arch = "aarch64");
             assert_eq!(left, if fused { f32::EPSILON.powi(2) } else { 0.0 }, "{set:?}");
         }
-        assert_eq!(Instructions::present().last(), Some(Instructions(Set::Baseline)));
+        assert!(matches!(
+            Instructions::present().last(),
+            Some(Instructions(Set::Baseline))
+        ));
     }
 }

@@ -9,6 +9,7 @@
 //! Both devices reduce the argument to a half turn by hand: arguments reach hundreds of radians, and a GPU's own sine
 //! promises nothing there.
 mod cpu;
+mod flex;
 mod gpu;
 mod kernel;
 mod pool;

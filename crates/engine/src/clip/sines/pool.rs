@@ -79,3 +79,34 @@ impl Squares {
         1.0 / (self.side * self.side) as f32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_and_their_gradient_leave_out_what_fills_no_square() {
+        let squares = Squares {
+            height: 3,
+            width: 5,
+            side: 2,
+        };
+        let planes: Vec<f32> = (0..30).map(|v| v as f32).collect();
+        // Rows 0 and 1, columns 0 to 3 of each plane.
+        assert_eq!(squares.means(&planes)[..], [3.0, 5.0, 18.0, 20.0]);
+        let spread = squares.spread(vec![4.0, 8.0, 12.0, 16.0]);
+        assert_eq!(spread[..10], [1.0, 1.0, 2.0, 2.0, 0.0, 1.0, 1.0, 2.0, 2.0, 0.0]);
+        assert_eq!(spread[10..17], [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0]);
+    }
+
+    #[test]
+    fn squares_larger_than_a_plane_have_no_means() {
+        let squares = Squares {
+            height: 3,
+            width: 3,
+            side: 4,
+        };
+        assert!(squares.means(&[1.0; 9]).is_empty());
+        assert_eq!(squares.spread(Vec::new()), Vec::<f32>::new());
+    }
+}

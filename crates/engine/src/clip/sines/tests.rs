@@ -146,19 +146,3 @@ fn what_is_no_number_stays_none() {
     let [means, _] = computed(&case, &Device::flex());
     assert!(means.iter().all(|m| m.is_nan()));
 }
-
-#[test]
-fn every_instruction_set_is_within_the_tolerance_of_features() {
-    let [views, height, width, waves] = [1, 64, 64, 32];
-    let case = case([views, height, width, waves], 60.0, 1);
-    let [true_means, true_slopes] = reference(&case);
-    let largest = true_slopes.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-    for set in crate::simd::Instructions::present() {
-        let (means, slopes) = cpu::with(set, &case.pictures, views, &case.filters, &case.phases, &case.gradient);
-        let gaps = [
-            largest_gap(&means, &true_means),
-            largest_gap(&slopes, &true_slopes) / largest,
-        ];
-        assert!(gaps[0] < 3e-6 && gaps[1] < 1e-4, "{set:?} {gaps:?}");
-    }
-}
