@@ -17,7 +17,7 @@ use crate::resource_names;
 /// Arguments of `verify`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenes (PLY, compressed PLY, SPZ, SOG, .splat), pictures (PNG, JPEG, WebP) and folders of them; or such that
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .splat), pictures (PNG, JPEG, WebP) and folders of them; or such that
     /// are there already, artifacts/ID
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<String>,

@@ -1,7 +1,8 @@
 //! Files that appear whole or not at all.
 use crate::{Error, Result};
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Writes a file under a temporary name in the same folder, makes it durable, and only then gives it its name.
 ///
@@ -11,33 +12,60 @@ use std::path::Path;
 /// [`Error::Io`]: no such folder, no permission, disk full; or `path` is something else than a regular file, such as
 /// a device, which a rename would replace.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    let attempt = || -> std::io::Result<()> {
-        if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-            return Err(std::io::Error::other("exists and is not a regular file"));
-        }
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".guardsplat-").suffix(".part");
-        #[cfg(unix)]
-        {
-            // Like any new file: what the user's mask allows, not the privacy of a temporary one.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let file = builder.tempfile_in(folder)?;
-        let mut out = BufWriter::with_capacity(1 << 20, file);
-        write(&mut out)?;
-        let file = out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|e| e.error)?;
+    Pending::write(path, write)?.finish()
+}
+
+/// A file that is whole and durable, and has yet to get its name; else it is deleted.
+pub(crate) struct Pending {
+    file: NamedTempFile,
+    path: PathBuf,
+}
+
+impl Pending {
+    /// Writes a file under a temporary name, as [`write_whole`].
+    pub fn write(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<Pending> {
+        let file = aside(path, write).map_err(Error::io(path))?;
+        Ok(Pending {
+            file,
+            path: path.into(),
+        })
+    }
+
+    /// Gives it its name.
+    pub fn finish(self) -> Result<()> {
+        let Pending { file, path } = self;
+        file.persist(&path).map_err(|e| Error::io(&path)(e.error))?;
         // The name is durable once the folder is; not every file system can do that, and the file is whole anyway.
-        let _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
+        let _ = std::fs::File::open(folder(&path)).and_then(|folder| folder.sync_all());
         Ok(())
-    };
-    attempt().map_err(Error::io(path))
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+fn aside(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<NamedTempFile> {
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return Err(std::io::Error::other("exists and is not a regular file"));
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".guardsplat-").suffix(".part");
+    #[cfg(unix)]
+    {
+        // Like any new file: what the user's mask allows, not the privacy of a temporary one.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let file = builder.tempfile_in(folder(path))?;
+    let mut out = BufWriter::with_capacity(1 << 20, file);
+    write(&mut out)?;
+    let file = out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+    file.as_file().sync_all()?;
+    Ok(file)
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! What a file is besides its Gaussians: how it is written again with other colours, and which colours it can keep.
-use crate::{Ignored, Sh};
+use crate::atomic_write::write_whole;
+use crate::{Ignored, Result, Sh};
 use std::fmt::Debug;
 use std::io::{self, Write};
+use std::path::Path;
 
 /// The file formats of scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,6 +18,10 @@ pub enum Format {
     Splat,
     /// PlayCanvas' pictures in a ZIP.
     Sog,
+    /// glTF with KHR_gaussian_splatting, as JSON.
+    Gltf,
+    /// The same in one binary file.
+    Glb,
 }
 
 impl Format {
@@ -27,6 +33,8 @@ impl Format {
             Format::Spz => "spz",
             Format::Splat => "splat",
             Format::Sog => "sog",
+            Format::Gltf => "gltf",
+            Format::Glb => "glb",
         }
     }
 }
@@ -62,6 +70,16 @@ pub(crate) trait Container: Debug + Send + Sync {
     /// Rows of the file that are no Gaussians of the scene, where some were ignored. They are written as they were.
     fn ignored(&self) -> Option<&Ignored> {
         None
+    }
+
+    /// Whether everything is in one file; others can't be written by [`write`](Self::write).
+    fn is_one_file(&self) -> bool {
+        true
+    }
+
+    /// Writes the file at `path` with the colours `sh`, whole or not at all, and those that it refers to beside it.
+    fn write_at(&self, sh: &Sh, path: &Path) -> Result<()> {
+        write_whole(path, |out| self.write(sh, out))
     }
 
     /// Writes the file with the colours `sh`: finite, of the degree and the rows of the scene that was read.

@@ -12,6 +12,7 @@ pub mod convert;
 mod error;
 mod fields;
 mod gaussians;
+mod gltf;
 mod ignored;
 mod names;
 mod packed;

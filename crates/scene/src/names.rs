@@ -4,12 +4,14 @@ use std::path::Path;
 
 impl Format {
     /// All of them.
-    pub const ALL: [Format; 5] = [
+    pub const ALL: [Format; 7] = [
         Format::Ply,
         Format::CompressedPly,
         Format::Spz,
         Format::Splat,
         Format::Sog,
+        Format::Gltf,
+        Format::Glb,
     ];
 
     /// What people call it.
@@ -20,6 +22,8 @@ impl Format {
             Format::Spz => "SPZ",
             Format::Splat => ".splat",
             Format::Sog => "SOG",
+            Format::Gltf => "glTF",
+            Format::Glb => "binary glTF",
         }
     }
 
@@ -27,6 +31,16 @@ impl Format {
     pub fn of_name(path: &Path) -> Option<Format> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Format::ALL.into_iter().find(|format| format.extension() == extension)
+    }
+
+    /// The format that a file's whole name says: of a PLY also whether it is a compressed one.
+    pub fn of_whole_name(path: &Path) -> Option<Format> {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let compressed = format!(".{}", Format::CompressedPly.extension());
+        match Format::of_name(path)? {
+            Format::Ply if name.ends_with(&compressed) => Some(Format::CompressedPly),
+            format => Some(format),
+        }
     }
 
     /// Whether a file of this format may be called so: with any name but one that says it is of another. Both kinds
@@ -66,6 +80,7 @@ mod tests {
                 other => other,
             };
             assert_eq!(said, expected);
+            assert_eq!(Format::of_whole_name(Path::new(&name)), Some(format));
             format.check_name(Path::new(&name)).unwrap();
             format.check_name(Path::new(&name.to_uppercase())).unwrap();
         }

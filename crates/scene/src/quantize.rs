@@ -5,7 +5,7 @@
 //! then: bit by bit, but for SOG, whose codebooks and groups stay those of the scene that it was fitted to.
 //! Groups of a changed scene follow its changes a little: of independent noise of 0.02 on the harmonics of a captured
 //! scene (101,407 Gaussians, degree 3) files keep 73 % and the stand-in 62 %.
-use crate::convert::{check_arrays, morton, packed, sog, splat, spz};
+use crate::convert::{self, check_arrays, morton, packed, sog, splat, spz};
 use crate::error::bad;
 use crate::packed::{CHUNK, rest};
 use crate::range::Range;
@@ -28,6 +28,8 @@ pub struct ColorQuantizer {
 enum How {
     /// Everything.
     Ply,
+    /// Everything up to the highest degree that a glTF has.
+    Gltf,
     Spz,
     Splat,
     Packed(Chunks),
@@ -67,6 +69,7 @@ impl ColorQuantizer {
         }
         let how = match format {
             Format::Ply => How::Ply,
+            Format::Gltf | Format::Glb => How::Gltf,
             Format::Spz => How::Spz,
             Format::Splat => How::Splat,
             Format::CompressedPly => How::Packed(Chunks::of(gaussians)),
@@ -107,6 +110,12 @@ impl ColorQuantizer {
         }
         match &self.how {
             How::Ply => (),
+            How::Gltf => {
+                let most = convert::most_degree(Format::Glb) + 1;
+                for row in coefficients.chunks_exact_mut(self.per_gaussian) {
+                    row.iter_mut().skip(3 * most * most).for_each(|value| *value = 0.0);
+                }
+            }
             How::Spz => coefficients.chunks_exact_mut(self.per_gaussian).for_each(keep_spz),
             How::Splat => coefficients.chunks_exact_mut(self.per_gaussian).for_each(keep_splat),
             How::Packed(chunks) => chunks.apply(rows, coefficients, self.per_gaussian),

@@ -4,8 +4,8 @@ use crate::container::{Container, Format};
 use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
-use crate::sniff::announced;
-use crate::{Error, Result, ply, sog, splat, spz};
+use crate::sniff::{announced, is_loose_sog};
+use crate::{Error, Result, gltf, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -52,19 +52,37 @@ impl Scene {
     }
 
     /// Reads a scene as [`Scene::read_with`], and stops before it takes more than `memory` bytes, where the head of the
-    /// file does not tell how many it will take: that is so of SOG. Of all other formats
+    /// file does not tell how many it will take: that is so of SOG and glTF. Of all other formats
     /// [`summary`](crate::summary()) tells before anything is read.
     ///
     /// # Errors
     /// Those of [`Scene::read_with`]; [`Error::DoesNotFit`].
     pub fn read_within(path: &Path, bad_rows: BadRows, memory: u64) -> Result<Scene> {
+        Scene::open(path, bad_rows, memory, None)
+    }
+
+    /// Reads a scene as [`Scene::read_within`], and the files in its folder that it refers to: a glTF may have its
+    /// buffers there. The path may also be the folder of a SOG that is not bundled. Only for files that their user chose on this machine: who hands in a file chooses what is read.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read_within`]; [`Error::BadScene`] for references to anything that is not in the folder or
+    /// below it.
+    pub fn read_with_files(path: &Path, bad_rows: BadRows, memory: u64) -> Result<Scene> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Scene::open(path, bad_rows, memory, Some(folder))
+    }
+
+    fn open(path: &Path, bad_rows: BadRows, memory: u64, folder: Option<&Path>) -> Result<Scene> {
+        if folder.is_some() && is_loose_sog(path) {
+            return Scene::of(path, sog::read_folder(path, bad_rows, memory)?);
+        }
         let file = File::open(path).map_err(Error::io(path))?;
         let metadata = file.metadata().map_err(Error::io(path))?;
         if !metadata.is_file() {
             return Err(bad(path, "not a regular file".to_string()));
         }
         let mut source = BufReader::with_capacity(1 << 16, file);
-        Scene::read_from(path, &mut source, metadata.len(), bad_rows, memory)
+        Scene::read_from(path, &mut source, metadata.len(), bad_rows, memory, folder)
     }
 
     /// Reads a scene from memory; `name` is for messages.
@@ -80,25 +98,34 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::read_with`].
     pub fn parse_with(name: &Path, bytes: &[u8], bad_rows: BadRows) -> Result<Scene> {
-        Scene::read_from(name, &mut BufReader::new(bytes), bytes.len() as u64, bad_rows, u64::MAX)
+        let size = bytes.len() as u64;
+        Scene::read_from(name, &mut BufReader::new(bytes), size, bad_rows, u64::MAX, None)
     }
 
-    /// Reads a scene of `size` bytes within `memory` bytes; `path` is for messages.
+    /// Reads a scene of `size` bytes within `memory` bytes, and files that it refers to from `folder`, if that is given;
+    /// `path` is for messages.
     fn read_from(
         path: &Path,
         source: &mut BufReader<impl Read>,
         size: u64,
         bad_rows: BadRows,
         memory: u64,
+        folder: Option<&Path>,
     ) -> Result<Scene> {
         // The file system may give fewer bytes at first, but a buffer of an empty file only.
         let first = source.fill_buf().map_err(Error::io(path))?;
-        let (gaussians, source) = match announced(first) {
+        let read = match announced(first) {
             Some(Format::Ply | Format::CompressedPly) => ply::read(path, source, size, bad_rows)?,
             Some(Format::Spz) => spz::read(path, source, size)?,
             Some(Format::Sog) => sog::read(path, source, size, bad_rows, memory)?,
+            Some(Format::Gltf | Format::Glb) => gltf::read(path, source, size, bad_rows, memory, folder)?,
             _ => splat::read(path, source, size, bad_rows)?,
         };
+        Scene::of(path, read)
+    }
+
+    /// What was read, of which some row must be left.
+    fn of(path: &Path, (gaussians, source): (Gaussians, Arc<dyn Container>)) -> Result<Scene> {
         if let Some(ignored) = source.ignored().filter(|_| gaussians.is_empty()) {
             let (count, first) = (ignored.count(), ignored.first());
             return Err(bad(
@@ -135,7 +162,16 @@ impl Scene {
             let (row, value) = (i / sh.per_gaussian(), sh.coefficients[i]);
             return Err(bad(path, format!("a colour of row {row} would be {value}")));
         }
-        write_whole(path, |out| self.encode(sh, out))
+        match &self.source {
+            Some(source) => source.write_at(sh, path),
+            None => write_whole(path, |out| self.encode(sh, out)),
+        }
+    }
+
+    /// Whether all of it is in one file. Otherwise [`Scene::write`] writes files beside, named after the one at its path,
+    /// and [`Scene::encode`] fails.
+    pub fn is_one_file(&self) -> bool {
+        self.source.as_ref().is_none_or(|source| source.is_one_file())
     }
 
     /// The bytes that [`Scene::write`] puts into a file, for colours that it would not refuse.

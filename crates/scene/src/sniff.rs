@@ -3,7 +3,7 @@ use crate::container::Format;
 use crate::error::bad;
 use crate::ignored::BadRows;
 use crate::summary::Summary;
-use crate::{Error, Result, ply, sog, splat, spz};
+use crate::{Error, Result, gltf, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -18,7 +18,7 @@ pub(crate) fn announced(first: &[u8]) -> Option<Format> {
         first if ply::begins(first) => Some(Format::Ply),
         first if spz::is_spz(first) => Some(Format::Spz),
         first if sog::detect(first) => Some(Format::Sog),
-        _ => None,
+        first => gltf::announced(first),
     }
 }
 
@@ -77,7 +77,7 @@ impl Format {
 }
 
 /// What `head` says, the first [`HEAD`](crate::HEAD) bytes of a file of `size` bytes, or all of a smaller one; `name` is for
-/// messages. `None` where it says nothing: a SOG has its figures anywhere.
+/// messages. `None` where it says nothing: a SOG and a glTF have their figures anywhere.
 ///
 /// # Errors
 /// [`Error::BadScene`](crate::Error::BadScene) for what [`Scene::read_with`](crate::Scene::read_with) would refuse after
@@ -86,7 +86,7 @@ pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
     let said = match head {
         _ if ply::begins(head) => ply::summary(head, size),
         _ if spz::is_spz(head) => spz::summary(head, size),
-        _ if sog::detect(head) => return Ok(None),
+        _ if sog::detect(head) || gltf::announced(head).is_some() => return Ok(None),
         _ => splat::summary(head, size),
     };
     said.map(Some).map_err(|reason| bad(name, reason))
@@ -128,10 +128,21 @@ mod tests {
             (gzip, Format::Spz),
             (b"NGSP\x04", Format::Spz),
             (b"PK\x03\x04", Format::Sog),
+            (b"glTF\x02\0\0\0", Format::Glb),
+            (b" {\n\t\"asset\"", Format::Gltf),
+            (b"\xef\xbb\xbf{\"scene\":0", Format::Gltf),
         ] {
             assert_eq!(sniff(head, 1000), Some(format), "{}", head.escape_ascii());
         }
-        for head in [&b""[..], b"plywood", b"\x89PNG\r\n\x1a\n", b"Dear diary"] {
+        for head in [
+            &b""[..],
+            b"plywood",
+            b"\x89PNG\r\n\x1a\n",
+            b"Dear diary",
+            b"{ brackets }",
+            b"{\"\0\0",
+            b"[{\"position\":",
+        ] {
             assert_eq!(sniff(head, 1024), None, "{}", head.escape_ascii());
         }
     }

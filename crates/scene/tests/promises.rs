@@ -30,6 +30,40 @@ fn spz(points: u32) -> Vec<u8> {
     file
 }
 
+/// A binary glTF of a little JSON and a small buffer.
+fn glb(json: &str) -> Vec<u8> {
+    let json = format!("{json:1$}", json.len().next_multiple_of(4));
+    let mut file = b"glTF\x02\0\0\0".to_vec();
+    file.extend((12 + 8 + json.len() as u32 + 8 + 64).to_le_bytes());
+    file.extend((json.len() as u32).to_le_bytes());
+    file.extend(b"JSON");
+    file.extend(json.as_bytes());
+    file.extend(64u32.to_le_bytes());
+    file.extend(b"BIN\0");
+    let mut spz = spz(400_000_000);
+    spz.truncate(64);
+    file.extend(spz);
+    file
+}
+
+/// Primitives of splats that promise much: of as many as `count`, in the buffer, and as an SPZ.
+fn gltf(count: u64, length: u64) -> [Vec<u8>; 2] {
+    let own = "KHR_gaussian_splatting";
+    let start = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":0,"attributes":{"#;
+    let end = format!(
+        r#""accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3"}}],
+"bufferViews":[{{"buffer":0,"byteLength":{length}}}],"buffers":[{{"byteLength":{length}}}]}}"#
+    );
+    [
+        glb(&format!(
+            r#"{start}"POSITION":0,"{own}:ROTATION":0,"{own}:SCALE":0,"{own}:OPACITY":0,"{own}:SH_DEGREE_0_COEF_0":0}},"extensions":{{"{own}":{{}}}}}}]}}],{end}"#
+        )),
+        glb(&format!(
+            r#"{start}}},"extensions":{{"{own}":{{"extensions":{{"{own}_compression_spz":{{"bufferView":0}}}}}}}}}}]}}],{end}"#
+        )),
+    ]
+}
+
 // One test: another thread's memory would be counted too.
 #[test]
 fn headers_that_promise_too_much_cost_nothing() {
@@ -46,6 +80,9 @@ fn headers_that_promise_too_much_cost_nothing() {
             files.push((format!("{elements}, {format}, {names}"), ply(format, elements, names)));
         }
     }
+    for (count, length) in [(400_000_000, 64), (u64::MAX, 64), (400_000_000, 1 << 40), (5, 64)] {
+        files.extend(gltf(count, length).map(|file| (format!("{count} splats of {length} bytes"), file)));
+    }
     let folder = tempfile::tempdir().unwrap();
     for (what, file) in files {
         let path = folder.path().join("it");
@@ -53,7 +90,8 @@ fn headers_that_promise_too_much_cost_nothing() {
         for bad_rows in [BadRows::Refuse, BadRows::Ignore] {
             ALLOCATOR.reset_peak_memory();
             assert!(Scene::read_with(&path, bad_rows).is_err(), "{what}");
-            assert!(summary(Path::new("it"), &file[..file.len().min(HEAD)], file.len() as u64).is_err());
+            let said = summary(Path::new("it"), &file[..file.len().min(HEAD)], file.len() as u64);
+            assert!(matches!(said, Err(_) | Ok(None)));
             let peak = ALLOCATOR.get_peak_memory();
             assert!(peak < ENOUGH, "{what}: {peak} bytes");
         }

@@ -6,7 +6,7 @@ use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::embed::{
-    Job, Outcome, Preset, Progress, Ring, Settings, TrainableCoefficients, Verification, embed,
+    Job, Outcome, Preset, Progress, Ring, Settings, TrainableCoefficients, Verification, embed_with_files,
 };
 use guardsplat_engine::memory::MemoryRequirements;
 use guardsplat_engine::message::Key;
@@ -22,7 +22,7 @@ use crate::operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene to mark: PLY, compressed PLY, SPZ, SOG or .splat
+    /// The scene to mark: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// Where to write the marked scene, in the format of IN
@@ -139,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let mut display = Display::new("embedding");
     let mut verifying = None;
-    let outcome = embed(&engine, &job, &mut |progress| {
+    let outcome = embed_with_files(&engine, &job, &mut |progress| {
         show(&mut display, &mut verifying, progress);
     })?;
     display.finish();

@@ -24,7 +24,7 @@ const PICTURE: u32 = 512;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: PLY, compressed PLY, SPZ, SOG or .splat
+    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Counts the Gaussians that so many training views show; takes a while
@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     admission::admit_reading(&arguments.scene, &limits, rest)?;
     let head = admission::summary_of(&arguments.scene);
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_within(&arguments.scene, bad_rows, limits.left(&rest))?;
+    let scene = Scene::read_with_files(&arguments.scene, bad_rows, limits.left(&rest))?;
     let gaussians = &scene.gaussians;
     let cameras = load::cameras(arguments.cameras.as_deref())?;
     let size = SceneSize::of(&scene);

@@ -1,5 +1,6 @@
 //! The command line: what there is to say, and what the process exits with.
 mod cameras;
+mod convert;
 mod display;
 mod embed;
 mod evaluate;
@@ -67,6 +68,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Turns cameras of one kind into another, such as those of COLMAP into a file for the service
     Cameras(cameras::Arguments),
+    /// Writes a scene in another format
+    Convert(convert::Arguments),
     /// Makes a small scene to try things with
     Sample(sample::Arguments),
     /// Weights of other CLIP models and of LPIPS
@@ -162,6 +165,7 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Inspect(arguments) => inspect::run(&arguments)?,
         Command::Evaluate(arguments) => evaluate::run(&arguments)?,
         Command::Cameras(arguments) => cameras::run(&arguments)?,
+        Command::Convert(arguments) => convert::run(&arguments)?,
         Command::Sample(arguments) => sample::run(&arguments)?,
         Command::Models(command) => models::run(command)?,
         Command::Run(arguments) => run::run(arguments),

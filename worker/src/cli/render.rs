@@ -31,7 +31,7 @@ enum Format {
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: PLY, compressed PLY, SPZ, SOG or .splat
+    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A folder for the pictures and their cameras
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let limits = Limits::of_machine(arguments.budget.bytes());
     admission::admit_reading(&arguments.input, &limits, rest)?;
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_within(&arguments.input, bad_rows, limits.left(&rest))?;
+    let scene = Scene::read_with_files(&arguments.input, bad_rows, limits.left(&rest))?;
     let ignored = scene.ignored().cloned();
     limits.admit(&rendering_requirements(SceneSize::of(&scene), rest.pictures))?;
     let scene = scene.into_gaussians();

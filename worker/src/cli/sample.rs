@@ -2,6 +2,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use guardsplat_engine::scene::Format;
+use guardsplat_engine::scene::convert::convert_to;
 use guardsplat_engine::view::write_cameras;
 use guardsplat_engine::{Error, Result, sample};
 
@@ -20,7 +22,7 @@ enum Kind {
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene file to write
+    /// The scene file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb or .splat
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// What it is of: object (seen from outside) or room (seen from inside)
@@ -56,7 +58,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if let Some(file) = &arguments.cameras {
         write_cameras(file, &cameras)?;
     }
-    scene.write(&arguments.output, &scene.gaussians.sh)?;
+    // The format that the name says, and PLY for names that say none.
+    let format = Format::of_whole_name(&arguments.output).unwrap_or(Format::Ply);
+    convert_to(&scene.gaussians, format, &arguments.output)?;
     print_line(&format!(
         "{} Gaussians of degree {} written to {}",
         scene.gaussians.len(),

@@ -18,7 +18,7 @@ use crate::operations::verification::{VerificationReport, Views, read_and_compar
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenes (PLY, compressed PLY, SPZ, SOG, .splat), pictures (PNG, JPEG, WebP, OpenEXR) and folders of them, all of one
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .splat), pictures (PNG, JPEG, WebP, OpenEXR) and folders of them, all of one
     /// suspect
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<PathBuf>,
@@ -93,6 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         seed: arguments.seed,
         cameras: load::cameras(arguments.cameras.as_deref())?,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
+        with_files: true,
     };
     let mut display = Display::new("reading");
     let compared = read_and_compare(&engine, &source, &views, message.as_ref(), |done, total| {

@@ -131,12 +131,14 @@ impl SceneChange {
 }
 
 /// Formats by the names that reports have for them.
-const FORMATS: [(&str, Format); 5] = [
+const FORMATS: [(&str, Format); 7] = [
     ("ply", Format::Ply),
     ("compressed-ply", Format::CompressedPly),
     ("spz", Format::Spz),
     ("splat", Format::Splat),
     ("sog", Format::Sog),
+    ("gltf", Format::Gltf),
+    ("glb", Format::Glb),
 ];
 
 fn format_name(format: Format) -> &'static str {
@@ -176,6 +178,7 @@ mod tests {
             let name = format!("format:{format}");
             assert_eq!(name.parse::<Trial>().unwrap().to_string(), name);
         }
+        assert_eq!("format:glb".parse::<Trial>().unwrap().to_string(), "format:glb");
         for wrong in [
             "prune-lowest:x",
             "format:obj",
@@ -197,6 +200,7 @@ mod tests {
         assert_eq!(after(SceneChange::ShDegree(0)).sh.degree, 0);
         assert_eq!(after(SceneChange::Format(Format::Ply)), scene);
         assert_eq!(after(SceneChange::Format(Format::Splat)).sh.degree, 0);
+        assert_eq!(after(SceneChange::Format(Format::Glb)).sh, scene.sh);
         assert_ne!(after(SceneChange::ShNoise(0.01)), scene);
         assert!(SceneChange::PruneLowest(1.0).apply(&scene, 1).is_err());
     }

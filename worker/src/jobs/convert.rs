@@ -83,6 +83,7 @@ pub fn views(spec: &api::VerifySpec) -> Result<Views> {
         seed: spec.seed,
         cameras: Vec::new(),
         bad_rows: BadRows::ignored_if(spec.ignore_bad_rows),
+        with_files: false,
     })
 }
 

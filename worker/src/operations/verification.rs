@@ -30,6 +30,8 @@ pub struct Views {
     pub cameras: Vec<Camera>,
     /// What becomes of rows of the scene with values that are not legal.
     pub bad_rows: BadRows,
+    /// Whether scenes may be in more files than one: where their user chose them on this machine.
+    pub with_files: bool,
 }
 
 /// Logits of views or pictures.
@@ -78,7 +80,11 @@ fn read_scenes(
             ..MemoryRequirements::of_program()
         };
         admission::admit_reading(path, &engine.limits, rest)?;
-        let scene = Scene::read_within(path, views.bad_rows, engine.limits.left(&rest))?;
+        let memory = engine.limits.left(&rest);
+        let scene = match views.with_files {
+            true => Scene::read_with_files(path, views.bad_rows, memory)?,
+            false => Scene::read_within(path, views.bad_rows, memory)?,
+        };
         ignored.extend(scene.ignored().cloned());
         let gaussians = scene.into_gaussians();
         let before = logits.len();

@@ -1,4 +1,6 @@
 //! The binary: commands, exit codes, JSON and messages.
+mod formats;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,8 +1,7 @@
 //! Embedding from file to file: the marked scene is written aside, read back and verified before it gets its name.
 use std::path::Path;
 
-use tempfile::TempPath;
-
+use super::aside::Aside;
 use super::learned_offsets::LearnedOffsets;
 use super::optimise::optimise;
 use super::progress::Progress;
@@ -73,6 +72,26 @@ pub struct Outcome {
 /// Whatever reading, optimising, verifying and writing may fail with, [`Error::Stopped`] when the engine is asked to
 /// stop; the output is then as it was before.
 pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
+    let read = |memory| Scene::read_within(job.input, job.bad_rows, memory);
+    embed_scene(engine, job, &read, progress)
+}
+
+/// Marks a scene as [`embed`], which may be in more files than one: a glTF with its buffers beside it, or the folder of a
+/// SOG. Only for scenes that their user chose on this machine ([`Scene::read_with_files`]).
+///
+/// # Errors
+/// Those of [`embed`].
+pub fn embed_with_files(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
+    let read = |memory| Scene::read_with_files(job.input, job.bad_rows, memory);
+    embed_scene(engine, job, &read, progress)
+}
+
+fn embed_scene(
+    engine: &Engine,
+    job: &Job<'_>,
+    read: &dyn Fn(u64) -> crate::scene::Result<Scene>,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Outcome> {
     job.settings.check()?;
     let settings = job.settings;
     let stop = &engine.stop;
@@ -82,7 +101,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
         ..MemoryRequirements::of_program()
     };
     admission::admit_marking(job.input, &engine.limits, rest)?;
-    let scene = Scene::read_within(job.input, job.bad_rows, engine.limits.left(&rest))?;
+    let scene = read(engine.limits.left(&rest))?;
     stop.check()?;
     let memory = admit(engine, &scene, settings, job.cameras)?;
     let aside = reserve(job, &scene)?;
@@ -113,7 +132,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
     }
     let written = missed.is_empty() || job.force;
     if written {
-        aside.persist(job.output).map_err(|e| Error::io(job.output)(e.error))?;
+        aside.persist(job.output)?;
     }
     Ok(Outcome {
         verification,
@@ -132,14 +151,18 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
 }
 
 /// Writes the scene with what was learned to the file aside, and reads back what it shows.
-fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Path) -> Result<Gaussians> {
+fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Aside) -> Result<Gaussians> {
     let colours = learned.colours(&scene.gaussians.sh);
     // The new file is complete before it replaces the reserved one, so free that one's space first.
-    std::fs::write(aside, []).map_err(Error::io(job.output))?;
-    scene.write(aside, &colours).map_err(|e| named(e, job.output))?;
+    aside.clear().map_err(Error::io(job.output))?;
+    scene.write(aside.path(), &colours).map_err(|e| named(e, job.output))?;
     drop(colours);
     // The rows that were bad are so in the marked file too, and no others may be.
-    let marked = Scene::read_with(aside, job.bad_rows).map_err(|e| named(e, job.output))?;
+    let marked = match scene.is_one_file() {
+        true => Scene::read_with(aside.path(), job.bad_rows),
+        false => Scene::read_with_files(aside.path(), job.bad_rows, u64::MAX),
+    };
+    let marked = marked.map_err(|e| named(e, job.output))?;
     check_geometry(job.output, scene, &marked)?;
     Ok(marked.into_gaussians())
 }
@@ -155,7 +178,7 @@ fn admit(engine: &Engine, scene: &Scene, settings: &Settings, cameras: &[Camera]
 /// A file beside the output that holds as much as the output will; about as much in formats that are compressed. A
 /// folder that is missing, read-only or full is thereby known before the work, not after it, as is a name that says
 /// another format. It is deleted when dropped.
-fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
+fn reserve(job: &Job<'_>, scene: &Scene) -> Result<Aside> {
     let suits = scene.format().check_name(job.output);
     suits.map_err(|reason| Error::BadOption { field: "OUT", reason })?;
     let refuse = |reason: &str| Err(Error::io(job.output)(std::io::Error::other(reason.to_owned())));
@@ -166,18 +189,9 @@ fn reserve(job: &Job<'_>, scene: &Scene) -> Result<TempPath> {
         }
         _ => {}
     }
-    let folder = match job.output.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let aside = tempfile::Builder::new()
-        .prefix(".guardsplat-")
-        .suffix(".part")
-        .tempfile_in(folder)
-        .map_err(Error::io(job.output))?
-        .into_temp_path();
+    let aside = Aside::beside(job.output, scene.is_one_file()).map_err(Error::io(job.output))?;
     scene
-        .write(&aside, &scene.gaussians.sh)
+        .write(aside.path(), &scene.gaussians.sh)
         .map_err(|e| named(e, job.output))?;
     Ok(aside)
 }

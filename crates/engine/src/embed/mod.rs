@@ -2,6 +2,7 @@
 //!
 //! Geometry and opacity are frozen. [`optimise`] is the loop, [`embed`] goes from file to verified file.
 mod adam;
+mod aside;
 mod augment;
 mod early_stopping;
 mod embed_file;
@@ -25,7 +26,7 @@ mod view_pool;
 
 pub use adam::{Adam, AdamOptions, Penalty};
 pub use augment::Augmentation;
-pub use embed_file::{Job, Outcome, embed};
+pub use embed_file::{Job, Outcome, embed, embed_with_files};
 pub use learned_offsets::LearnedOffsets;
 pub use loss_weight_controller::{LossWeightControl, LossWeightController, TargetRelaxation};
 pub use optimise::{Optimised, optimise};

@@ -12,13 +12,13 @@ pub const MAX_PICTURES: usize = 10_000;
 /// What paths name: all of it is one suspect.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Source {
-    /// Scene files, of any format.
+    /// Scene files, of any format, and folders of SOG.
     pub scenes: Vec<PathBuf>,
     /// Picture files, those of a folder by name.
     pub pictures: Vec<PathBuf>,
 }
 
-/// Sorts out `paths`: scenes of any format, pictures and folders of pictures, any number of each. Files are what their content
+/// Sorts out `paths`: scenes of any format, be it the folder of a SOG, pictures and folders of pictures, any number of each. Files are what their content
 /// says; in folders, which may hold other things too, names say which are pictures.
 ///
 /// # Errors
@@ -26,13 +26,15 @@ pub struct Source {
 pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
     let mut source = Source::default();
     for path in paths {
-        if path.is_dir() {
+        if is_loose_sog(path) {
+            source.scenes.push(path.clone());
+        } else if path.is_dir() {
             add_folder(path, &mut source.pictures)?;
-            continue;
-        }
-        match SuspectKind::of(path)? {
-            SuspectKind::Scene => source.scenes.push(path.clone()),
-            SuspectKind::Picture => source.pictures.push(path.clone()),
+        } else {
+            match SuspectKind::of(path)? {
+                SuspectKind::Scene => source.scenes.push(path.clone()),
+                SuspectKind::Picture => source.pictures.push(path.clone()),
+            }
         }
         check_count(source.scenes.len() + source.pictures.len())?;
     }
@@ -47,12 +49,6 @@ pub fn find_source(paths: &[PathBuf]) -> Result<Source> {
 
 /// Adds the pictures of a folder by name.
 fn add_folder(path: &Path, pictures: &mut Vec<PathBuf>) -> Result<()> {
-    if is_loose_sog(path) {
-        return Err(bad(
-            path,
-            "the parts of an SOG scene, whose pictures are no views; bundle them into one .sog file first",
-        ));
-    }
     let before = pictures.len();
     for entry in std::fs::read_dir(path).map_err(Error::io(path))? {
         let file = entry.map_err(Error::io(path))?.path();
@@ -129,6 +125,8 @@ mod tests {
         assert!(reason(&[empty.path().into()]).contains("without png"));
         at("meta.json", b"{}");
         at("means_l.webp", png);
-        assert!(reason(&[folder_path]).contains("no views"));
+        // Its pictures are no views, but numbers.
+        let sog = find_source(std::slice::from_ref(&folder_path)).unwrap();
+        assert_eq!((sog.scenes, sog.pictures), (vec![folder_path], Vec::new()));
     }
 }

@@ -19,6 +19,12 @@ pub(super) fn check(gaussians: &Gaussians, format: Format) -> Result<(), String>
         Format::Splat => Ok(()),
         Format::Spz if u32::try_from(n).is_err() => Err(format!("{n} Gaussians; the limit of SPZ is {}", u32::MAX)),
         Format::Spz => check_positions(gaussians, f64::from(super::spz::LARGEST), "SPZ"),
+        Format::Gltf | Format::Glb if n == 0 => Err("no Gaussian; a glTF has one at least".to_string()),
+        Format::Glb if super::gltf::bytes(gaussians) > super::gltf::MOST => Err(format!(
+            "{n} Gaussians; a .glb has room for {} bytes of them",
+            super::gltf::MOST
+        )),
+        Format::Gltf | Format::Glb => Ok(()),
         Format::Sog if n > WEBP_SIDE * WEBP_SIDE => {
             Err(format!("{n} Gaussians; the limit of SOG is {}", WEBP_SIDE * WEBP_SIDE))
         }

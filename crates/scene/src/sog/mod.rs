@@ -7,10 +7,13 @@ mod archive;
 pub(crate) mod budget;
 pub(crate) mod codebook;
 pub(crate) mod decode;
+mod folder;
 mod json;
 pub(crate) mod meta;
 pub(crate) mod palette;
 pub(crate) mod picture;
+
+pub(crate) use folder::read as read_folder;
 
 use crate::container::{Container, Format};
 use crate::error::bad;
@@ -91,7 +94,9 @@ pub(crate) fn read(
 
 fn parse(file: Vec<u8>, bad_rows: BadRows, budget: &mut Budget) -> Result<(Gaussians, Sog), String> {
     if !file.starts_with(ZIP) {
-        return Err("the meta.json of an SOG without its pictures; bundle the folder into one .sog file first".into());
+        return Err(
+            "the meta.json of an SOG without its pictures; give its folder, or bundle it into one .sog file".into(),
+        );
     }
     let mut archive = Archive::open(&file)?;
     let meta = archive.unpack("meta.json", "meta.json", MAX_META, budget)?;

@@ -1,14 +1,18 @@
-//! Scenes: PLY, compressed PLY, SPZ, .splat.
+//! Scenes: PLY, compressed PLY, SPZ, glTF, .splat.
 use super::{put, put_damaged};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use guardsplat_scene::convert::convert;
+use guardsplat_scene::{Format, Gaussians, Sh};
 use std::io::Write;
+use std::path::Path;
 
 pub fn put_all() {
     plain();
     packed();
     spz();
     splat();
+    gltf();
 }
 
 const NAMES: [&str; 14] = [
@@ -261,4 +265,55 @@ fn splat() {
     put("splat", "text", "Dear diary, ".repeat(8));
     put("scene", "splat", rows(0.5));
     put("summary", "splat", rows(0.5));
+}
+
+fn gltf() {
+    let scene = |degree: usize| {
+        let mut numbers = values(60, 3).cycle();
+        let mut next = || numbers.next().unwrap_or_default();
+        let mut sh = Sh {
+            degree,
+            coefficients: Vec::new(),
+        };
+        sh.coefficients = (0..3 * sh.per_gaussian()).map(|_| next()).collect();
+        Gaussians {
+            positions: (0..3).map(|_| [next(), next(), next()]).collect(),
+            rotations: vec![[1.0, 0.0, 0.0, 0.0], [0.5; 4], [0.0, 1.0, 0.0, 0.0]],
+            log_scales: (0..3).map(|_| [next(), next(), f32::NEG_INFINITY]).collect(),
+            opacity_logits: vec![f32::INFINITY, next(), next()],
+            sh,
+        }
+    };
+    let file = |degree, format| {
+        let mut bytes = Vec::new();
+        convert(&scene(degree), format, Path::new("seed"), &mut bytes).expect("a small scene has a place");
+        bytes
+    };
+    for (name, degree, format) in [
+        ("glb-0", 0, Format::Glb),
+        ("glb-3", 3, Format::Glb),
+        ("text-1", 1, Format::Gltf),
+    ] {
+        put_damaged("gltf", name, &file(degree, format));
+    }
+    // JSON, a 0 and a buffer, under a node that turns, scales and shifts.
+    let glb = file(1, Format::Glb);
+    let (text, buffer) = glb.split_at(glb.windows(4).position(|w| w == b"BIN\0").unwrap_or_default());
+    let text = String::from_utf8_lossy(&text[20..text.len() - 4])
+        .trim_end()
+        .to_string();
+    let node = r#"{"children":[1],"rotation":[0.6,0,0,0.8],"scale":[2,2,2]},{"mesh":0,"translation":[1,2,3]}"#;
+    let turned = text.replace(r#"{"mesh":0}"#, node);
+    put_damaged("gltf", "turned", &[turned.as_bytes(), &[0], &buffer[4..]].concat());
+    let stream = gzip(&content(3, 2, 1));
+    let (length, own) = (stream.len(), "KHR_gaussian_splatting");
+    let spz = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0,"rotation":[0,0.6,0,0.8]}}],"meshes":[{{"primitives":[{{"mode":0,"attributes":{{}},
+"extensions":{{"{own}":{{"extensions":{{"{own}_compression_spz_2":{{"bufferView":0}}}}}}}}}}]}}],
+"bufferViews":[{{"buffer":0,"byteLength":{length}}}],"buffers":[{{"byteLength":{length}}}]}}"#
+    );
+    put_damaged("gltf", "spz", &[spz.as_bytes(), &[0], &stream].concat());
+    put("gltf", "no-asset", r#"{"position":[0,0,0]}"#);
+    put("scene", "glb", file(1, Format::Glb));
+    put("summary", "gltf", file(0, Format::Gltf));
 }

@@ -51,6 +51,7 @@ pub(super) fn check(given: &Gaussians, read: &Gaussians, format: Format, bytes: 
         Format::Spz => spz(given, read),
         Format::Splat => splat(given, read),
         Format::Sog => sog(given, read, bytes),
+        Format::Gltf | Format::Glb => gltf(given, read),
     }
     opacities(given, read);
     // Half a step of a component other than the largest.
@@ -61,6 +62,7 @@ pub(super) fn check(given: &Gaussians, read: &Gaussians, format: Format, bytes: 
             Format::CompressedPly => 0.5f64.sqrt() / 1023.0,
             Format::Spz => 0.5f64.sqrt() / 511.0 / 2.0,
             Format::Sog => 0.5f64.sqrt() / 127.5 / 2.0,
+            Format::Gltf | Format::Glb => 0.0,
             // Bytes have no 1.
             _ => 1.0 / 128.0,
         },
@@ -170,6 +172,32 @@ fn spz(given: &Gaussians, read: &Gaussians) {
         let limit = if place < 12 { 4.5 } else { 8.5 } / 128.0;
         let apart = (given.clamp(-1.0, 127.0 / 128.0) - read).abs();
         assert!(apart <= limit + 1e-6, "harmonic {place}: {given} came back as {read}");
+    }
+}
+
+fn gltf(given: &Gaussians, read: &Gaussians) {
+    assert_eq!(given.positions, read.positions);
+    assert_eq!(given.sh, read.sh);
+    for (given, read) in given
+        .log_scales
+        .as_flattened()
+        .iter()
+        .zip(read.log_scales.as_flattened())
+    {
+        let apart = (f64::from(*given) - f64::from(*read)).abs();
+        // The largest and the least of single precision.
+        let kept = (-80.0..88.7).contains(given);
+        assert!(
+            given == read || apart <= 1e-6 * f64::from(given.abs()).max(1.0) || !kept,
+            "{given} came back as {read}"
+        );
+    }
+    for (given, read) in given.opacity_logits.iter().zip(&read.opacity_logits) {
+        let sigmoid = |logit: f32| 1.0 / (1.0 + (-f64::from(logit)).exp());
+        assert!(
+            (sigmoid(*given) - sigmoid(*read)).abs() <= 6e-8,
+            "{given} came back as {read}"
+        );
     }
 }
 

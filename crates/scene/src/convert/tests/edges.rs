@@ -20,6 +20,9 @@ fn no_gaussian() {
             assert!(checked(&none, format).written.order.is_empty());
         }
         assert_eq!(refused(&none, Format::Splat), "no Gaussian; a .splat has one at least");
+        for format in [Format::Gltf, Format::Glb] {
+            assert_eq!(refused(&none, format), "no Gaussian; a glTF has one at least");
+        }
     }
 }
 
@@ -80,7 +83,7 @@ fn large_numbers() {
     scene.rotations[7] = [1e-45, 0.0, 0.0, -1e-45];
     scene.log_scales[8] = [300.0, 60.0, -200.0];
     scene.sh.coefficients[..12].copy_from_slice(&[9.0, -9.0, 1e3, 9.0, -9.0, 1e3, 5.0, -5.0, 2.0, -2.0, 0.0, -0.0]);
-    for format in [Format::Ply, Format::CompressedPly, Format::Spz, Format::Sog] {
+    for format in Format::ALL.into_iter().filter(|format| *format != Format::Splat) {
         checked(&scene, format);
     }
     // A deviation of e^300 is the largest float.

@@ -34,7 +34,10 @@ fn a_second_conversion_changes_next_to_nothing() {
         let first = reordered(&first, &file.written.order, second.sh.degree);
         let exact = |what: &str, same: bool| assert!(same, "{what} of {format:?}");
         let logits = |scene: &Gaussians| scene.opacity_logits.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-        exact("opacity", logits(&first) == logits(second));
+        // Single precision has more numbers for small opacities than for their logits, and fewer for large ones.
+        if !matches!(format, Format::Gltf | Format::Glb) {
+            exact("opacity", logits(&first) == logits(second));
+        }
         // Chunks may have other Gaussians once their positions have moved, and other ranges.
         if format != Format::CompressedPly {
             exact("colour", first.sh == second.sh);
@@ -42,7 +45,7 @@ fn a_second_conversion_changes_next_to_nothing() {
             let mut scales = first.log_scales.iter().zip(&second.log_scales);
             exact("scales", scales.all(|(a, b)| near(a, b)));
         }
-        if matches!(format, Format::Ply | Format::Spz | Format::Splat) {
+        if !matches!(format, Format::CompressedPly | Format::Sog) {
             exact("positions", first.positions == second.positions);
         }
     }

@@ -3,6 +3,7 @@ mod garbage;
 mod ignored;
 mod refusals;
 mod round_trips;
+mod trainers;
 
 use crate::fields::rest_count;
 use crate::summary::tests::agrees;

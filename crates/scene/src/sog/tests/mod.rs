@@ -1,4 +1,5 @@
 //! Tests of reading and writing, and the files that they are made of.
+mod folders;
 mod formulas;
 mod garbage;
 mod ignored;

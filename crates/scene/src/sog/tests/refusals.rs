@@ -156,7 +156,7 @@ fn pictures_that_are_none_are_named() {
 #[test]
 fn folders_are_refused_by_their_meta_json() {
     let mut file = File::new(2, 1, 5);
-    let reason = "the meta.json of an SOG without its pictures; bundle the folder into one .sog file first";
+    let reason = "the meta.json of an SOG without its pictures; give its folder, or bundle it into one .sog file";
     let text = file.meta.to_string();
     assert_eq!(refused(text.as_bytes()), reason);
     assert_eq!(
