@@ -15,6 +15,7 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use guardsplat_engine::view::SceneKind;
 use guardsplat_engine::{Error, Result};
 use tracing_subscriber::EnvFilter;
 
@@ -105,6 +106,30 @@ impl Background {
         match self {
             Self::White => [1.0; 3],
             Self::Black => [0.0; 3],
+        }
+    }
+}
+
+/// How a scene was captured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    /// Seen from outside
+    Object,
+    /// Surroundings, seen from inside
+    Room,
+    /// Ground, seen from above
+    Terrain,
+    /// Seen from one side
+    Forward,
+}
+
+impl Kind {
+    fn scene(self) -> SceneKind {
+        match self {
+            Self::Object => SceneKind::Object,
+            Self::Room => SceneKind::Room,
+            Self::Terrain => SceneKind::Terrain,
+            Self::Forward => SceneKind::Forward,
         }
     }
 }
