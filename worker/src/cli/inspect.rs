@@ -118,7 +118,8 @@ impl Found {
             hollow,
             inside,
             seen_from_front,
-            seen_from_behind,
+            hidden_from_front,
+            hidden_from_behind,
             seen_from_above,
             flatness,
             ..
@@ -130,11 +131,12 @@ impl Found {
             None => format!("{}, which says nothing where cameras are given", self.found),
         };
         format!(
-            "{used}: {} hollow, {} seen from inside only; {} seen from the front, {} from behind, {} from above; height {:.2} of its width",
+            "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width",
             percent(hollow),
             percent(inside),
             percent(seen_from_front),
-            percent(seen_from_behind),
+            percent(hidden_from_front),
+            percent(hidden_from_behind),
             percent(seen_from_above),
             flatness
         )

@@ -1,10 +1,10 @@
 //! What kind of scene it is, by a rule on its geometry: how it was captured decides where its viewers stand.
 //!
-//! The first of these that holds, on the figures of [`Openness`]:
+//! A scene of fewer than a hundred Gaussians is an object. Else the first of these that holds, on the figures of [`Openness`]:
 //!
 //! * *terrain*: flat and seen from above,
 //! * *room*: a good part of it is hollow, and something inside is seen by nobody outside,
-//! * *forward*: nearly all is seen from one level side, and clearly less from behind,
+//! * *forward*: from one level side most is seen and nearly nothing is hidden, and more is hidden from behind,
 //! * *object*: all others.
 //!
 //! Colours do not count, so that a marked scene is of the kind that it was.
@@ -25,9 +25,12 @@ const INSIDE: f32 = 0.05;
 /// Terrain is at most so high for its width, and so much of it is seen from above.
 const FLAT: f32 = 0.2;
 const FROM_ABOVE: f32 = 0.75;
-/// So much of a forward-facing capture is seen from its front, and so much less from behind.
-const FROM_FRONT: f32 = 0.75;
-const LESS_BEHIND: f32 = 0.2;
+/// So much of a forward-facing capture is seen from its front, at most so much is hidden from there, and so much more from behind.
+const FROM_FRONT: f32 = 0.7;
+const HIDDEN: f32 = 0.06;
+const MORE_BEHIND: f32 = 0.03;
+/// Fewer Gaussians than these say nothing.
+const FEWEST: usize = 100;
 
 /// How a scene was captured, and where its viewers are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,11 +63,16 @@ impl SceneKind {
 
     /// What the rule says.
     pub fn by(found: &Openness) -> SceneKind {
-        if found.flatness <= FLAT && found.seen_from_above >= FROM_ABOVE {
+        if found.gaussians < FEWEST {
+            Self::Object
+        } else if found.flatness <= FLAT && found.seen_from_above >= FROM_ABOVE {
             Self::Terrain
         } else if found.hollow >= HOLLOW && found.inside >= INSIDE {
             Self::Room
-        } else if found.seen_from_front >= FROM_FRONT && found.seen_from_front - found.seen_from_behind >= LESS_BEHIND {
+        } else if found.seen_from_front >= FROM_FRONT
+            && found.hidden_from_front <= HIDDEN
+            && found.hidden_from_behind - found.hidden_from_front >= MORE_BEHIND
+        {
             Self::Forward
         } else {
             Self::Object

@@ -8,6 +8,8 @@ mod given;
 mod inside;
 mod json;
 mod kind;
+#[cfg(test)]
+mod kinds_tests;
 mod openness;
 mod sampler;
 mod solid;

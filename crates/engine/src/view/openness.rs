@@ -31,22 +31,29 @@ const FAR: f32 = 0.15;
 /// Cosine between a side and the looks that tell what is seen from it, 32 degrees; a Gaussian counts with the share of these that
 /// escapes.
 const SIDE: f32 = 0.85;
+/// How much what is hidden counts against what is seen.
+const HIDDEN: f32 = 2.0;
 /// Largest sine of elevation of a level side: 37 degrees.
 const LEVEL: f32 = 0.6;
 
 /// What the geometry of a scene says; shares are of what the scene shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Openness {
+    /// Gaussians of the scene.
+    #[serde(skip)]
+    pub gaussians: usize,
     /// Share of the grid's cells that are free and closed in.
     pub hollow: f32,
     /// Share that nobody outside sees, and that faces free space.
     pub inside: f32,
-    /// The level side from which most is seen, a unit vector.
+    /// The level side from which most is seen and least is hidden, a unit vector.
     pub front: [f32; 3],
     /// Share that is seen from there.
     pub seen_from_front: f32,
-    /// Share that is seen from the opposite side.
-    pub seen_from_behind: f32,
+    /// Share that is hidden from there.
+    pub hidden_from_front: f32,
+    /// Share that is hidden from the opposite side.
+    pub hidden_from_behind: f32,
     /// Share that is seen from above.
     pub seen_from_above: f32,
     /// Height over width, of the middle nine tenths of what is shown.
@@ -61,7 +68,7 @@ impl Openness {
         let rows = drawn(&weights(gaussians));
         let count = rows.len().max(1) as f32;
         let cones: Vec<u64> = looks.iter().map(|side| cone(*side, &looks)).collect();
-        let (mut inside, mut seen_from) = (0, [0.0f32; LOOKS]);
+        let (mut inside, mut seen_from, mut hidden_from) = (0, [0.0f32; LOOKS], [0.0f32; LOOKS]);
         for row in rows {
             let place = gaussians.positions[row];
             let (mut escaped, mut far) = (0u64, 0);
@@ -73,24 +80,31 @@ impl Openness {
             }
             let share = |count: usize| count as f32 / LOOKS as f32;
             inside += usize::from(share(escaped.count_ones() as usize) <= BURIED && share(far) >= FACING_FREE);
-            for (cone, seen) in cones.iter().zip(&mut seen_from) {
-                *seen += (escaped & cone).count_ones() as f32 / cone.count_ones().max(1) as f32;
+            for (side, cone) in cones.iter().enumerate() {
+                let seen = (escaped & cone).count_ones();
+                seen_from[side] += seen as f32 / cone.count_ones().max(1) as f32;
+                hidden_from[side] += f32::from(u8::from(seen == 0));
             }
         }
-        let share = |side: usize| seen_from[side] / count;
+        let (seen, hidden) = (seen_from.map(|sum| sum / count), hidden_from.map(|sum| sum / count));
         let nearest = |to: [f32; 3]| {
             let near = |a: &usize, b: &usize| dot(looks[*a], to).total_cmp(&dot(looks[*b], to));
             (0..LOOKS).max_by(near).unwrap_or(0)
         };
+        // Sheets are seen from both sides; what stands before them is hidden from behind, and counts.
+        let open = |side: usize| seen[side] - HIDDEN * hidden[side];
         let level = (0..LOOKS).filter(|side| dot(looks[*side], extent.up).abs() < LEVEL);
-        let front = level.max_by(|a, b| seen_from[*a].total_cmp(&seen_from[*b])).unwrap_or(0);
+        let front = level.max_by(|a, b| open(*a).total_cmp(&open(*b))).unwrap_or(0);
+        let behind = nearest(looks[front].map(|x| -x));
         Self {
+            gaussians: gaussians.len(),
             hollow: hollow(grid, &looks, extent.up),
             inside: inside as f32 / count,
             front: looks[front],
-            seen_from_front: share(front),
-            seen_from_behind: share(nearest(looks[front].map(|x| -x))),
-            seen_from_above: share(nearest(extent.up)),
+            seen_from_front: seen[front],
+            hidden_from_front: hidden[front],
+            hidden_from_behind: hidden[behind],
+            seen_from_above: seen[nearest(extent.up)],
             flatness: flatness(gaussians, extent),
         }
     }

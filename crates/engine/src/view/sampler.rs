@@ -43,6 +43,8 @@ const NEAR: f32 = 0.2;
 /// Distances of cameras, times that at which the scene just fills the picture; and that of all cameras on a ring.
 const FILL: std::ops::Range<f32> = 0.95..1.2;
 const MEAN_FILL: f32 = 0.5 * (FILL.start + FILL.end);
+/// The same before a forward-facing capture, which is not as deep as wide and may go on beyond the picture.
+const FILL_FORWARD: std::ops::Range<f32> = 0.7..1.0;
 /// The same over terrain.
 const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
 /// How far from the centre views aim, in radii.
@@ -213,10 +215,11 @@ impl ViewSampler {
     fn place(&self, direction: [f32; 3], size: u32, still: bool, random: &mut impl Rng) -> Camera {
         let Extent { centre, radius, up, .. } = self.extent;
         let terrain = self.kind == SceneKind::Terrain;
-        let fill = match (still, terrain) {
+        let fill = match (still, self.kind) {
             (true, _) => MEAN_FILL,
-            (false, false) => random.random_range(FILL),
-            (false, true) => random.random_range(FILL_TERRAIN),
+            (false, SceneKind::Object | SceneKind::Room) => random.random_range(FILL),
+            (false, SceneKind::Forward) => random.random_range(FILL_FORWARD),
+            (false, SceneKind::Terrain) => random.random_range(FILL_TERRAIN),
         };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
