@@ -236,7 +236,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 fn measure_difficulty(gaussians: &Gaussians, sampler: &ViewSampler) -> Result<Difficulty> {
     let rasterizer = rasterizer(&open(DeviceChoice::Cpu)?)?;
     let view = |index: u64| {
-        let view = prepare(gaussians, &sampler.camera(Split::HeldOut, index, SIDE), WeightCache::None)?;
+        let view = prepare(
+            gaussians,
+            &sampler.camera(Split::HeldOut, index, SIDE),
+            WeightCache::None,
+        )?;
         let colours = sh::colours(&gaussians.sh, None, &view);
         let [white, black] = [1.0, 0.0].map(|ground| rasterizer.render(&view, &colours, [ground; 3]));
         Ok([white?.to_8_bit(), black?.to_8_bit()])
@@ -296,11 +300,17 @@ fn tell(report: &Report) {
     if let Some(seen) = &report.difficulty {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
         let of_picture = format!("covers {} of a view", percent(seen.covered));
-        let colours = format!("lightness {:.2}, colours spread by {:.3}", seen.lightness, seen.chroma_spread);
+        let colours = format!(
+            "lightness {:.2}, colours spread by {:.3}",
+            seen.lightness, seen.chroma_spread
+        );
         let room = format!("{} of values at an end", percent(seen.at_ends));
         let thin = format!("texture {:.3}, {} at an edge", seen.texture, percent(seen.thinness));
         let saturation = format!("saturation {:.2}", seen.saturation);
-        line("looks", format!("{of_picture}; {colours}, {saturation}, {room}; {thin}"));
+        line(
+            "looks",
+            format!("{of_picture}; {colours}, {saturation}, {room}; {thin}"),
+        );
     }
     if let Some(cameras) = &report.cameras {
         let near = cameras.clearance.map_or_else(String::new, |distance| {

@@ -70,7 +70,11 @@ mod tests {
         let found = covered(&picture([1.0, 0.5, 0.9, 0.4]), &picture([0.0, 0.5, 0.3, 0.0])).unwrap();
         assert_eq!(found, [false, true, false, true]);
         assert_eq!(share(&found), 0.5);
-        let narrow = Picture { width: 4, height: 1, ..picture([0.0; 4]) };
+        let narrow = Picture {
+            width: 4,
+            height: 1,
+            ..picture([0.0; 4])
+        };
         assert!(covered(&narrow, &picture([0.0; 4])).is_err());
     }
 
@@ -82,7 +86,10 @@ mod tests {
             panic!()
         };
         assert!((db - 20.0).abs() < 1e-4, "{db}");
-        assert_eq!(psnr_covered(&a, &b, &[false, true, true, true]).unwrap(), Some(Psnr::Identical));
+        assert_eq!(
+            psnr_covered(&a, &b, &[false, true, true, true]).unwrap(),
+            Some(Psnr::Identical)
+        );
         assert_eq!(psnr_covered(&a, &b, &[false; 4]).unwrap(), None);
         assert!(psnr_covered(&a, &b, &[true; 3]).is_err());
     }

@@ -81,14 +81,20 @@ impl Sums {
             let rgb = [0, 1, 2].map(|c| picture.pixels[3 * pixel + c]);
             let light = luma(pixel);
             let chroma = [(f64::from(rgb[2]) - light) / 1.772, (f64::from(rgb[0]) - light) / 1.402];
-            let (least, most) = rgb.iter().fold((f32::INFINITY, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
+            let (least, most) = rgb
+                .iter()
+                .fold((f32::INFINITY, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
             self.pixels += 1.0;
             self.luma += light;
             for (sum, value) in self.chroma.iter_mut().zip(chroma) {
                 *sum += value;
                 self.chroma_squares += value * value;
             }
-            self.saturation += if most > 0.0 { f64::from((most - least) / most) } else { 0.0 };
+            self.saturation += if most > 0.0 {
+                f64::from((most - least) / most)
+            } else {
+                0.0
+            };
             self.at_ends += rgb.iter().filter(|v| !(AT_END..=1.0 - AT_END).contains(*v)).count() as f64;
             let (x, y) = (pixel % width, pixel / width);
             let around = [
@@ -117,7 +123,13 @@ mod tests {
             width: 8,
             height: 8,
             pixels: (0..64)
-                .flat_map(|i| if i % 8 < wide && i / 8 < high { colour(i) } else { [ground; 3] })
+                .flat_map(|i| {
+                    if i % 8 < wide && i / 8 < high {
+                        colour(i)
+                    } else {
+                        [ground; 3]
+                    }
+                })
                 .collect(),
         })
     }

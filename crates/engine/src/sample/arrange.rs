@@ -102,13 +102,17 @@ pub(super) const STAGE: [f64; 3] = [1.9, 2.3, 1.8];
 pub(super) fn stage(random: &mut impl Rng) -> Vec<Solid> {
     let [wide, high, deep] = STAGE;
     let floor = Solid {
-        shape: Shape::Sheet { half: [wide, 0.5 * deep] },
+        shape: Shape::Sheet {
+            half: [wide, 0.5 * deep],
+        },
         axes: UPRIGHT,
         centre: [0.0; 3],
     };
     // The wall's own -y looks to the front.
     let wall = Solid {
-        shape: Shape::Sheet { half: [wide, 0.5 * high] },
+        shape: Shape::Sheet {
+            half: [wide, 0.5 * high],
+        },
         axes: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
         centre: [0.0, -0.5 * high, 0.5 * deep].map(|x| x as f32),
     };

@@ -13,13 +13,13 @@ mod texture;
 
 use crate::error::{Error, Result};
 use crate::scene::{Gaussians, MAX_DEGREE, Scene, Sh};
-use crate::view::{Camera, SceneKind};
 use crate::view::vector::{along, cross, dot, perpendicular, unit};
+use crate::view::{Camera, SceneKind};
+use arrange::STAND;
 use highlight::Highlight;
+use points::Points;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use arrange::STAND;
-use points::Points;
 use shapes::Solid;
 use texture::Texture;
 

@@ -66,7 +66,10 @@ impl Solid {
 
     /// Whether this is the ground.
     pub fn is_ground(&self) -> bool {
-        matches!(self.shape, Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. })
+        matches!(
+            self.shape,
+            Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. }
+        )
     }
 
     /// The point and outward unit normal for `u`, `v` in [0, 1): even in the square is even on the surface.
@@ -88,7 +91,11 @@ impl Solid {
 
 /// Height of the hills above their plane, and how it grows along x and z.
 pub(super) fn hills(phase: [f64; 2], x: f64, z: f64) -> (f64, [f64; 2]) {
-    let waves = [(0.16, 1.1, 0.5, phase[0]), (0.11, -0.7, 1.4, phase[1]), (0.04, 2.3, 2.1, phase[0] + phase[1])];
+    let waves = [
+        (0.16, 1.1, 0.5, phase[0]),
+        (0.11, -0.7, 1.4, phase[1]),
+        (0.04, 2.3, 2.1, phase[0] + phase[1]),
+    ];
     let (mut height, mut slope) = (0.0, [0.0; 2]);
     for (high, a, b, phase) in waves {
         let (sine, cosine) = (a * x + b * z + phase).sin_cos();

@@ -110,7 +110,11 @@ pub(super) fn weights(gaussians: &Gaussians) -> Vec<f64> {
 }
 
 /// Weighted quantiles: the smallest values below which lie at least those shares of the weight.
-pub(super) fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, weights: &[f64], shares: [f64; N]) -> [f64; N] {
+pub(super) fn quantiles<const N: usize>(
+    values: impl Iterator<Item = f64>,
+    weights: &[f64],
+    shares: [f64; N],
+) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.zip(weights.iter().copied()).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let total: f64 = sorted.iter().map(|(_, w)| w).sum();

@@ -1,7 +1,7 @@
 //! Views of surroundings from inside: from free places, looking about.
 //!
 //! **Places.** Free cells of the [grid](super::solid) that are closed in, at heights at which eyes are, and as far from what is
-//! solid as a third of the best of them is, at least two cells.
+//! solid as half of what the best of them is, at least two cells.
 //!
 //! **Views.** The [direction](super::directions) comes first, so that all sides are looked at equally often. Of some random places
 //! the first counts from which one sees far enough that way, so that no picture is full of one near wall; else the one from
@@ -15,8 +15,8 @@ use super::solid::SolidGrid;
 use super::vector::{along, dot};
 use crate::error::{Error, Result};
 
-/// Vertical field of view of the mean view, radians: 57 degrees; views have 0.85 to 1.2 of it.
-const FIELD_OF_VIEW: f32 = 1.0;
+/// Vertical field of view of the mean view, radians: 66 degrees; views have 0.85 to 1.2 of it.
+const FIELD_OF_VIEW: f32 = 1.15;
 const ZOOMED: std::ops::Range<f32> = 0.85..1.2;
 /// Share of directions that must be closed, of those in which looks go, so that a place is inside.
 const CLOSED: f32 = 0.6;
@@ -25,10 +25,10 @@ const LOOKS: usize = 64;
 /// Heights of eyes, as shares of the way from the lowest to the highest free place.
 const HEIGHTS: std::ops::RangeInclusive<f32> = 0.25..=0.75;
 /// Least distance to what is solid, in that of the best place, and in cells.
-const CLEARANCE: f32 = 1.0 / 3.0;
+const CLEARANCE: f32 = 0.5;
 const LEAST_CELLS: u32 = 2;
 /// How far one has to see ahead, in the longest side of the grid.
-const AHEAD: f32 = 0.3;
+const AHEAD: f32 = 0.5;
 /// Places that are tried for a direction.
 const TRIES: usize = 8;
 
@@ -48,7 +48,9 @@ impl InsideViews {
     /// [`Error::BadOption`] where no free place is closed in.
     pub(super) fn new(grid: SolidGrid, extent: &Extent) -> Result<Self> {
         let clearances = grid.clearances();
-        let looks: Vec<_> = lattice(LOOKS).filter(|look| dot(*look, extent.up).abs() < 0.5).collect();
+        let looks: Vec<_> = lattice(LOOKS)
+            .filter(|look| dot(*look, extent.up).abs() < 0.5)
+            .collect();
         let open = ((1.0 - CLOSED) * looks.len() as f32) as usize;
         let closed_in = |cell: &usize| {
             let place = grid.middle(*cell);
@@ -59,9 +61,11 @@ impl InsideViews {
         let roomy = |cell: &usize| (LEAST_CELLS..u32::MAX).contains(&clearances[*cell]);
         let mut places: Vec<usize> = (0..grid.len()).filter(roomy).filter(closed_in).collect();
         let height = |cell: usize| dot(grid.middle(cell), extent.up);
-        let (low, high) = places.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), cell| {
-            (low.min(height(*cell)), high.max(height(*cell)))
-        });
+        let (low, high) = places
+            .iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), cell| {
+                (low.min(height(*cell)), high.max(height(*cell)))
+            });
         places.retain(|cell| high <= low || HEIGHTS.contains(&((height(*cell) - low) / (high - low))));
         let best = places.iter().map(|cell| clearances[*cell]).max();
         let best = best.ok_or_else(|| Error::BadOption {

@@ -26,8 +26,8 @@ const INSIDE: f32 = 0.05;
 const FLAT: f32 = 0.2;
 const FROM_ABOVE: f32 = 0.75;
 /// So much of a forward-facing capture is seen from its front, at most so much is hidden from there, and so much more from behind.
-const FROM_FRONT: f32 = 0.7;
-const HIDDEN: f32 = 0.06;
+const FROM_FRONT: f32 = 0.6;
+const HIDDEN: f32 = 0.09;
 const MORE_BEHIND: f32 = 0.03;
 /// Fewer Gaussians than these say nothing.
 const FEWEST: usize = 100;

@@ -36,19 +36,32 @@ fn colours_do_not_count() {
 /// Marks of before kinds were there are read from the same cameras.
 #[test]
 fn real_scenes_are_objects_and_keep_their_cameras() {
-    for name in ["pod.ply", "donut.ply", "playbot_8k.ply", "guitar.compressed.ply", "plant.splat"] {
+    for name in [
+        "pod.ply",
+        "donut.ply",
+        "playbot_8k.ply",
+        "guitar.compressed.ply",
+        "plant.splat",
+    ] {
         let Some(path) = scene_path(name) else { return };
         let gaussians = crate::scene::Scene::read(&path).unwrap().gaussians;
         let found = ViewSampler::new(&gaussians, 2).unwrap();
         let object = ViewSampler::around(&gaussians, 2).unwrap();
         assert_eq!(found.kind(), SceneKind::Object, "{name}");
-        assert_eq!(found.camera(Split::HeldOut, 5, 64), object.camera(Split::HeldOut, 5, 64));
+        assert_eq!(
+            found.camera(Split::HeldOut, 5, 64),
+            object.camera(Split::HeldOut, 5, 64)
+        );
     }
 }
 
 #[test]
 fn splits_of_every_kind_are_apart_whatever_the_seeds() {
-    for (kind, least) in [(SceneKind::Room, 2.4f32), (SceneKind::Terrain, 1.7), (SceneKind::Forward, 1.2)] {
+    for (kind, least) in [
+        (SceneKind::Room, 2.4f32),
+        (SceneKind::Terrain, 1.7),
+        (SceneKind::Forward, 1.2),
+    ] {
         let scene = scene(kind, 1);
         let [a, b] = [4, 5].map(|seed| ViewSampler::new(&scene, seed).unwrap());
         assert_eq!(a.kind(), kind);
@@ -73,9 +86,15 @@ fn viewers_of_a_room_stand_in_free_space_and_look_about() {
         assert!(clearance > 0.1, "{clearance}");
         let up = sampler.extent().up;
         let mut sides = [false; 8];
-        for view in views(&sampler, Split::Training).into_iter().chain(views(&sampler, Split::HeldOut)) {
+        for view in views(&sampler, Split::Training)
+            .into_iter()
+            .chain(views(&sampler, Split::HeldOut))
+        {
             let eye = view.centre();
-            assert!(eye[0].abs() < 2.0 && eye[2].abs() < 1.6 && (-1.7..0.0).contains(&eye[1]), "{eye:?}");
+            assert!(
+                eye[0].abs() < 2.0 && eye[2].abs() < 1.6 && (-1.7..0.0).contains(&eye[1]),
+                "{eye:?}"
+            );
             let way = |p: &[f32; 3]| dot(sub(*p, eye), sub(*p, eye));
             let nearest = scene.positions.iter().map(way).fold(f32::INFINITY, f32::min).sqrt();
             // The grid knows places to half a cell each way.
@@ -98,12 +117,20 @@ fn a_stage_is_seen_from_its_front_and_terrain_from_above() {
     for seed in 0..3 {
         let stage = ViewSampler::new(&scene(SceneKind::Forward, seed), seed).unwrap();
         for view in views(&stage, Split::Training) {
-            assert!(view.rotation[2][2] > 0.6 && view.centre()[2] < -1.5, "{:?}", view.centre());
+            assert!(
+                view.rotation[2][2] > 0.6 && view.centre()[2] < -1.5,
+                "{:?}",
+                view.centre()
+            );
         }
         let terrain = ViewSampler::new(&scene(SceneKind::Terrain, seed), seed).unwrap();
         for view in views(&terrain, Split::Training) {
             // y points down.
-            assert!(view.rotation[2][1] > 0.57 && view.centre()[1] < -1.0, "{:?}", view.centre());
+            assert!(
+                view.rotation[2][1] > 0.57 && view.centre()[1] < -1.0,
+                "{:?}",
+                view.centre()
+            );
         }
     }
 }
@@ -126,7 +153,13 @@ fn a_kind_can_be_said_and_is_refused_where_there_is_no_place() {
     let reason = ViewSampler::seen_from(&flat, 1, room).unwrap_err().to_string();
     assert!(reason.contains("no free place"), "{reason}");
     let mut inside = ViewSampler::new(&scene(SceneKind::Room, 1), 1).unwrap();
-    assert!(inside.train_on_ring(0.5).unwrap_err().to_string().contains("taken for room"));
+    assert!(
+        inside
+            .train_on_ring(0.5)
+            .unwrap_err()
+            .to_string()
+            .contains("taken for room")
+    );
     assert!("castle".parse::<SceneKind>().is_err());
 }
 

@@ -153,7 +153,13 @@ fn flatness(gaussians: &Gaussians, extent: &Extent) -> f32 {
         let [low, high] = super::extent::quantiles(values, &weights, [0.05, 0.95]);
         high - low
     });
-    let vertical = (0..3).fold(0, |best: usize, k| if extent.up[k].abs() > extent.up[best].abs() { k } else { best });
+    let vertical = (0..3).fold(0, |best: usize, k| {
+        if extent.up[k].abs() > extent.up[best].abs() {
+            k
+        } else {
+            best
+        }
+    });
     let width = spans[(vertical + 1) % 3].min(spans[(vertical + 2) % 3]);
     (spans[vertical] / width.max(1e-9)) as f32
 }

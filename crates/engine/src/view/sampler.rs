@@ -156,7 +156,10 @@ impl ViewSampler {
         if self.kind != SceneKind::Object {
             return Err(Error::BadOption {
                 field: "ring",
-                reason: format!("a circle is around an object, and this scene is taken for {}", self.kind),
+                reason: format!(
+                    "a circle is around an object, and this scene is taken for {}",
+                    self.kind
+                ),
             });
         }
         self.ring = Some(elevation);

@@ -51,7 +51,8 @@ impl SolidGrid {
         let mut grid = Self {
             low: ends.map(|[low, _]| (low - margin) as f32),
             side: side as f32,
-            counts: ends.map(|[low, high]| ((high - low + 2.0 * margin) / side).ceil().clamp(1.0, 2.0 * CELLS) as usize),
+            counts: ends
+                .map(|[low, high]| ((high - low + 2.0 * margin) / side).ceil().clamp(1.0, 2.0 * CELLS) as usize),
             solid: Vec::new(),
         };
         let mut cover = vec![0.0f32; grid.counts.iter().product()];

@@ -56,7 +56,9 @@ fn presets_seeds_and_sizes_reach_the_settings() {
         })
     };
     assert_eq!(kind(0).unwrap().kind, None);
-    let named: Vec<_> = (1..=4).map(|number| kind(number).unwrap().kind.unwrap().name()).collect();
+    let named: Vec<_> = (1..=4)
+        .map(|number| kind(number).unwrap().kind.unwrap().name())
+        .collect();
     assert_eq!(named, ["object", "room", "terrain", "forward"]);
     assert_eq!(kind(5).err().unwrap().to_string(), "scene_kind: 5 is none");
     let none = settings(&api::EmbedSpec {
