@@ -18,6 +18,7 @@ mod output;
 mod pages;
 mod report;
 mod resource_names;
+mod scene_kind;
 mod server;
 mod settings;
 mod stage;

@@ -18,6 +18,7 @@ use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line, printable, say};
 use crate::report::{EmbedReport, FailureReport};
 use crate::resource_names;
+use crate::scene_kind::{self, SceneKind};
 use crate::stage::Stage;
 use crate::transfer::{Destination, download};
 
@@ -84,9 +85,12 @@ pub struct Arguments {
         hide_possible_values = true
     )]
     robust_to: Vec<Distortion>,
-    /// Where the scene's viewers are: cameras.json (3DGS) or transforms.json (NeRF), or artifacts/ID; around it unless given
+    /// Where the scene's viewers are: cameras.json (3DGS) or transforms.json (NeRF), or artifacts/ID
     #[arg(long, value_name = "FILE")]
     cameras: Option<String>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<SceneKind>,
     /// Decides views, backgrounds and augmentation
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
@@ -186,6 +190,7 @@ fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs
         size: arguments.size.unwrap_or_default(),
         force: arguments.force,
         ignore_bad_rows: arguments.ignore_bad_rows,
+        scene_kind: scene_kind::number(arguments.kind),
         robust_to: distortion::named(&arguments.robust_to),
         ..EmbedSpec::default()
     };

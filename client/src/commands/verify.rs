@@ -13,6 +13,7 @@ use crate::options::Submission;
 use crate::output::{Exit, print_json, print_line};
 use crate::report::VerifyReport;
 use crate::resource_names;
+use crate::scene_kind::{self, SceneKind};
 
 /// Arguments of `verify`.
 #[derive(Args)]
@@ -32,9 +33,12 @@ pub struct Arguments {
     /// Side of these views in pixels; CLIP's input unless given
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
-    /// Where a scene's viewers are, a file as `embed` was given, or artifacts/ID; around it unless given
+    /// Where a scene's viewers are, a file as `embed` was given, or artifacts/ID
     #[arg(long, value_name = "FILE")]
     cameras: Option<String>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<SceneKind>,
     /// Decides the views of a scene
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
@@ -100,6 +104,7 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         size: arguments.size.unwrap_or_default(),
         seed: arguments.seed,
         ignore_bad_rows: arguments.ignore_bad_rows,
+        scene_kind: scene_kind::number(arguments.kind),
     });
     let job = create_with(context, &arguments.submission, &inputs, spec).await?;
     if arguments.submission.no_wait {

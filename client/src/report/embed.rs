@@ -18,6 +18,9 @@ pub struct EmbedReport {
     /// Null when the views are identical.
     psnr_db: Option<f64>,
     identical: bool,
+    /// Null when the views are identical where the scene is.
+    psnr_covered_db: Option<f64>,
+    covered: f64,
     ssim: f64,
     lpips: Option<f64>,
     steps: u32,
@@ -44,6 +47,8 @@ impl From<&EmbedResult> for EmbedReport {
             message_recovered: result.message_recovered,
             psnr_db: result.psnr_db,
             identical: result.psnr_db.is_none(),
+            psnr_covered_db: result.psnr_covered_db,
+            covered: result.covered,
             ssim: result.ssim,
             lpips: result.lpips,
             steps: result.steps,

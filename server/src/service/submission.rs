@@ -2,7 +2,7 @@
 use std::collections::HashSet;
 
 use guardsplat_codeword::MessageLength;
-use guardsplat_proto::v1::embed_spec::{Distortion, Preset};
+use guardsplat_proto::v1::embed_spec::{Distortion, Preset, SceneKind};
 use guardsplat_proto::v1::job::Spec;
 use guardsplat_proto::v1::{CreateJobRequest, EmbedSpec, Job, KeySpec, VerifySpec};
 use uuid::Uuid;
@@ -130,6 +130,7 @@ fn embed(spec: &EmbedSpec, problems: &mut Violations) -> Result<Option<Wanted>> 
     distortions(&spec.robust_to, problems);
     side("job.embed.size", spec.size, problems);
     let message = (!spec.message.is_empty()).then(|| ("job.embed.message", spec.message.clone()));
+    scene_kind("job.embed.scene_kind", spec.scene_kind, &spec.cameras, problems);
     let cameras = cameras("job.embed.cameras", &spec.cameras, problems)?;
     Ok(scene.map(|scene| Wanted {
         inputs: std::iter::once(scene).chain(cameras).collect(),
@@ -183,6 +184,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
         "must be 1 to 10000, or 0 for 20",
     );
     side("job.verify.size", spec.size, problems);
+    scene_kind("job.verify.scene_kind", spec.scene_kind, &spec.cameras, problems);
     inputs.extend(cameras("job.verify.cameras", &spec.cameras, problems)?);
     let claim = problems.take(claims::of_verify(spec))?.flatten();
     let message = (!spec.message.is_empty()).then(|| ("job.verify.message", spec.message.clone()));
@@ -192,6 +194,17 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
         message,
         claim,
     }))
+}
+
+/// A kind of scene, which has a say only where there are no cameras.
+fn scene_kind(field: &str, number: i32, cameras: &str, problems: &mut Violations) {
+    let known = SceneKind::try_from(number);
+    problems.check(known.is_ok(), field, "is no kind of scene that this server knows");
+    problems.check(
+        cameras.is_empty() || number == 0,
+        field,
+        "must be left out where cameras are given, which say where viewers are",
+    );
 }
 
 /// A file of cameras, where one is named.

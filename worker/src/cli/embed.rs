@@ -16,7 +16,7 @@ use guardsplat_engine::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Budget, Exit, print_json, print_line};
+use super::{Budget, Exit, Kind, print_json, print_line};
 use crate::operations::embed_settings::chosen;
 use crate::operations::{comparison_sheet, load};
 
@@ -56,9 +56,12 @@ pub struct Arguments {
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     ring: Option<f32>,
     /// Where the scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP: training views are around and between
-    /// these, and every eighth is held out. Unless given, views are around the scene
+    /// these, and every eighth is held out
     #[arg(long, value_name = "FILE", conflicts_with = "ring")]
     cameras: Option<PathBuf>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<Kind>,
     /// Side of training views and of those of the verification, in pixels
     #[arg(long, value_name = "PX")]
     size: Option<u32>,
@@ -90,6 +93,8 @@ struct Report<'a> {
     message_recovered: bool,
     #[serde(flatten)]
     quality: Quality,
+    psnr_covered_db: Option<f64>,
+    covered: f64,
     steps: usize,
     view_steps: usize,
     seconds: f64,
@@ -167,6 +172,9 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
     if let Some(elevation) = arguments.ring {
         settings.ring = Some(Ring { elevation });
     }
+    if let Some(kind) = arguments.kind {
+        settings.kind = Some(kind.scene());
+    }
     chosen(settings.learning(arguments.learn), arguments.seed, arguments.size)
 }
 
@@ -219,6 +227,8 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
         message: found.message.to_string(),
         message_recovered: found.message_recovered,
         quality: found.quality,
+        psnr_covered_db: found.psnr_covered_db,
+        covered: found.covered,
         steps: outcome.steps,
         view_steps: outcome.view_steps,
         seconds: start.elapsed().as_secs_f64(),

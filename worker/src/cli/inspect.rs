@@ -6,19 +6,23 @@ use guardsplat_engine::Result;
 use guardsplat_engine::clip::{Clip, Parts};
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::embed::{Preset, measure_view_on_cpu, predict_memory};
+use guardsplat_engine::extract::rasterizer;
 use guardsplat_engine::memory::{
     Bytes, Limits, MemoryRequirements, ModelBytes, SceneSize, admission, picture_bytes, rendering_requirements,
 };
+use guardsplat_engine::quality::Difficulty;
 use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
-use guardsplat_engine::splat::{WeightCache, prepare};
-use guardsplat_engine::view::{Extent, Split, ViewSampler};
+use guardsplat_engine::splat::{WeightCache, prepare, sh};
+use guardsplat_engine::view::{Extent, Openness, SceneKind, Split, ViewSampler};
 use serde::Serialize;
 
-use super::{Budget, Exit, print_json, print_line};
+use super::{Budget, Exit, Kind, print_json, print_line};
 use crate::operations::load;
 
 /// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
 const SIDE: u32 = 160;
+/// Held-out views that tell how hard a scene is.
+const LOOKED_AT: u64 = 12;
 /// Side of pictures for the prediction of `render`: its own default.
 const PICTURE: u32 = 512;
 
@@ -33,6 +37,9 @@ pub struct Arguments {
     /// Where the scene's viewers are, as for `embed`: a file (cameras.json or transforms.json), or a folder of COLMAP
     #[arg(long, value_name = "PATH")]
     cameras: Option<PathBuf>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<Kind>,
     /// Leaves out rows with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
@@ -57,6 +64,8 @@ struct Report {
     sh_degree_learned: usize,
     colours_rounded: bool,
     extent: Option<Where>,
+    kind: Option<Found>,
+    difficulty: Option<Difficulty>,
     cameras: Option<Viewers>,
     views: Option<u32>,
     seen_gaussians: Option<usize>,
@@ -74,6 +83,18 @@ struct Where {
     on_ground: bool,
 }
 
+/// The kind of a scene.
+#[derive(Serialize)]
+struct Found {
+    /// By its geometry.
+    found: SceneKind,
+    /// The one that views are made for; none where cameras were given.
+    used: Option<SceneKind>,
+    /// What the geometry says.
+    #[serde(flatten)]
+    openness: Openness,
+}
+
 /// Cameras that were given.
 #[derive(Serialize)]
 struct Viewers {
@@ -89,6 +110,37 @@ struct Need {
     bytes: u64,
     parts: MemoryRequirements,
     fits: bool,
+}
+
+impl Found {
+    fn text(&self) -> String {
+        let Openness {
+            hollow,
+            inside,
+            seen_from_front,
+            hidden_from_front,
+            hidden_from_behind,
+            seen_from_above,
+            flatness,
+            ..
+        } = self.openness;
+        let percent = |share: f32| format!("{:.0} %", 100.0 * share);
+        let used = match self.used {
+            Some(used) if used == self.found => used.to_string(),
+            Some(used) => format!("{used}, as was said, found to be {}", self.found),
+            None => format!("{}, which says nothing where cameras are given", self.found),
+        };
+        format!(
+            "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width",
+            percent(hollow),
+            percent(inside),
+            percent(seen_from_front),
+            percent(hidden_from_front),
+            percent(hidden_from_behind),
+            percent(seen_from_above),
+            flatness
+        )
+    }
 }
 
 impl Need {
@@ -118,10 +170,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let size = SceneSize::of(&scene);
     let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));
     let (mut extent, mut embed, mut seen, mut viewers) = (None, None, None, None);
+    let (mut kind, mut difficulty) = (None, None);
     // Of nothing there is nothing to be seen.
     if !gaussians.is_empty() {
         extent = Some(Extent::of(gaussians)?);
-        let settings = Preset::Standard.settings();
+        let mut settings = Preset::Standard.settings();
+        settings.kind = arguments.kind.map(Kind::scene);
         let view = measure_view_on_cpu(gaussians, &settings, &cameras)?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
         let clip = 4 * clip.parameters() as u64;
@@ -130,7 +184,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             verifying: clip,
         };
         embed = Some(predict_memory(size, view, &settings, models));
-        let sampler = ViewSampler::among(gaussians, 0, &cameras)?;
+        let sampler = ViewSampler::seen_from(gaussians, 0, settings.viewpoints(&cameras))?;
+        let (found, openness) = SceneKind::of(gaussians)?;
+        kind = Some(Found {
+            found,
+            used: cameras.is_empty().then(|| sampler.kind()),
+            openness,
+        });
+        difficulty = Some(measure_difficulty(gaussians, &sampler)?);
         seen = (arguments.views.map(|views| count_seen(gaussians, &sampler, views))).transpose()?;
         viewers = sampler.given().map(|given| Viewers {
             training: given.training_cameras(),
@@ -154,6 +215,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             up: extent.up,
             on_ground: extent.on_ground,
         }),
+        kind,
+        difficulty,
         cameras: viewers,
         views: arguments.views,
         seen_gaussians: seen,
@@ -167,6 +230,22 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         tell(&report);
     }
     Ok(Exit::Done)
+}
+
+/// What some held-out views show.
+fn measure_difficulty(gaussians: &Gaussians, sampler: &ViewSampler) -> Result<Difficulty> {
+    let rasterizer = rasterizer(&open(DeviceChoice::Cpu)?)?;
+    let view = |index: u64| {
+        let view = prepare(
+            gaussians,
+            &sampler.camera(Split::HeldOut, index, SIDE),
+            WeightCache::None,
+        )?;
+        let colours = sh::colours(&gaussians.sh, None, &view);
+        let [white, black] = [1.0, 0.0].map(|ground| rasterizer.render(&view, &colours, [ground; 3]));
+        Ok([white?.to_8_bit(), black?.to_8_bit()])
+    };
+    Difficulty::of(&(0..LOOKED_AT).map(view).collect::<Result<Vec<_>>>()?)
 }
 
 /// How many Gaussians so many training views show.
@@ -214,6 +293,24 @@ fn tell(report: &Report) {
             );
         }
         None => line("extent", "none: there is nothing to see or mark".into()),
+    }
+    if let Some(kind) = &report.kind {
+        line("kind", kind.text());
+    }
+    if let Some(seen) = &report.difficulty {
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        let of_picture = format!("covers {} of a view", percent(seen.covered));
+        let colours = format!(
+            "lightness {:.2}, colours spread by {:.3}",
+            seen.lightness, seen.chroma_spread
+        );
+        let room = format!("{} of values at an end", percent(seen.at_ends));
+        let thin = format!("texture {:.3}, {} at an edge", seen.texture, percent(seen.thinness));
+        let saturation = format!("saturation {:.2}", seen.saturation);
+        line(
+            "looks",
+            format!("{of_picture}; {colours}, {saturation}, {room}; {thin}"),
+        );
     }
     if let Some(cameras) = &report.cameras {
         let near = cameras.clearance.map_or_else(String::new, |distance| {

@@ -16,6 +16,7 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use guardsplat_engine::view::SceneKind;
 use guardsplat_engine::{Error, Result};
 use tracing_subscriber::EnvFilter;
 
@@ -108,6 +109,30 @@ impl Background {
         match self {
             Self::White => [1.0; 3],
             Self::Black => [0.0; 3],
+        }
+    }
+}
+
+/// How a scene was captured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    /// Seen from outside
+    Object,
+    /// Surroundings, seen from inside
+    Room,
+    /// Ground, seen from above
+    Terrain,
+    /// Seen from one side
+    Forward,
+}
+
+impl Kind {
+    fn scene(self) -> SceneKind {
+        match self {
+            Self::Object => SceneKind::Object,
+            Self::Room => SceneKind::Room,
+            Self::Terrain => SceneKind::Terrain,
+            Self::Forward => SceneKind::Forward,
         }
     }
 }
@@ -224,6 +249,10 @@ mod tests {
             "verify A B C --key K --message 0123abcd --json --memory 1 --ignore-bad-rows",
             "render IN DIR --ignore-bad-rows --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
             "inspect SCENE --json --cameras F --memory 7 --views 16 --ignore-bad-rows",
+            "embed IN OUT --key K --message 0 --kind room",
+            "verify A --key K --kind forward",
+            "render IN DIR --views 5 --kind terrain",
+            "inspect SCENE --kind object",
             "cameras colmap/sparse/0 cameras.json",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
             "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",

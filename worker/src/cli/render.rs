@@ -10,11 +10,11 @@ use guardsplat_engine::memory::{
 use guardsplat_engine::quality::write_picture;
 use guardsplat_engine::scene::{BadRows, Scene};
 use guardsplat_engine::splat::{WeightCache, prepare, sh};
-use guardsplat_engine::view::{Camera, Split, ViewSampler, read_cameras, write_cameras};
+use guardsplat_engine::view::{Camera, Split, ViewSampler, Viewpoints, read_cameras, write_cameras};
 use guardsplat_engine::{Error, Result};
 
 use super::display::Display;
-use super::{Background, Budget, Exit, print_line};
+use super::{Background, Budget, Exit, Kind, print_line};
 
 /// Side of views where neither a size nor a camera file says otherwise.
 const DEFAULT_SIZE: u32 = 512;
@@ -40,9 +40,12 @@ pub struct Arguments {
     /// How many views; with --cameras, its first ones, all unless given
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), required_unless_present = "cameras")]
     views: Option<u32>,
-    /// Cameras from a file (cameras.json or transforms.json) or a folder of COLMAP instead of ones spread around the scene
+    /// Cameras from a file (cameras.json or transforms.json) or a folder of COLMAP instead of ones where viewers of such a scene are
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<Kind>,
     /// Side in pixels, 512 unless given; for cameras from a file, their longer side, as in the file unless given
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=8192))]
     size: Option<u32>,
@@ -87,7 +90,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let cameras = match given {
         Some(cameras) => cameras,
         None => {
-            let sampler = ViewSampler::new(&scene, arguments.seed)?;
+            let viewpoints = Viewpoints {
+                kind: arguments.kind.map(Kind::scene),
+                cameras: &[],
+            };
+            let sampler = ViewSampler::seen_from(&scene, arguments.seed, viewpoints)?;
             let views = 0..u64::from(arguments.views.unwrap_or(1));
             views.map(|index| sampler.camera(Split::HeldOut, index, size)).collect()
         }

@@ -1,34 +1,27 @@
 //! `sample`.
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use guardsplat_engine::scene::Format;
 use guardsplat_engine::scene::convert::convert_to;
 use guardsplat_engine::view::write_cameras;
 use guardsplat_engine::{Error, Result, sample};
 
-use super::{Exit, print_line};
+use super::{Exit, Kind, print_line};
 
-/// Cameras of a room.
+/// Cameras of a scene that is not seen from all around.
 const CAMERAS: usize = 40;
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Kind {
-    /// Things on a disc of ground
-    Object,
-    /// A room with things in it
-    Room,
-}
 
 #[derive(Args)]
 pub struct Arguments {
     /// The scene file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb or .splat
     #[arg(value_name = "OUT")]
     output: PathBuf,
-    /// What it is of: object (seen from outside) or room (seen from inside)
+    /// What it is of: things on a disc, a room with things in it, hills with houses, or a stage that was captured from its
+    /// front
     #[arg(long, value_enum, default_value = "object")]
     kind: Kind,
-    /// Writes cameras inside the room to this file, cameras.json, for `embed --cameras`
+    /// Writes where the viewers of a room, of terrain or of a stage are to this file, cameras.json, for `embed --cameras`
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
     /// How many Gaussians
@@ -43,15 +36,12 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let kind = match arguments.kind {
-        Kind::Object => sample::Kind::Object,
-        Kind::Room => sample::Kind::Room,
-    };
+    let kind = arguments.kind.scene();
     let cameras = sample::cameras(kind, CAMERAS);
     if arguments.cameras.is_some() && cameras.is_empty() {
         return Err(Error::BadOption {
             field: "--cameras",
-            reason: "an object is seen from all around; say --kind room".into(),
+            reason: "an object is seen from all around; say --kind room, terrain or forward".into(),
         });
     }
     let scene = sample::sample_of(kind, arguments.gaussians, arguments.sh_degree, arguments.seed)?;

@@ -12,7 +12,7 @@ use guardsplat_engine::scene::{BadRows, Ignored};
 use serde::Serialize;
 
 use super::display::Display;
-use super::{Background, Budget, Exit, print_json, print_line};
+use super::{Background, Budget, Exit, Kind, print_json, print_line};
 use crate::operations::load;
 use crate::operations::verification::{VerificationReport, Views, read_and_compare};
 
@@ -42,9 +42,12 @@ pub struct Arguments {
     /// What is behind a scene, or shows through transparent pixels
     #[arg(long, value_enum, default_value = "white")]
     background: Background,
-    /// Where a scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP, as `embed` was told; around it unless given
+    /// Where a scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP, as `embed` was told
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
+    /// The kind of scene, which says where its viewers are; found from the scene unless given
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    kind: Option<Kind>,
     /// Decides the views of a scene
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -92,6 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         background: arguments.background.rgb(),
         seed: arguments.seed,
         cameras: load::cameras(arguments.cameras.as_deref())?,
+        kind: arguments.kind.map(Kind::scene),
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
         with_files: true,
     };

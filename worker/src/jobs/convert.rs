@@ -10,7 +10,8 @@ use guardsplat_engine::message::Key;
 use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::scene::{BadRows, Ignored};
-use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset};
+use guardsplat_engine::view::SceneKind;
+use guardsplat_proto::v1::embed_spec::{Distortion, Preset as ApiPreset, SceneKind as ApiKind};
 use guardsplat_proto::v1::failure::Reason;
 use guardsplat_proto::v1::progress::Stage;
 use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
@@ -38,7 +39,20 @@ pub fn settings(spec: &api::EmbedSpec) -> Result<Settings> {
     if !spec.robust_to.is_empty() {
         settings.robust_to = robust_to(&spec.robust_to)?;
     }
+    settings.kind = kind(spec.scene_kind)?;
     Ok(chosen(settings, spec.seed, size)?)
+}
+
+/// The kind of scene, where one is named.
+fn kind(number: i32) -> Result<Option<SceneKind>> {
+    match ApiKind::try_from(number) {
+        Ok(ApiKind::Unspecified) => Ok(None),
+        Ok(ApiKind::Object) => Ok(Some(SceneKind::Object)),
+        Ok(ApiKind::Room) => Ok(Some(SceneKind::Room)),
+        Ok(ApiKind::Terrain) => Ok(Some(SceneKind::Terrain)),
+        Ok(ApiKind::Forward) => Ok(Some(SceneKind::Forward)),
+        Err(_) => Err(Error::BadJob(format!("scene_kind: {number} is none"))),
+    }
 }
 
 /// What a mark is to stand.
@@ -82,6 +96,7 @@ pub fn views(spec: &api::VerifySpec) -> Result<Views> {
         background: WHITE,
         seed: spec.seed,
         cameras: Vec::new(),
+        kind: kind(spec.scene_kind)?,
         bad_rows: BadRows::ignored_if(spec.ignore_bad_rows),
         with_files: false,
     })
@@ -134,6 +149,8 @@ pub fn embed_result(outcome: &Outcome) -> api::EmbedResult {
         message: found.message.to_string(),
         message_recovered: found.message_recovered,
         psnr_db: found.quality.psnr.psnr_db,
+        psnr_covered_db: found.psnr_covered_db,
+        covered: found.covered,
         ssim: found.quality.ssim,
         lpips: found.quality.lpips,
         steps: outcome.steps as u32,

@@ -8,7 +8,7 @@ use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
-use guardsplat_engine::view::{Camera, ViewSampler};
+use guardsplat_engine::view::{Camera, SceneKind, ViewSampler, Viewpoints};
 use serde::Serialize;
 
 use super::thumbnails::Thumbnails;
@@ -26,8 +26,10 @@ pub struct Views {
     pub background: [f32; 3],
     /// Decides them.
     pub seed: u64,
-    /// Where the scene's viewers are; around it where none are given.
+    /// Where the scene's viewers are; where none are given the kind of scene says where.
     pub cameras: Vec<Camera>,
+    /// That kind; found from the scene where none is given.
+    pub kind: Option<SceneKind>,
     /// What becomes of rows of the scene with values that are not legal.
     pub bad_rows: BadRows,
     /// Whether scenes may be in more files than one: where their user chose them on this machine.
@@ -92,7 +94,11 @@ fn read_scenes(
             progress(before + done, total);
             shown.see("view", before + done - 1, picture)
         };
-        let sampler = ViewSampler::among(&gaussians, views.seed, &views.cameras)?;
+        let viewpoints = Viewpoints {
+            kind: views.kind,
+            cameras: &views.cameras,
+        };
+        let sampler = ViewSampler::seen_from(&gaussians, views.seed, viewpoints)?;
         let reading = read_scene(engine, &gaussians, &sampler, views.count, size, views.background, seen)?;
         logits.extend(reading.views);
     }

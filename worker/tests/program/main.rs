@@ -317,6 +317,27 @@ fn a_scene_can_be_inspected() {
     let bench = Bench::new();
     bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
     let found = bench.json("inspect in.ply --json", 0);
+    assert_eq!(
+        (&found["kind"]["found"], &found["kind"]["used"]),
+        (&"object".into(), &"object".into())
+    );
+    for share in [
+        "covered",
+        "lightness",
+        "chroma_spread",
+        "saturation",
+        "at_ends",
+        "texture",
+        "thinness",
+    ] {
+        let value = found["difficulty"][share].as_f64().unwrap();
+        assert!((0.0..=1.0).contains(&value), "{share} {value}");
+    }
+    let said = bench.json("inspect in.ply --kind terrain --json", 0);
+    assert_eq!(
+        (&said["kind"]["found"], &said["kind"]["used"]),
+        (&"object".into(), &"terrain".into())
+    );
     let file = std::fs::metadata(bench.path("in.ply")).unwrap().len();
     for (field, value) in [
         ("file_bytes", file),

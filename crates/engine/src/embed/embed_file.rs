@@ -29,7 +29,7 @@ pub struct Job<'a> {
     pub message: &'a Message,
     /// How.
     pub settings: &'a Settings,
-    /// Where its viewers are; around the scene where none are given.
+    /// Where its viewers are; where none are given the kind of scene says where.
     pub cameras: &'a [Camera],
     /// Writes a scene that misses its target all the same.
     pub force: bool,

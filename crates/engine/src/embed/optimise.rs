@@ -41,8 +41,7 @@ pub struct Optimised {
 }
 
 /// Optimises offsets that make views of the scene read as `message`: views around and between `cameras`, or, without any,
-/// around the scene. The same arguments on the same device give the
-/// same offsets, bit by bit.
+/// where viewers of such a scene are. The same arguments on the same device give the same offsets, bit by bit.
 ///
 /// # Errors
 /// Settings out of range, a message of another length than the key's, a scene without Gaussians,
@@ -63,9 +62,9 @@ pub fn optimise(
         });
     }
     let gaussians = &scene.gaussians;
-    let mut sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
+    let mut sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
     if let Some(ring) = settings.ring {
-        sampler.train_on_ring(ring.elevation.to_radians());
+        sampler.train_on_ring(ring.elevation.to_radians())?;
     }
     let mut held_out = settings
         .early_stop
@@ -133,7 +132,7 @@ impl<'a> Run<'a> {
         settings: &'a Settings,
         sampler: ViewSampler,
     ) -> Result<(Self, Coverage)> {
-        let among_cameras = sampler.given().is_some();
+        let of_parts = sampler.shows_parts();
         let mut pool = ViewPool::new(sampler, settings);
         let coverage = pool.cover(engine, &scene.gaussians)?;
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
@@ -147,7 +146,7 @@ impl<'a> Run<'a> {
                     .iter()
                     .map(|r| coverage.energies[*r as usize])
                     .collect();
-                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies, among_cameras))
+                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies, of_parts))
             }
             Optimizer::Adam(options) => OptimizerState::Adam(Adam::new(options, rows, columns, scene.gaussians.len())),
         };

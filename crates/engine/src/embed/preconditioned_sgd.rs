@@ -16,10 +16,10 @@ const CHUNK: usize = 512;
 const MEAN_SQUARE: f32 = 0.079_577_47;
 /// Smallest energy of a Gaussian that is believed, against the mean of all.
 const FLOOR: f32 = 1e-2;
-/// The same where views are around cameras that were given: each shows another part of the scene, so what few of them show
+/// The same where views are from inside, as among cameras that were given: each shows another part of the scene, so what few show
 /// is known badly, and a step that is divided by too little is seen from the next camera. One mark of 32 bits in a room of
 /// the project's own reads 97.5, 96.9 and 90.6 % with 0.3, 1 and 3, at 35.2, 37.5 and 37.9 dB; with 0.01 half.
-const FLOOR_AMONG_CAMERAS: f32 = 1.0;
+const FLOOR_OF_PARTS: f32 = 1.0;
 
 /// Rates of the steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,10 +74,10 @@ pub struct PreconditionedSgd {
 impl PreconditionedSgd {
     /// For slots of `stride` coefficients with these energies: the mean over views of the sum over pixels of a Gaussian's
     /// weight times the cover of the pixel.
-    /// `among_cameras` says whether these views are around cameras that were given.
-    pub fn new(options: PreconditionedSgdOptions, stride: usize, energies: &[f32], among_cameras: bool) -> Self {
+    /// `of_parts` says whether each of these views shows another part of the scene.
+    pub fn new(options: PreconditionedSgdOptions, stride: usize, energies: &[f32], of_parts: bool) -> Self {
         let mean = energies.iter().map(|e| f64::from(*e)).sum::<f64>() / energies.len().max(1) as f64;
-        let floor = if among_cameras { FLOOR_AMONG_CAMERAS } else { FLOOR };
+        let floor = if of_parts { FLOOR_OF_PARTS } else { FLOOR };
         let floor = (floor * mean as f32).max(f32::MIN_POSITIVE);
         Self {
             options,

@@ -77,6 +77,7 @@ impl Preset {
             fresh_per_step: 4,
             views: None,
             ring: None,
+            kind: None,
             pool_views: 150,
             pool_mebibytes: 1024,
             half_weights: false,

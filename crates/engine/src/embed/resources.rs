@@ -34,7 +34,7 @@ pub fn measure_view(
     settings: &Settings,
     cameras: &[Camera],
 ) -> Result<ViewSize> {
-    let sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
+    let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
     let camera = sampler.camera(Split::Training, 0, settings.size);
     let view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?.view;
     Ok(view_size(&view))
@@ -45,7 +45,7 @@ pub fn measure_view(
 /// # Errors
 /// An empty scene.
 pub fn measure_view_on_cpu(gaussians: &Gaussians, settings: &Settings, cameras: &[Camera]) -> Result<ViewSize> {
-    let sampler = ViewSampler::among(gaussians, settings.seed, cameras)?;
+    let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
     let camera = sampler.camera(Split::Training, 0, settings.size);
     let cache = cpu_weight_cache(camera.width, settings.half_weights);
     Ok(view_size(&prepare(gaussians, &camera, cache)?))

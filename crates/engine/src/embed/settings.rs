@@ -8,6 +8,7 @@ use super::optimizer::{Optimizer, accept_names};
 use super::preconditioned_sgd::PreconditionedSgdOptions;
 use super::target::Target;
 use crate::error::{Error, Result};
+use crate::view::{Camera, SceneKind, Viewpoints};
 
 /// Weights of the terms of the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,6 +99,10 @@ pub struct Settings {
     // Left out of JSON where there is none, so that settings from before it was there have the hash that they had.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ring: Option<Ring>,
+    /// The kind of the scene, which says where its views are; `None` finds it from the scene. Without a meaning where cameras
+    /// are given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<SceneKind>,
     /// Views that are kept for later steps; fresh ones replace the oldest.
     pub pool_views: usize,
     /// Memory for kept views, in MiB; the oldest go first.
@@ -168,6 +173,14 @@ impl Settings {
         let settings: Settings = serde_json::from_value(all).map_err(bad)?;
         settings.check()?;
         Ok(settings)
+    }
+
+    /// Where views are taken from, with these cameras, if there are any.
+    pub fn viewpoints<'a>(&self, cameras: &'a [Camera]) -> Viewpoints<'a> {
+        Viewpoints {
+            kind: self.kind,
+            cameras,
+        }
     }
 
     /// What training views go through.

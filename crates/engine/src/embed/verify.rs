@@ -1,10 +1,10 @@
-//! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views over the sphere.
+//! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views.
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::extract::{Comparison, Engine, PooledLogits, default_size};
 use crate::message::Message;
 use crate::picture::Picture;
-use crate::quality::{Quality, measure};
+use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
 use crate::scene::Gaussians;
 use crate::view::{Camera, Split, ViewSampler};
 
@@ -28,6 +28,10 @@ pub struct Verification {
     pub wrong_bits_of_all: usize,
     /// How much the mark shows.
     pub quality: Quality,
+    /// Mean PSNR in dB over the pixels that the scene covers; `None` where no view covers any, or none of them differs.
+    pub psnr_covered_db: Option<f64>,
+    /// Mean share of a view that the scene covers, 0 to 1.
+    pub covered: f64,
     /// How many views.
     pub views: usize,
     /// Side of the views in pixels.
@@ -51,15 +55,20 @@ pub fn verify(
 ) -> Result<Verification> {
     let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
     // From the original, so that both scenes are seen by the same cameras whatever happened to the other.
-    let sampler = ViewSampler::among(original, settings.seed, cameras)?;
+    let sampler = ViewSampler::seen_from(original, settings.seed, settings.viewpoints(cameras))?;
     let mut pairs = Vec::with_capacity(settings.verify.views);
     let mut logits = Vec::with_capacity(settings.verify.views);
+    let (mut of_covered, mut shares): (Vec<Psnr>, f64) = (Vec::new(), 0.0);
     for index in 0..settings.verify.views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let [before, after] = [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
         let after = after?;
         logits.extend(engine.read_logits(std::slice::from_ref(&after))?);
-        pairs.push((before?, after));
+        let before = before?;
+        let mask = covered(&before, &engine.picture(original, &camera, [0.0; 3])?)?;
+        of_covered.extend(psnr_covered(&before, &after, &mask)?);
+        shares += cover::share(&mask);
+        pairs.push((before, after));
         done(index + 1);
     }
     let quality = measure(&pairs, engine.lpips()?, &engine.compute.device, &engine.stop)?;
@@ -78,6 +87,11 @@ pub fn verify(
         wrong_bits_of_all,
         message: read.message(),
         quality,
+        psnr_covered_db: match of_covered.is_empty() {
+            true => None,
+            false => mean_psnr(&of_covered)?.psnr_db,
+        },
+        covered: shares / settings.verify.views.max(1) as f64,
         views: settings.verify.views,
         size,
         pairs,

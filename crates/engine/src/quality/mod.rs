@@ -2,6 +2,8 @@
 mod animation;
 pub mod batch;
 pub mod compare;
+pub mod cover;
+pub mod difficulty;
 mod exr;
 pub mod files;
 mod likeness;
@@ -14,6 +16,8 @@ mod window;
 
 pub use batch::{batch, unbatch};
 pub use compare::{contact_sheet, difference};
+pub use cover::{covered, psnr_covered};
+pub use difficulty::Difficulty;
 pub use files::{PictureFormat, decode_picture, encode_picture, is_picture, read_picture, write_picture};
 pub(crate) use likeness::{Likeness, LikenessWeights, likeness_with_gradient};
 pub use lpips::Lpips;

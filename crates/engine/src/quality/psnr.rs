@@ -40,17 +40,28 @@ pub fn psnr(original: &Picture, marked: &Picture) -> Result<Psnr> {
     if original.pixels.is_empty() {
         return bad("they have no pixels".into());
     }
+    Ok(squared_error(original, marked).into())
+}
+
+/// Mean squared error of two pictures of one size that have pixels.
+pub(super) fn squared_error(original: &Picture, marked: &Picture) -> f64 {
     let squares = original
         .pixels
         .iter()
         .zip(&marked.pixels)
         .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
-    let mse = squares.sum::<f64>() / original.pixels.len() as f64;
-    Ok(if mse == 0.0 {
-        Psnr::Identical
-    } else {
-        Psnr::Decibel(-10.0 * mse.log10())
-    })
+    squares.sum::<f64>() / original.pixels.len() as f64
+}
+
+impl From<f64> for Psnr {
+    /// Of a mean squared error.
+    fn from(error: f64) -> Self {
+        if error == 0.0 {
+            Self::Identical
+        } else {
+            Self::Decibel(-10.0 * error.log10())
+        }
+    }
 }
 
 /// Mean over views. Fails without views.

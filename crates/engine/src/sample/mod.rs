@@ -1,21 +1,26 @@
-//! Scenes of the project's own: Gaussians on textured solid shapes that stand on a disc of ground, or in a room.
+//! Scenes of the project's own: Gaussians on textured solid shapes that stand on a disc of ground, in a room, on hills, or on
+//! a stage of which only what its captors saw is there.
 //!
 //! Points are spread over each surface in proportion to its area. A Gaussian there is as wide as the spacing of
 //! points and a tenth of that thick along the surface normal, so that the surface closes without fringes. Its
 //! constant colour is the texture under a lamp and a sky; its highlight is a Phong lobe fitted into the spherical
 //! harmonics of the scene's degree.
+mod arrange;
 mod highlight;
+mod points;
 mod shapes;
 mod texture;
 
 use crate::error::{Error, Result};
 use crate::scene::{Gaussians, MAX_DEGREE, Scene, Sh};
-use crate::view::Camera;
 use crate::view::vector::{along, cross, dot, perpendicular, unit};
+use crate::view::{Camera, SceneKind};
+use arrange::STAND;
 use highlight::Highlight;
-use rand::{RngExt, SeedableRng};
+use points::Points;
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use shapes::{Solid, arrange, furnish};
+use shapes::Solid;
 use texture::Texture;
 
 /// Most Gaussians of a sample; it is meant to be small.
@@ -39,48 +44,50 @@ const LAMP: [f32; 3] = [0.45, -0.8, 0.4];
 /// # Errors
 /// [`Error::BadOption`] for no Gaussians or more than [`MAX_GAUSSIANS`], or a degree above 4.
 pub fn sample(gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
-    sample_of(Kind::Object, gaussians, sh_degree, seed)
+    sample_of(SceneKind::Object, gaussians, sh_degree, seed)
 }
 
-/// What a sample is of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kind {
-    /// Things on a disc of ground, seen from outside.
-    #[default]
-    Object,
-    /// A room with things in it, seen from inside: about 4 by 3 units and 1.7 high.
-    Room,
-}
-
-/// Where the viewers of a sample are, 640 by 480 pixels: for a room, at the height of eyes, half of them looking across it
-/// and half along its walls. None for an object, which is seen from all around.
-pub fn cameras(kind: Kind, count: usize) -> Vec<Camera> {
-    if kind == Kind::Object {
-        return Vec::new();
-    }
+/// Where the viewers of a sample are, 640 by 480 pixels: in a room at the height of eyes, half of them looking across it and
+/// half along its walls; above a landscape; before a stage. None for an object, which is seen from all around.
+pub fn cameras(kind: SceneKind, count: usize) -> Vec<Camera> {
     let camera = |i: usize| {
         // The golden angle: any number of cameras is spread evenly, and neighbours in the list look elsewhere.
         let angle = i as f32 * std::f32::consts::PI * (3.0 - 5f32.sqrt());
-        let reach = 0.35 * ((i as f32 + 0.5) / count as f32).sqrt();
-        let [a, b] = shapes::ROOM.map(|side| side as f32);
-        let eye = [
-            reach * a * angle.cos(),
-            -0.55 * shapes::CEILING as f32,
-            reach * b * angle.sin(),
-        ];
-        let turned = angle + if i.is_multiple_of(2) { std::f32::consts::PI } else { 1.2 };
-        let height = -(0.25 + 0.4 * (i % 5) as f32 / 4.0) * shapes::CEILING as f32;
-        let target = [a * turned.cos(), height, b * turned.sin()];
+        let share = ((i as f32 + 0.5) / count as f32).sqrt();
+        let (eye, target) = match kind {
+            SceneKind::Object | SceneKind::Room => in_room(i, angle, 0.35 * share),
+            SceneKind::Terrain => {
+                let reach = 1.3 * share;
+                let eye = [reach * angle.cos(), -2.6 - 0.4 * (i % 4) as f32, reach * angle.sin()];
+                (eye, [-0.5 * eye[0], 0.0, -0.5 * eye[2]])
+            }
+            SceneKind::Forward => {
+                let [x, y, z] = STAND;
+                let eye = [x + 1.1 * share * angle.cos(), y + 0.5 * share * angle.sin(), z];
+                (eye, [0.3 * eye[0], -0.4 * arrange::STAGE[1] as f32, 0.0])
+            }
+        };
         Camera::look_at(eye, target, [0.0, -1.0, 0.0], 0.9, 640, 480)
     };
+    let count = if kind == SceneKind::Object { 0 } else { count };
     (0..count).map(camera).collect()
+}
+
+/// Eye and target of a camera in a room, so far from its middle.
+fn in_room(i: usize, angle: f32, reach: f32) -> ([f32; 3], [f32; 3]) {
+    let [a, b] = arrange::ROOM.map(|side| side as f32);
+    let ceiling = arrange::CEILING as f32;
+    let eye = [reach * a * angle.cos(), -0.55 * ceiling, reach * b * angle.sin()];
+    let turned = angle + if i.is_multiple_of(2) { std::f32::consts::PI } else { 1.2 };
+    let height = -(0.25 + 0.4 * (i % 5) as f32 / 4.0) * ceiling;
+    (eye, [a * turned.cos(), height, b * turned.sin()])
 }
 
 /// Makes a sample scene of a kind, as [`sample`] does.
 ///
 /// # Errors
 /// Those of [`sample`].
-pub fn sample_of(kind: Kind, gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
+pub fn sample_of(kind: SceneKind, gaussians: usize, sh_degree: usize, seed: u64) -> Result<Scene> {
     if !(1..=MAX_GAUSSIANS).contains(&gaussians) {
         let reason = format!("{gaussians} is not between 1 and {MAX_GAUSSIANS}");
         return Err(Error::BadOption {
@@ -97,8 +104,10 @@ pub fn sample_of(kind: Kind, gaussians: usize, sh_degree: usize, seed: u64) -> R
     }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let solids = match kind {
-        Kind::Object => arrange(&mut random),
-        Kind::Room => furnish(&mut random),
+        SceneKind::Object => arrange::arrange(&mut random),
+        SceneKind::Room => arrange::furnish(&mut random),
+        SceneKind::Terrain => arrange::landscape(&mut random),
+        SceneKind::Forward => arrange::stage(&mut random),
     };
     let lamp = unit(LAMP).unwrap_or([0.0, -1.0, 0.0]);
     let highlight = Highlight::new(sh_degree);
@@ -116,15 +125,12 @@ pub fn sample_of(kind: Kind, gaussians: usize, sh_degree: usize, seed: u64) -> R
         area_done += solid.area();
         // Rounding the running total gives the last solid exactly what is left.
         let count = (gaussians as f64 * area_done / area).round() as usize - scene.len();
-        let spacing = (solid.area() / count.max(1) as f64).sqrt();
+        let seen_from = (kind == SceneKind::Forward).then_some(STAND);
+        let points = Points::new(solid, count, seen_from);
+        let deviation = WIDTH * points.spacing();
         for i in 0..count {
-            // A low-discrepancy grid over the surface, loosened a little to hide its rows.
-            let jitter: [f64; 2] = [random.random(), random.random()];
-            let u = (i as f64 + jitter[0]) / count as f64;
-            let v = (i as f64 * 0.618_033_988_749_894_9 + 0.3 * jitter[1] / (count as f64).sqrt()).fract();
-            let (position, normal) = solid.point(u, v);
+            let (position, normal) = points.draw(i, &mut random);
             let shade = shade(texture.colour(solid.to_own_axes(position)), normal, lamp);
-            let deviation = WIDTH * spacing;
             scene.positions.push(position);
             scene.rotations.push(facing(normal));
             scene
@@ -193,8 +199,8 @@ mod tests {
     #[test]
     fn a_room_is_seen_from_inside() {
         for seed in 0..4 {
-            let scene = sample_of(Kind::Room, 4000, 1, seed).unwrap().gaussians;
-            let cameras = cameras(Kind::Room, 24);
+            let scene = sample_of(SceneKind::Room, 4000, 1, seed).unwrap().gaussians;
+            let cameras = cameras(SceneKind::Room, 24);
             for camera in &cameras {
                 let [x, y, z] = camera.centre();
                 let near = |p: &&[f32; 3]| ((p[0] - x).powi(2) + (p[1] - y).powi(2) + (p[2] - z).powi(2)).sqrt() < 0.3;
@@ -202,7 +208,7 @@ mod tests {
                 let view = crate::splat::prepare(&scene, camera, crate::splat::WeightCache::None).unwrap();
                 assert!(view.visible.len() > 300, "seed {seed}: {}", view.visible.len());
             }
-            let [a, b] = shapes::ROOM.map(|side| side as f32 + 0.01);
+            let [a, b] = arrange::ROOM.map(|side| side as f32 + 0.01);
             assert!(scene.positions.iter().all(|p| p[0].abs() < a && p[2].abs() < b));
         }
     }

@@ -1,14 +1,10 @@
-//! Solids with area-preserving parametrisations of their surfaces, and how they stand on the ground.
-use crate::view::vector::{cross, dot, unit};
-use rand::{Rng, RngExt};
+//! Solids with area-preserving parametrisations of their surfaces.
+use crate::view::vector::{dot, unit};
 use std::f64::consts::{PI, TAU};
-
-/// Radius of the ground.
-const GROUND: f64 = 1.4;
 
 /// A shape around the origin, before it is turned and moved; lengths in world units, axis along y.
 #[derive(Clone, Copy)]
-enum Shape {
+pub(super) enum Shape {
     /// Level disc; its underside is the same Gaussians.
     Ground {
         radius: f64,
@@ -16,6 +12,11 @@ enum Shape {
     /// A rectangle, seen from above: half its sides.
     Sheet {
         half: [f64; 2],
+    },
+    /// Low hills on a square, half its side; nearly area-preserving, as they are not steep.
+    Hills {
+        half: f64,
+        phase: [f64; 2],
     },
     Sphere {
         radius: f64,
@@ -42,10 +43,10 @@ enum Shape {
 
 /// A shape in its place.
 pub(super) struct Solid {
-    shape: Shape,
+    pub shape: Shape,
     /// Own axes in the world.
-    axes: [[f32; 3]; 3],
-    centre: [f32; 3],
+    pub axes: [[f32; 3]; 3],
+    pub centre: [f32; 3],
 }
 
 impl Solid {
@@ -54,6 +55,7 @@ impl Solid {
         match self.shape {
             Shape::Ground { radius } => PI * radius * radius,
             Shape::Sheet { half: [a, b] } => 4.0 * a * b,
+            Shape::Hills { half, .. } => 4.0 * half * half,
             Shape::Sphere { radius } => 4.0 * PI * radius * radius,
             Shape::Torus { ring, tube } => TAU * ring * TAU * tube,
             Shape::Block { half: [a, b, c] } => 8.0 * (a * b + b * c + c * a),
@@ -64,7 +66,10 @@ impl Solid {
 
     /// Whether this is the ground.
     pub fn is_ground(&self) -> bool {
-        matches!(self.shape, Shape::Ground { .. } | Shape::Sheet { .. })
+        matches!(
+            self.shape,
+            Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. }
+        )
     }
 
     /// The point and outward unit normal for `u`, `v` in [0, 1): even in the square is even on the surface.
@@ -84,6 +89,23 @@ impl Solid {
     }
 }
 
+/// Height of the hills above their plane, and how it grows along x and z.
+pub(super) fn hills(phase: [f64; 2], x: f64, z: f64) -> (f64, [f64; 2]) {
+    let waves = [
+        (0.16, 1.1, 0.5, phase[0]),
+        (0.11, -0.7, 1.4, phase[1]),
+        (0.04, 2.3, 2.1, phase[0] + phase[1]),
+    ];
+    let (mut height, mut slope) = (0.0, [0.0; 2]);
+    for (high, a, b, phase) in waves {
+        let (sine, cosine) = (a * x + b * z + phase).sin_cos();
+        height += high * sine;
+        slope[0] += high * a * cosine;
+        slope[1] += high * b * cosine;
+    }
+    (height, slope)
+}
+
 fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     let (sine, cosine) = (TAU * v).sin_cos();
     // A disc of area-preserving radius at height y.
@@ -91,6 +113,12 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     match shape {
         Shape::Ground { radius } => (disc(radius, u, 0.0), [0.0, -1.0, 0.0]),
         Shape::Sheet { half: [a, b] } => ([a * (2.0 * u - 1.0), 0.0, b * (2.0 * v - 1.0)], [0.0, -1.0, 0.0]),
+        Shape::Hills { half, phase } => {
+            let [x, z] = [u, v].map(|t| half * (2.0 * t - 1.0));
+            let (height, [along_x, along_z]) = hills(phase, x, z);
+            let length = (1.0 + along_x * along_x + along_z * along_z).sqrt();
+            ([x, -height, z], [-along_x, -1.0, -along_z].map(|n| n / length))
+        }
         Shape::Sphere { radius } => {
             let y = 1.0 - 2.0 * u;
             let level = (1.0 - y * y).max(0.0).sqrt();
@@ -158,115 +186,10 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     }
 }
 
-/// The ground, a solid in its middle and four around, each of another shape; y points down.
-pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
-    let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut solids = vec![Solid {
-        shape: Shape::Ground { radius: GROUND },
-        axes: upright,
-        centre: [0.0; 3],
-    }];
-    solids.extend(things(random, [0.0, 0.9 * GROUND - 0.42]));
-    solids
-}
-
-/// Half the sides of a room, and how high it is.
-pub(super) const ROOM: [f64; 2] = [2.0, 1.6];
-pub(super) const CEILING: f64 = 1.7;
-
-/// A room: floor, ceiling, four walls, and a thing near each wall, each of another shape; y points down.
-pub(super) fn furnish(random: &mut impl Rng) -> Vec<Solid> {
-    let [a, b] = ROOM;
-    let high = 0.5 * CEILING;
-    // A sheet's normal is its own -y, which is turned to point inwards.
-    let sheet = |half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]| {
-        let down = inwards.map(|x| -x);
-        let along = if inwards[1] == 0.0 {
-            [0.0, 1.0, 0.0]
-        } else {
-            [1.0, 0.0, 0.0]
-        };
-        Solid {
-            shape: Shape::Sheet { half },
-            axes: [along, down, cross(along, down)],
-            centre: centre.map(|x| x as f32),
-        }
-    };
-    let mut solids = vec![
-        sheet([a, b], [0.0, -1.0, 0.0], [0.0; 3]),
-        sheet([a, b], [0.0, 1.0, 0.0], [0.0, -CEILING, 0.0]),
-        sheet([high, b], [-1.0, 0.0, 0.0], [a, -high, 0.0]),
-        sheet([high, b], [1.0, 0.0, 0.0], [-a, -high, 0.0]),
-        sheet([high, a], [0.0, 0.0, -1.0], [0.0, -high, b]),
-        sheet([high, a], [0.0, 0.0, 1.0], [0.0, -high, -b]),
-    ];
-    let far = b - 0.45;
-    solids.extend(things(random, [far, far]));
-    solids
-}
-
-/// A solid of each shape around the middle, the first and the others so far away.
-fn things(random: &mut impl Rng, reaches: [f64; 2]) -> Vec<Solid> {
-    let size: [f64; 5] = std::array::from_fn(|_| random.random_range(0.85..1.15));
-    let mut shapes = [
-        Shape::Sphere { radius: 0.34 * size[0] },
-        Shape::Torus {
-            ring: 0.28 * size[1],
-            tube: 0.12 * size[1],
-        },
-        Shape::Block {
-            half: [0.24 * size[2], 0.3 * size[2], 0.2],
-        },
-        Shape::Cylinder {
-            radius: 0.19,
-            half: 0.42 * size[3],
-        },
-        Shape::Cone {
-            radius: 0.3,
-            half: 0.36 * size[4],
-        },
-    ];
-    // Fisher-Yates; the first then stands in the middle.
-    for i in (1..shapes.len()).rev() {
-        shapes.swap(i, random.random_range(0..=i));
-    }
-    let start = random.random_range(0.0..TAU);
-    let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let turn_of_each = if reaches[0] == 0.0 { 0.25 * TAU } else { 0.2 * TAU };
-    let mut solids = Vec::new();
-    for (i, shape) in shapes.into_iter().enumerate() {
-        let angle = start + turn_of_each * i as f64 + random.random_range(-0.15..0.15);
-        let reach = reaches[usize::from(i > 0)];
-        let turn = random.random_range(0.0..TAU);
-        let (axes, height) = match shape {
-            Shape::Ground { .. } | Shape::Sheet { .. } => (upright, 0.0),
-            Shape::Sphere { radius } => (turned(turn), radius),
-            // The ring stands on its rim, so that one sees through it.
-            Shape::Torus { ring, tube } => (on_edge(turn), ring + tube),
-            Shape::Block { half } => (turned(turn), half[1]),
-            Shape::Cylinder { half, .. } | Shape::Cone { half, .. } => (turned(turn), half),
-        };
-        let centre = [reach * angle.cos(), -height, reach * angle.sin()].map(|x| x as f32);
-        solids.push(Solid { shape, axes, centre });
-    }
-    solids
-}
-
-/// Axes turned about the vertical.
-fn turned(angle: f64) -> [[f32; 3]; 3] {
-    let (s, c) = (angle.sin() as f32, angle.cos() as f32);
-    [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
-}
-
-/// Axes with the y axis level.
-fn on_edge(angle: f64) -> [[f32; 3]; 3] {
-    let [level, down, _] = turned(angle);
-    [down, level, cross(down, level)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample::arrange::arrange;
     use rand::SeedableRng;
 
     #[test]
@@ -302,22 +225,6 @@ mod tests {
                     let along: f64 = (0..3).map(|k| c[k] * normal[k]).sum();
                     assert!((along.abs() / stretch - 1.0).abs() < 1e-3);
                 }
-            }
-        }
-    }
-
-    #[test]
-    fn everything_stands_on_the_ground() {
-        for seed in 0..20 {
-            for solid in arrange(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed)) {
-                let mut lowest = f32::NEG_INFINITY;
-                for i in 0..2000 {
-                    let (p, normal) = solid.point(f64::from(i) / 2000.0, f64::from(i) * 0.618 % 1.0);
-                    lowest = lowest.max(p[1]);
-                    assert!(p[0].hypot(p[2]) < GROUND as f32 + 0.01);
-                    assert!((dot(normal, normal) - 1.0).abs() < 1e-4);
-                }
-                assert!(lowest.abs() < 0.01, "{lowest}");
             }
         }
     }

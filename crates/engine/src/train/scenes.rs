@@ -63,7 +63,7 @@ impl ViewedScene {
                     .for_each(|v| *v += grain * rng.random_range(-1.0..1.0_f32));
             }
         }
-        let sampler = ViewSampler::new(&gaussians, seed)?;
+        let sampler = ViewSampler::around(&gaussians, seed)?;
         let views = (0..views as u64)
             .into_par_iter()
             .map(|view| {

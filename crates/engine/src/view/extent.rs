@@ -86,7 +86,7 @@ fn longest(log_scales: &[f32; 3]) -> f64 {
 }
 
 /// What each Gaussian shows: opacity times capped area; never all zero.
-fn weights(gaussians: &Gaussians) -> Vec<f64> {
+pub(super) fn weights(gaussians: &Gaussians) -> Vec<f64> {
     let areas: Vec<f64> = gaussians
         .log_scales
         .iter()
@@ -110,7 +110,11 @@ fn weights(gaussians: &Gaussians) -> Vec<f64> {
 }
 
 /// Weighted quantiles: the smallest values below which lie at least those shares of the weight.
-fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, weights: &[f64], shares: [f64; N]) -> [f64; N] {
+pub(super) fn quantiles<const N: usize>(
+    values: impl Iterator<Item = f64>,
+    weights: &[f64],
+    shares: [f64; N],
+) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.zip(weights.iter().copied()).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let total: f64 = sorted.iter().map(|(_, w)| w).sum();
@@ -169,9 +173,18 @@ fn normal(gaussians: &Gaussians, row: usize) -> [f32; 3] {
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| scales[*a].total_cmp(&scales[*b]));
     let flat = scales[order[0]] < scales[order[1]] - 0.5;
-    if !flat {
-        return [0.0; 3];
-    }
+    if flat { axes(gaussians, row)[order[0]] } else { [0.0; 3] }
+}
+
+/// The axes of a Gaussian in the world, and which of them is the shortest.
+pub(super) fn shortest_axis(gaussians: &Gaussians, row: usize) -> ([[f32; 3]; 3], usize) {
+    let scales = gaussians.log_scales[row];
+    let shortest = (0..3).fold(0, |best: usize, k| if scales[k] < scales[best] { k } else { best });
+    (axes(gaussians, row), shortest)
+}
+
+/// The axes of a Gaussian in the world: the columns of its rotation's matrix.
+fn axes(gaussians: &Gaussians, row: usize) -> [[f32; 3]; 3] {
     // What has no direction is not turned, as in the renderer; whole files of zeros exist.
     let q = gaussians.rotations[row].map(f64::from);
     let length = q.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -180,24 +193,23 @@ fn normal(gaussians: &Gaussians, row: usize) -> [f32; 3] {
     } else {
         [1.0, 0.0, 0.0, 0.0]
     };
-    // A column of the rotation matrix of a unit quaternion.
-    match order[0] {
-        0 => [
+    [
+        [
             1.0 - 2.0 * (y * y + z * z),
             2.0 * (x * y + w * z),
             2.0 * (x * z - w * y),
         ],
-        1 => [
+        [
             2.0 * (x * y - w * z),
             1.0 - 2.0 * (x * x + z * z),
             2.0 * (y * z + w * x),
         ],
-        _ => [
+        [
             2.0 * (x * z + w * y),
             2.0 * (y * z - w * x),
             1.0 - 2.0 * (x * x + y * y),
         ],
-    }
+    ]
 }
 
 #[cfg(test)]

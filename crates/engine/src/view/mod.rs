@@ -1,15 +1,25 @@
 //! Views: cameras from the scene itself or from a file.
 mod camera;
 mod colmap;
+mod directions;
 mod extent;
 mod files;
 mod given;
+mod inside;
 mod json;
+mod kind;
+#[cfg(test)]
+mod kinds_tests;
+mod openness;
 mod sampler;
+mod solid;
 pub(crate) mod vector;
 
 pub use camera::Camera;
 pub use extent::Extent;
 pub use files::{parse_cameras, read_cameras, write_cameras};
 pub use given::GivenViews;
-pub use sampler::{Split, ViewSampler};
+pub use inside::InsideViews;
+pub use kind::SceneKind;
+pub use openness::Openness;
+pub use sampler::{Split, ViewSampler, Viewpoints};

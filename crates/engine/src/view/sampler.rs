@@ -1,31 +1,40 @@
-//! An endless seeded stream of cameras around a scene, in two splits whose directions never meet.
+//! An endless seeded stream of cameras of one scene, in two splits that never meet.
 //!
-//! Directions are those from which the scene is seen: the whole sphere, or what is above the ground where the scene
-//! lies on a sheet of it ([`Extent::on_ground`]).
+//! Where cameras stand follows from the [kind](super::SceneKind) of the scene, which is found from its geometry unless it is given:
 //!
-//! **Split.** 64 points of a Fibonacci lattice, fixed in world axes and the same for every seed, are the places of
-//! the held-out views: those lie within 2.5 degrees of one, training views at least 5 degrees from all of them. So
-//! views held out under one seed are at least 2.5 degrees from the training views of every seed.
+//! * object: around it, from all [directions](super::directions) or from those above the ground where it lies on a sheet of
+//!   ground ([`Extent::on_ground`]). Each camera fills its picture with the scene;
+//! * terrain: above and obliquely, over the whole or a part of it;
+//! * forward: near the side from which it was captured, as around an object;
+//! * room: at free places [inside](super::inside), looking about.
 //!
-//! **Spread.** Training directions follow Roberts' R2 sequence, shifted by the seed: any run of consecutive indices
-//! is spread evenly. Held-out places are visited in order of largest distance to those before, so that even the
-//! first five look from all around. Distance, aim and the place within a held-out cap are drawn from ChaCha8, one
-//! stream a view.
+//! **Split.** Held-out directions lie in caps around fixed places, training directions outside of larger ones. So views held
+//! out under one seed are apart from the training views of every seed. For objects that is 2.5 degrees.
+//!
+//! **Spread.** Any run of consecutive training indices is spread evenly over all directions, and the first five held-out ones
+//! look from all around. Distance, aim and the place within a held-out cap are drawn from ChaCha8, one stream a view.
 //!
 //! **Ring.** Training views can be put on a circle instead, at one elevation and one distance and aimed at the centre, as
 //! published code has them ([`ViewSampler::train_on_ring`]); held-out views stay where they are.
 //!
-//! **Given cameras.** Views of both splits can be taken where cameras are ([`ViewSampler::among`]).
-use super::camera::Camera;
-use super::extent::Extent;
-use super::given::GivenViews;
-use super::vector::{along, dot, frame, unit};
-use crate::error::Result;
-use crate::scene::Gaussians;
+//! **Given cameras.** Views of both splits can be taken where cameras are ([`ViewSampler::seen_from`]).
+use std::f32::consts::PI;
+use std::sync::Arc;
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f32::consts::{PI, TAU};
-use std::sync::Arc;
+
+use super::camera::Camera;
+use super::directions::Directions;
+use super::extent::{Extent, weights};
+use super::given::GivenViews;
+use super::inside::InsideViews;
+use super::kind::SceneKind;
+use super::openness::Openness;
+use super::solid::SolidGrid;
+use super::vector::{along, frame};
+use crate::error::{Error, Result};
+use crate::scene::Gaussians;
 
 /// Vertical field of view, radians, of views that need not keep away from a tiny scene: 45 degrees.
 const FIELD_OF_VIEW: f32 = 0.25 * PI;
@@ -34,14 +43,14 @@ const NEAR: f32 = 0.2;
 /// Distances of cameras, times that at which the scene just fills the picture; and that of all cameras on a ring.
 const FILL: std::ops::Range<f32> = 0.95..1.2;
 const MEAN_FILL: f32 = 0.5 * (FILL.start + FILL.end);
-/// Lowest sine of elevation over ground: 6 degrees.
-const LOWEST: f32 = 0.1;
-/// Places of held-out views.
-const HELD_OUT_PLACES: usize = 64;
-/// Held-out views stay within this angle of their place, radians.
-const HELD_OUT_CAP: f32 = 2.5 * PI / 180.0;
-/// Training views stay out of this angle around held-out places, radians.
-const TRAINING_GAP: f32 = 5.0 * PI / 180.0;
+/// The same before a forward-facing capture, which is not as deep as wide and may go on beyond the picture.
+const FILL_FORWARD: std::ops::Range<f32> = 0.7..1.0;
+/// The same over terrain.
+const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
+/// How far from the centre views aim, in radii.
+const AIM: f32 = 0.04;
+/// The same over terrain, along the ground, times what the picture does not show.
+const AIM_TERRAIN: f32 = 0.7;
 
 /// Which of the two disjoint sets of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,61 +61,129 @@ pub enum Split {
     HeldOut,
 }
 
-/// Cameras around one scene; see the module's text.
+/// Where views are taken from, if neither the kind that is found nor the scene's own extent is to decide.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Viewpoints<'a> {
+    /// The kind of the scene; found from its geometry where none is given.
+    pub kind: Option<SceneKind>,
+    /// Cameras that views are at, around and between; then the kind says nothing.
+    pub cameras: &'a [Camera],
+}
+
+/// Cameras of one scene; see the module's text.
 #[derive(Clone, Debug)]
 pub struct ViewSampler {
     extent: Extent,
     seed: u64,
-    shift: [f64; 2],
-    places: Vec<[f32; 3]>,
+    kind: SceneKind,
+    directions: Directions,
     /// Elevation of all training views, radians.
     ring: Option<f32>,
-    /// Where views are, if not around the scene.
+    /// Where views stand inside a room.
+    inside: Option<Arc<InsideViews>>,
+    /// Where views are, if not where the scene says.
     given: Option<Arc<GivenViews>>,
 }
 
 impl ViewSampler {
-    /// Measures the scene and prepares the stream of `seed`.
+    /// Finds the kind of the scene and prepares the stream of `seed`.
     ///
     /// # Errors
     /// Those of [`Extent::of`]: an empty scene, or one too large for single precision.
     pub fn new(gaussians: &Gaussians, seed: u64) -> Result<ViewSampler> {
+        Self::seen_from(gaussians, seed, Viewpoints::default())
+    }
+
+    /// The stream of `seed` around a scene that is an object, whatever it looks like.
+    ///
+    /// # Errors
+    /// Those of [`Extent::of`].
+    pub fn around(gaussians: &Gaussians, seed: u64) -> Result<ViewSampler> {
+        let kind = Some(SceneKind::Object);
+        Self::seen_from(gaussians, seed, Viewpoints { kind, cameras: &[] })
+    }
+
+    /// The stream of `seed`, from where `viewpoints` say.
+    ///
+    /// # Errors
+    /// Those of [`Extent::of`] and [`GivenViews::new`], and [`Error::BadOption`] for a room without a free place inside.
+    pub fn seen_from(gaussians: &Gaussians, seed: u64, viewpoints: Viewpoints<'_>) -> Result<ViewSampler> {
         let extent = Extent::of(gaussians)?;
+        let given = match viewpoints.cameras {
+            [] => None,
+            cameras => Some(Arc::new(GivenViews::new(gaussians, cameras)?)),
+        };
+        // Given cameras decide by themselves.
+        let known = viewpoints.kind.or(given.is_some().then_some(SceneKind::Object));
+        let grid = || SolidGrid::of(gaussians, &weights(gaussians));
+        let openness = |grid: &SolidGrid| Openness::of(gaussians, &extent, grid);
         let mut random = stream(seed, u64::MAX);
-        let shift = [random.random(), random.random()];
-        let seen: Vec<[f32; 3]> = lattice(HELD_OUT_PLACES).filter(|d| seen(&extent, *d)).collect();
-        let first = random.random_range(0..seen.len().max(1));
-        let places = farthest_first(seen, first);
+        let mut inside = None;
+        let (kind, front, grid) = match known {
+            Some(kind @ (SceneKind::Object | SceneKind::Terrain)) => (kind, extent.up, None),
+            Some(kind @ SceneKind::Room) => (kind, extent.up, Some(grid())),
+            Some(SceneKind::Forward) | None => {
+                let grid = grid();
+                let openness = openness(&grid);
+                (known.unwrap_or(SceneKind::by(&openness)), openness.front, Some(grid))
+            }
+        };
+        let directions = match kind {
+            SceneKind::Object => Directions::around(&extent, &mut random),
+            SceneKind::Terrain => Directions::above(extent.up, &mut random),
+            SceneKind::Forward => Directions::facing(front, &mut random),
+            SceneKind::Room => Directions::level(extent.up, &mut random),
+        };
+        if let (SceneKind::Room, Some(grid)) = (kind, grid) {
+            inside = Some(Arc::new(InsideViews::new(grid, &extent)?));
+        }
         Ok(ViewSampler {
             extent,
             seed,
-            shift,
-            places,
+            kind,
+            directions,
             ring: None,
-            given: None,
+            inside,
+            given,
         })
     }
 
-    /// The same, with views around and between `cameras`; around the scene where there are none.
+    /// Puts the training views on a circle at this elevation above the scene's horizon, radians.
     ///
     /// # Errors
-    /// Those of [`ViewSampler::new`] and [`GivenViews::new`].
-    pub fn among(gaussians: &Gaussians, seed: u64, cameras: &[Camera]) -> Result<ViewSampler> {
-        let mut sampler = Self::new(gaussians, seed)?;
-        if !cameras.is_empty() {
-            sampler.given = Some(Arc::new(GivenViews::new(gaussians, cameras)?));
+    /// [`Error::BadOption`] for a scene that is no object.
+    pub fn train_on_ring(&mut self, elevation: f32) -> Result<()> {
+        if self.kind != SceneKind::Object {
+            return Err(Error::BadOption {
+                field: "ring",
+                reason: format!(
+                    "a circle is around an object, and this scene is taken for {}",
+                    self.kind
+                ),
+            });
         }
-        Ok(sampler)
+        self.ring = Some(elevation);
+        Ok(())
     }
 
-    /// Puts the training views on a circle at this elevation above the scene's horizon, radians.
-    pub fn train_on_ring(&mut self, elevation: f32) {
-        self.ring = Some(elevation);
+    /// The kind of scene that views are made for; without a meaning among given cameras.
+    pub fn kind(&self) -> SceneKind {
+        self.kind
     }
 
     /// The cameras that views are around, where such were given.
     pub fn given(&self) -> Option<&GivenViews> {
         self.given.as_deref()
+    }
+
+    /// The places where views stand in a room.
+    pub fn inside(&self) -> Option<&InsideViews> {
+        self.inside.as_deref()
+    }
+
+    /// Whether every view shows another part of the scene, and none the whole.
+    pub fn shows_parts(&self) -> bool {
+        self.given.is_some() || self.inside.is_some()
     }
 
     /// Where and how large the scene is.
@@ -126,75 +203,43 @@ impl ViewSampler {
             };
         }
         let direction = match split {
-            Split::Training => self.training_direction(index, &mut random),
-            Split::HeldOut => self.held_out_direction(index, &mut random),
+            Split::Training => self.directions.training(index, self.ring, &mut random),
+            Split::HeldOut => self.directions.held_out(index, &mut random),
         };
+        if let Some(inside) = &self.inside {
+            return inside.look(direction, self.extent.up, size, &mut random);
+        }
         let still = split == Split::Training && self.ring.is_some();
         self.place(direction, size, still, &mut random)
-    }
-
-    fn training_direction(&self, index: u64, random: &mut ChaCha8Rng) -> [f32; 3] {
-        // Roberts' R2 sequence: inverse powers of the plastic number. Whole turns are taken out in integers, so that
-        // the stream does not coarsen at huge indices.
-        let turn = |alpha: u64, shift: f64| (alpha.wrapping_mul(index) as f64 / 2f64.powi(64) + shift).fract() as f32;
-        let mut u = turn(0xC13F_A9A9_02A6_328F, self.shift[0]);
-        let mut v = turn(0x91E1_0DA5_C79E_7B1D, self.shift[1]);
-        // Refusals are few (12 % of the sphere, half of it over ground); the bound only keeps this a plain loop.
-        for _ in 0..1000 {
-            let direction = self.direction_at(u, v);
-            if self.training_allows(direction) {
-                return direction;
-            }
-            (u, v) = (random.random(), random.random());
-        }
-        self.direction_at(u, v)
-    }
-
-    /// Area-preserving map of the unit square to the directions from which the scene is seen; or of `v` to the ring.
-    fn direction_at(&self, u: f32, v: f32) -> [f32; 3] {
-        let lowest = if self.extent.on_ground { LOWEST } else { -1.0 };
-        let height = match self.ring {
-            Some(elevation) => elevation.sin(),
-            None => 1.0 - u * (1.0 - lowest),
-        };
-        let [east, north, up] = frame(self.extent.up);
-        let (sine, cosine) = (TAU * v).sin_cos();
-        let level = (1.0 - height * height).max(0.0).sqrt();
-        let flat = along(east.map(|e| e * cosine), sine, north);
-        along(up.map(|e| e * height), level, flat)
-    }
-
-    fn training_allows(&self, direction: [f32; 3]) -> bool {
-        lattice(HELD_OUT_PLACES).all(|place| dot(place, direction) < TRAINING_GAP.cos())
-    }
-
-    fn held_out_direction(&self, index: u64, random: &mut ChaCha8Rng) -> [f32; 3] {
-        // `lattice` always has points above any ground; the pole stands in so that nothing can fail here.
-        let place = match self.places.len() as u64 {
-            0 => self.extent.up,
-            n => self.places[(index % n) as usize],
-        };
-        let [east, north, _] = frame(place);
-        let tilt = HELD_OUT_CAP * random.random::<f32>().sqrt();
-        let (sine, cosine) = (TAU * random.random::<f32>()).sin_cos();
-        let flat = along(east.map(|e| e * cosine), sine, north);
-        along(place.map(|e| e * tilt.cos()), tilt.sin(), flat)
     }
 
     /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane. `still` ones are
     /// all at the mean distance and look at the centre.
     fn place(&self, direction: [f32; 3], size: u32, still: bool, random: &mut impl Rng) -> Camera {
         let Extent { centre, radius, up, .. } = self.extent;
-        let fill = if still { MEAN_FILL } else { random.random_range(FILL) };
+        let terrain = self.kind == SceneKind::Terrain;
+        let fill = match (still, self.kind) {
+            (true, _) => MEAN_FILL,
+            (false, SceneKind::Object | SceneKind::Room) => random.random_range(FILL),
+            (false, SceneKind::Forward) => random.random_range(FILL_FORWARD),
+            (false, SceneKind::Terrain) => random.random_range(FILL_TERRAIN),
+        };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
         let distance = wanted.max(radius + 1.1 * NEAR);
         let field_of_view = 2.0 * (radius * fill / distance).min(0.99).asin();
         let aim: [f32; 3] = match still {
             true => [0.0; 3],
-            false => std::array::from_fn(|_| random.random_range(-0.04..0.04)),
+            false => std::array::from_fn(|_| random.random_range(-AIM..AIM)),
         };
-        let target = along(centre, radius, aim);
+        let mut target = along(centre, radius, aim);
+        if terrain {
+            let [east, north, _] = frame(up);
+            for axis in [east, north] {
+                let beside = AIM_TERRAIN * (FILL_TERRAIN.end - fill) * random.random_range(-1.0..1.0);
+                target = along(target, radius * beside, axis);
+            }
+        }
         let eye = along(target, distance, direction);
         Camera::look_at(eye, target, up, field_of_view, size, size)
     }
@@ -206,40 +251,13 @@ fn stream(seed: u64, number: u64) -> ChaCha8Rng {
     random
 }
 
-fn seen(extent: &Extent, direction: [f32; 3]) -> bool {
-    // A held-out cap must lie above the lowest elevation as a whole.
-    !extent.on_ground || dot(extent.up, direction) > LOWEST + HELD_OUT_CAP
-}
-
-/// `n` evenly spread directions: a Fibonacci lattice in world axes.
-fn lattice(n: usize) -> impl Iterator<Item = [f32; 3]> {
-    (0..n).map(move |i| {
-        let z = 1.0 - (2.0 * i as f32 + 1.0) / n as f32;
-        let level = (1.0 - z * z).max(0.0).sqrt();
-        // The golden angle.
-        let (sine, cosine) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();
-        unit([level * cosine, level * sine, z]).unwrap_or([0.0, 0.0, 1.0])
-    })
-}
-
-/// Reorders points so that each is the farthest from all before it; ties go to the earlier one.
-fn farthest_first(mut points: Vec<[f32; 3]>, first: usize) -> Vec<[f32; 3]> {
-    if !points.is_empty() {
-        points.swap(0, first);
-    }
-    for done in 1..points.len() {
-        let nearest = |p: [f32; 3]| points[..done].iter().map(|q| dot(p, *q)).fold(-1.0, f32::max);
-        let closeness: Vec<f32> = points[done..].iter().map(|p| nearest(*p)).collect();
-        let best = (0..closeness.len()).min_by(|a, b| closeness[*a].total_cmp(&closeness[*b]));
-        points.swap(done, done + best.unwrap_or(0));
-    }
-    points
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::TAU;
+
+    use super::super::directions::lattice;
     use super::*;
-    use crate::view::vector::sub;
+    use crate::view::vector::{dot, frame, sub};
 
     fn ball(scale: f32) -> Gaussians {
         let positions: Vec<[f32; 3]> = lattice(500).map(|p| p.map(|x| x * scale)).collect();
@@ -261,8 +279,8 @@ mod tests {
     fn splits_never_meet_whatever_the_seeds() {
         let scene = ball(1.0);
         let (a, b) = (
-            ViewSampler::new(&scene, 1).unwrap(),
-            ViewSampler::new(&scene, 99).unwrap(),
+            ViewSampler::around(&scene, 1).unwrap(),
+            ViewSampler::around(&scene, 99).unwrap(),
         );
         let training: Vec<_> = (0..2000)
             .map(|i| direction(&a.camera(Split::Training, i, 32)))
@@ -286,9 +304,9 @@ mod tests {
     #[test]
     fn a_ring_is_a_circle_that_keeps_away_from_held_out_views() {
         let scene = ball(1.0);
-        let sphere = ViewSampler::new(&scene, 4).unwrap();
+        let sphere = ViewSampler::around(&scene, 4).unwrap();
         let mut ring = sphere.clone();
-        ring.train_on_ring(30f32.to_radians());
+        ring.train_on_ring(30f32.to_radians()).unwrap();
         let Extent { centre, up, .. } = *ring.extent();
         let cameras: Vec<Camera> = (0..400).map(|i| ring.camera(Split::Training, i, 32)).collect();
         let held_out: Vec<Camera> = (0..200).map(|i| ring.camera(Split::HeldOut, i, 32)).collect();
@@ -318,7 +336,7 @@ mod tests {
 
     #[test]
     fn both_splits_look_from_all_around() {
-        let sampler = ViewSampler::new(&ball(1.0), 3).unwrap();
+        let sampler = ViewSampler::around(&ball(1.0), 3).unwrap();
         for (split, count) in [(Split::Training, 64), (Split::HeldOut, 24)] {
             for start in [0, 1 << 40] {
                 let views: Vec<_> = (start..start + count)
@@ -335,9 +353,9 @@ mod tests {
     #[test]
     fn the_same_arguments_give_the_same_camera_and_others_another() {
         let scene = ball(1.0);
-        let sampler = ViewSampler::new(&scene, 5).unwrap();
-        let again = ViewSampler::new(&scene, 5).unwrap();
-        let other = ViewSampler::new(&scene, 6).unwrap();
+        let sampler = ViewSampler::around(&scene, 5).unwrap();
+        let again = ViewSampler::around(&scene, 5).unwrap();
+        let other = ViewSampler::around(&scene, 6).unwrap();
         for split in [Split::Training, Split::HeldOut] {
             for index in [0, 7, u64::MAX] {
                 let camera = sampler.camera(split, index, 64);
@@ -352,7 +370,7 @@ mod tests {
     fn the_scene_fills_the_picture_beyond_the_near_plane() {
         for scale in [1e-4, 0.1, 1.0, 1e6] {
             let scene = ball(scale);
-            let sampler = ViewSampler::new(&scene, 5).unwrap();
+            let sampler = ViewSampler::around(&scene, 5).unwrap();
             for index in 0..50 {
                 let camera = sampler.camera(Split::Training, index, 100);
                 let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -379,15 +397,15 @@ mod tests {
         };
         for log_scale in [f32::NEG_INFINITY, -30.0, 0.0, 20.0] {
             for position in [[0.0; 3], [1e6, -3.0, 2.0]] {
-                let sampler = ViewSampler::new(&one(log_scale, position), 1).unwrap();
+                let sampler = ViewSampler::around(&one(log_scale, position), 1).unwrap();
                 let camera = sampler.camera(Split::HeldOut, 0, 64);
                 let numbers = camera.rotation.into_iter().flatten().chain(camera.translation);
                 assert!(numbers.chain([camera.fx, camera.fy]).all(f32::is_finite), "{camera:?}");
                 assert!(dot(sub(camera.centre(), position), [1.0; 3]).is_finite());
             }
         }
-        assert!(ViewSampler::new(&Gaussians::default(), 1).is_err());
-        assert!(ViewSampler::new(&one(0.0, [1e30, 0.0, 0.0]), 1).is_err());
-        assert!(ViewSampler::new(&one(80.0, [0.0; 3]), 1).is_err());
+        assert!(ViewSampler::around(&Gaussians::default(), 1).is_err());
+        assert!(ViewSampler::around(&one(0.0, [1e30, 0.0, 0.0]), 1).is_err());
+        assert!(ViewSampler::around(&one(80.0, [0.0; 3]), 1).is_err());
     }
 }

@@ -169,6 +169,13 @@ async fn every_reading_of_a_file_is_paid_for() {
         let (result, history) = claimed_of(&bench, b"a scene", spec, read()).await;
         assert_eq!((paid(&result), history.readings_of_key), ((4, Some(12)), 5));
     }
+    // So it is where the scene is said to be of a kind, and is read from where viewers of such a scene are.
+    let spec = VerifySpec {
+        scene_kind: 2,
+        ..first()
+    };
+    let (result, _) = claimed_of(&bench, b"a scene", spec, read()).await;
+    assert_eq!(paid(&result), (5, Some(15)));
     // A reading of several files pays for those of each.
     let mut suspects = Vec::new();
     for bytes in [&b"a scene"[..], b"another"] {
@@ -176,7 +183,7 @@ async fn every_reading_of_a_file_is_paid_for() {
     }
     let spec = VerifySpec { suspects, ..first() };
     let (result, _) = bench.claimed(spec, vec![framed(0, read())]).await;
-    assert_eq!(paid(&result), (6, Some(18)));
+    assert_eq!(paid(&result), (7, Some(21)));
 }
 
 /// A claim pays for all assets of the key, so whoever marks is held to as much.

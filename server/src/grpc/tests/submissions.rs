@@ -57,6 +57,12 @@ async fn every_wrong_field_is_named() {
         (embed(|s| s.preset = 17), "job.embed.preset"),
         (embed(|s| s.cameras = "cameras.json".into()), "job.embed.cameras"),
         (verify(|s| s.cameras = s.key.clone()), "job.verify.cameras"),
+        (embed(|s| s.scene_kind = 9), "job.embed.scene_kind"),
+        (verify(|s| s.scene_kind = -1), "job.verify.scene_kind"),
+        (
+            verify(|s| (s.scene_kind, s.cameras) = (2, s.suspects[0].clone())),
+            "job.verify.scene_kind",
+        ),
         (embed(|s| s.robust_to = vec![6, 0]), "job.embed.robust_to[1]"),
         (embed(|s| s.robust_to = vec![6, 13, 6]), "job.embed.robust_to[2]"),
         (embed(|s| s.size = 15), "job.embed.size"),

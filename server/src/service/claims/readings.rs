@@ -39,6 +39,11 @@ impl Service {
             hash.update(b"cameras\0");
             hash.update(cameras.sha256.as_bytes());
         }
+        // Left out where there is none, so that readings from before kinds were there stay the same.
+        if spec.scene_kind != 0 {
+            hash.update(b"kind\0");
+            hash.update(spec.scene_kind.to_be_bytes());
+        }
         let id = hash.finalize().into();
         let new = NewReading {
             id,

@@ -49,6 +49,18 @@ fn presets_seeds_and_sizes_reach_the_settings() {
         standing(vec![0]).err().unwrap().to_string(),
         "robust_to: 0 is no distortion"
     );
+    let kind = |scene_kind: i32| {
+        settings(&api::EmbedSpec {
+            scene_kind,
+            ..api::EmbedSpec::default()
+        })
+    };
+    assert_eq!(kind(0).unwrap().kind, None);
+    let named: Vec<_> = (1..=4)
+        .map(|number| kind(number).unwrap().kind.unwrap().name())
+        .collect();
+    assert_eq!(named, ["object", "room", "terrain", "forward"]);
+    assert_eq!(kind(5).err().unwrap().to_string(), "scene_kind: 5 is none");
     let none = settings(&api::EmbedSpec {
         preset: 9,
         ..api::EmbedSpec::default()

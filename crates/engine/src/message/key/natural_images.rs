@@ -34,7 +34,7 @@ pub fn pictures(rasterizer: Box<dyn Rasterizer>, size: u32) -> Result<impl Itera
     let scenes = (0..SCENES)
         .map(|index| {
             let scene = sample(GAUSSIANS, 3, FIRST_SEED + index)?.gaussians;
-            let sampler = ViewSampler::new(&scene, index)?;
+            let sampler = ViewSampler::around(&scene, index)?;
             Ok((scene, sampler))
         })
         .collect::<Result<Vec<_>>>()?;

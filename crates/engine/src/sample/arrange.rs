@@ -1,0 +1,211 @@
+//! What stands where in each kind of sample: solids on a disc, in a room, on hills, on a stage.
+use std::f64::consts::TAU;
+
+use rand::{Rng, RngExt};
+
+use super::shapes::{Shape, Solid, hills};
+use crate::view::vector::cross;
+
+/// Radius of the ground.
+const GROUND: f64 = 1.4;
+/// Axes of what is not turned.
+const UPRIGHT: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The ground, a solid in its middle and four around, each of another shape; y points down.
+pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
+    let mut solids = vec![Solid {
+        shape: Shape::Ground { radius: GROUND },
+        axes: UPRIGHT,
+        centre: [0.0; 3],
+    }];
+    solids.extend(things(random, [0.0, 0.9 * GROUND - 0.42]));
+    solids
+}
+
+/// Half the sides of a room, and how high it is.
+pub(super) const ROOM: [f64; 2] = [2.0, 1.6];
+pub(super) const CEILING: f64 = 1.7;
+
+/// A room: floor, ceiling, four walls, and a thing near each wall, each of another shape; y points down.
+pub(super) fn furnish(random: &mut impl Rng) -> Vec<Solid> {
+    let [a, b] = ROOM;
+    let high = 0.5 * CEILING;
+    // A sheet's normal is its own -y, which is turned to point inwards.
+    let sheet = |half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]| {
+        let down = inwards.map(|x| -x);
+        let along = if inwards[1] == 0.0 {
+            [0.0, 1.0, 0.0]
+        } else {
+            [1.0, 0.0, 0.0]
+        };
+        Solid {
+            shape: Shape::Sheet { half },
+            axes: [along, down, cross(along, down)],
+            centre: centre.map(|x| x as f32),
+        }
+    };
+    let mut solids = vec![
+        sheet([a, b], [0.0, -1.0, 0.0], [0.0; 3]),
+        sheet([a, b], [0.0, 1.0, 0.0], [0.0, -CEILING, 0.0]),
+        sheet([high, b], [-1.0, 0.0, 0.0], [a, -high, 0.0]),
+        sheet([high, b], [1.0, 0.0, 0.0], [-a, -high, 0.0]),
+        sheet([high, a], [0.0, 0.0, -1.0], [0.0, -high, b]),
+        sheet([high, a], [0.0, 0.0, 1.0], [0.0, -high, -b]),
+    ];
+    let far = b - 0.45;
+    solids.extend(things(random, [far, far]));
+    solids
+}
+
+/// Half the side of a landscape.
+pub(super) const LANDSCAPE: f64 = 2.5;
+/// Houses and trees on it.
+const HOUSES: usize = 9;
+const TREES: usize = 14;
+
+/// Hills with houses and trees on them; y points down.
+pub(super) fn landscape(random: &mut impl Rng) -> Vec<Solid> {
+    let phase: [f64; 2] = std::array::from_fn(|_| random.random_range(0.0..TAU));
+    let hilly = Shape::Hills { half: LANDSCAPE, phase };
+    let mut solids = vec![Solid {
+        shape: hilly,
+        axes: UPRIGHT,
+        centre: [0.0; 3],
+    }];
+    for i in 0..HOUSES + TREES {
+        let size = random.random_range(0.8..1.25);
+        let [x, z]: [f64; 2] = std::array::from_fn(|_| 0.9 * LANDSCAPE * random.random_range(-1.0..1.0));
+        let (shape, high) = if i < HOUSES {
+            let half = [0.2 * size, 0.1 * size, 0.13 * size];
+            (Shape::Block { half }, half[1])
+        } else {
+            let half = 0.13 * size;
+            (Shape::Cone { radius: 0.1, half }, half)
+        };
+        // A little in the ground, which is not level under it.
+        let (ground, _) = hills(phase, x, z);
+        solids.push(Solid {
+            shape,
+            axes: turned(random.random_range(0.0..TAU)),
+            centre: [x, -ground - 0.8 * high, z].map(|x| x as f32),
+        });
+    }
+    solids
+}
+
+/// Where the camera stood, in the mean, that captured a stage; it saw nothing that faces away.
+pub(super) const STAND: [f32; 3] = [0.0, -1.2, -4.2];
+/// Half the width of a stage, how high and how deep it is.
+pub(super) const STAGE: [f64; 3] = [1.9, 2.3, 1.8];
+
+/// A stage: a floor, a wall behind it, and things in between; y points down, and its front is at small z.
+pub(super) fn stage(random: &mut impl Rng) -> Vec<Solid> {
+    let [wide, high, deep] = STAGE;
+    let floor = Solid {
+        shape: Shape::Sheet {
+            half: [wide, 0.5 * deep],
+        },
+        axes: UPRIGHT,
+        centre: [0.0; 3],
+    };
+    // The wall's own -y looks to the front.
+    let wall = Solid {
+        shape: Shape::Sheet {
+            half: [wide, 0.5 * high],
+        },
+        axes: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+        centre: [0.0, -0.5 * high, 0.5 * deep].map(|x| x as f32),
+    };
+    let mut solids = vec![floor, wall];
+    let mut things = things(random, [0.0, 0.5]);
+    for (i, thing) in things.iter_mut().enumerate() {
+        // Side by side, every second one a little farther back.
+        let beside = (i as f64 - 2.0) * 0.36 * wide;
+        thing.centre[0] = beside as f32;
+        thing.centre[2] = if i % 2 == 0 { -0.25 } else { 0.3 } * deep as f32;
+    }
+    solids.extend(things);
+    solids
+}
+
+/// A solid of each shape around the middle, the first and the others so far away.
+fn things(random: &mut impl Rng, reaches: [f64; 2]) -> Vec<Solid> {
+    let size: [f64; 5] = std::array::from_fn(|_| random.random_range(0.85..1.15));
+    let mut shapes = [
+        Shape::Sphere { radius: 0.34 * size[0] },
+        Shape::Torus {
+            ring: 0.28 * size[1],
+            tube: 0.12 * size[1],
+        },
+        Shape::Block {
+            half: [0.24 * size[2], 0.3 * size[2], 0.2],
+        },
+        Shape::Cylinder {
+            radius: 0.19,
+            half: 0.42 * size[3],
+        },
+        Shape::Cone {
+            radius: 0.3,
+            half: 0.36 * size[4],
+        },
+    ];
+    // Fisher-Yates; the first then stands in the middle.
+    for i in (1..shapes.len()).rev() {
+        shapes.swap(i, random.random_range(0..=i));
+    }
+    let start = random.random_range(0.0..TAU);
+    let turn_of_each = if reaches[0] == 0.0 { 0.25 * TAU } else { 0.2 * TAU };
+    let mut solids = Vec::new();
+    for (i, shape) in shapes.into_iter().enumerate() {
+        let angle = start + turn_of_each * i as f64 + random.random_range(-0.15..0.15);
+        let reach = reaches[usize::from(i > 0)];
+        let turn = random.random_range(0.0..TAU);
+        let (axes, height) = match shape {
+            Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. } => (UPRIGHT, 0.0),
+            Shape::Sphere { radius } => (turned(turn), radius),
+            // The ring stands on its rim, so that one sees through it.
+            Shape::Torus { ring, tube } => (on_edge(turn), ring + tube),
+            Shape::Block { half } => (turned(turn), half[1]),
+            Shape::Cylinder { half, .. } | Shape::Cone { half, .. } => (turned(turn), half),
+        };
+        let centre = [reach * angle.cos(), -height, reach * angle.sin()].map(|x| x as f32);
+        solids.push(Solid { shape, axes, centre });
+    }
+    solids
+}
+
+/// Axes turned about the vertical.
+fn turned(angle: f64) -> [[f32; 3]; 3] {
+    let (s, c) = (angle.sin() as f32, angle.cos() as f32);
+    [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
+}
+
+/// Axes with the y axis level.
+fn on_edge(angle: f64) -> [[f32; 3]; 3] {
+    let [level, down, _] = turned(angle);
+    [down, level, cross(down, level)]
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::view::vector::dot;
+
+    #[test]
+    fn everything_stands_on_the_ground() {
+        for seed in 0..20 {
+            for solid in arrange(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed)) {
+                let mut lowest = f32::NEG_INFINITY;
+                for i in 0..2000 {
+                    let (p, normal) = solid.point(f64::from(i) / 2000.0, f64::from(i) * 0.618 % 1.0);
+                    lowest = lowest.max(p[1]);
+                    assert!(p[0].hypot(p[2]) < GROUND as f32 + 0.01);
+                    assert!((dot(normal, normal) - 1.0).abs() < 1e-4);
+                }
+                assert!(lowest.abs() < 0.01, "{lowest}");
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What kind of scene it is, by a rule on its geometry: how it was captured decides where its viewers stand.
+//!
+//! A scene of fewer than a hundred Gaussians is an object. Else the first of these that holds, on the figures of [`Openness`]:
+//!
+//! * *terrain*: flat and seen from above,
+//! * *room*: a good part of it is hollow, and something inside is seen by nobody outside,
+//! * *forward*: from one level side most is seen and nearly nothing is hidden, and more is hidden from behind,
+//! * *object*: all others.
+//!
+//! Colours do not count, so that a marked scene is of the kind that it was.
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::extent::{Extent, weights};
+use super::openness::Openness;
+use super::solid::SolidGrid;
+use crate::scene::Gaussians;
+
+/// A room's least share of cells that are free and closed in.
+const HOLLOW: f32 = 0.25;
+/// A room's least share that only those see who are inside.
+const INSIDE: f32 = 0.05;
+/// Terrain is at most so high for its width, and so much of it is seen from above.
+const FLAT: f32 = 0.2;
+const FROM_ABOVE: f32 = 0.75;
+/// So much of a forward-facing capture is seen from its front, at most so much is hidden from there, and so much more from behind.
+const FROM_FRONT: f32 = 0.6;
+const HIDDEN: f32 = 0.09;
+const MORE_BEHIND: f32 = 0.03;
+/// Fewer Gaussians than these say nothing.
+const FEWEST: usize = 100;
+
+/// How a scene was captured, and where its viewers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneKind {
+    /// Something seen from outside, from all around or from above its ground.
+    Object,
+    /// Surroundings, seen from inside.
+    Room,
+    /// Ground, seen from above and obliquely.
+    Terrain,
+    /// What a camera saw that faced one way, seen from that side.
+    Forward,
+}
+
+impl SceneKind {
+    /// All kinds.
+    pub const ALL: [SceneKind; 4] = [Self::Object, Self::Room, Self::Terrain, Self::Forward];
+
+    /// The kind of a scene, and the figures that say so.
+    ///
+    /// # Errors
+    /// Those of [`Extent::of`]: an empty scene, or one too large for single precision.
+    pub fn of(gaussians: &Gaussians) -> crate::Result<(SceneKind, Openness)> {
+        let extent = Extent::of(gaussians)?;
+        let grid = SolidGrid::of(gaussians, &weights(gaussians));
+        let openness = Openness::of(gaussians, &extent, &grid);
+        Ok((Self::by(&openness), openness))
+    }
+
+    /// What the rule says.
+    pub fn by(found: &Openness) -> SceneKind {
+        if found.gaussians < FEWEST {
+            Self::Object
+        } else if found.flatness <= FLAT && found.seen_from_above >= FROM_ABOVE {
+            Self::Terrain
+        } else if found.hollow >= HOLLOW && found.inside >= INSIDE {
+            Self::Room
+        } else if found.seen_from_front >= FROM_FRONT
+            && found.hidden_from_front <= HIDDEN
+            && found.hidden_from_behind - found.hidden_from_front >= MORE_BEHIND
+        {
+            Self::Forward
+        } else {
+            Self::Object
+        }
+    }
+
+    /// As options and JSON have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Object => "object",
+            Self::Room => "room",
+            Self::Terrain => "terrain",
+            Self::Forward => "forward",
+        }
+    }
+}
+
+impl fmt::Display for SceneKind {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(self.name())
+    }
+}
+
+impl FromStr for SceneKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == text);
+        found.ok_or_else(|| format!("{text:?} is none of object, room, terrain, forward"))
+    }
+}
