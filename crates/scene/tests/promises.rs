@@ -32,7 +32,7 @@ fn spz(points: u32) -> Vec<u8> {
 
 /// A binary glTF of a little JSON and a small buffer.
 fn glb(json: &str) -> Vec<u8> {
-    let json = format!("{json:1$}", json.len().next_multiple_of(4));
+    let json = json.to_string() + &" ".repeat(json.len().next_multiple_of(4) - json.len());
     let mut file = b"glTF\x02\0\0\0".to_vec();
     file.extend((12 + 8 + json.len() as u32 + 8 + 64).to_le_bytes());
     file.extend((json.len() as u32).to_le_bytes());

@@ -182,7 +182,7 @@ mod tests {
     fn buffers_in_the_text_are_not_counted() {
         let count = |text: &str| besides_data(text.as_bytes());
         assert_eq!(count(r#"{"uri":"data:a,bcd"}"#), r#"{"uri":}"#.len());
-        assert_eq!(count(r#"["data:"x","a data:","data"#), r#"[,"a data:","data"#.len());
+        assert_eq!(count(r#"["data:\"x","a data:","data"#), r#"[,"a data:","data"#.len());
     }
 
     proptest! {
