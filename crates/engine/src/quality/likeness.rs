@@ -33,7 +33,7 @@ pub(crate) struct Likeness {
     pub ssim: f64,
 }
 
-/// Two colour planes of pictures, clamped to [0, 1]: `[height][width]`.
+/// Two colour planes of pictures: `[height][width]`.
 struct Planes {
     x: Vec<f32>,
     y: Vec<f32>,
@@ -42,10 +42,11 @@ struct Planes {
 }
 
 impl Planes {
-    fn new(original: &Picture, marked: &Picture, channel: usize) -> Self {
+    /// With each value `changed`.
+    fn new(original: &Picture, marked: &Picture, channel: usize, changed: fn(f32) -> f32) -> Self {
         let plane = |picture: &Picture| -> Vec<f32> {
             let values = picture.pixels.chunks_exact(3);
-            values.map(|pixel| pixel[channel].clamp(0.0, 1.0)).collect()
+            values.map(|pixel| changed(pixel[channel])).collect()
         };
         Self {
             x: plane(original),
@@ -56,9 +57,11 @@ impl Planes {
     }
 }
 
-/// Mean SSIM of two pictures of one size that is not empty.
+/// Mean SSIM of two pictures of one size that is not empty, values as they are.
 pub(super) fn mean_ssim(original: &Picture, marked: &Picture) -> f64 {
-    let planes: Vec<Planes> = (0..3).map(|channel| Planes::new(original, marked, channel)).collect();
+    let planes: Vec<Planes> = (0..3)
+        .map(|channel| Planes::new(original, marked, channel, |v| v))
+        .collect();
     let height = original.height as usize;
     let parts = height.div_ceil(ROWS);
     let sums: Vec<f64> = (0..3 * parts)
@@ -87,7 +90,7 @@ pub(crate) fn likeness_with_gradient(
         .into_par_iter()
         .map(|task| {
             let (original, marked) = pairs[task / 3];
-            let planes = &Planes::new(original, marked, task % 3);
+            let planes = &Planes::new(original, marked, task % 3, |v| v.clamp(0.0, 1.0));
             let scale = 1.0 / (original.pixels.len() * pairs.len()) as f32;
             Instructions::widest().run(ToPlane { planes, weights, scale })
         })
@@ -224,6 +227,11 @@ mod tests {
         }
     }
 
+    fn clamped(picture: &Picture) -> Picture {
+        let pixels = picture.pixels.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+        Picture { pixels, ..*picture }
+    }
+
     /// The weighted terms by their definitions, window by window, in f64; and L1 and SSIM.
     fn reference(x: &Picture, y: &Picture, weights: LikenessWeights) -> [f64; 3] {
         let (width, height) = (x.width as usize, x.height as usize);
@@ -272,7 +280,7 @@ mod tests {
                 (found.l1 - l1).abs() < 1e-6 && (found.ssim - ssim).abs() < 1e-5,
                 "{found:?}"
             );
-            assert!((mean_ssim(x, y) - ssim).abs() < 1e-5);
+            assert!((mean_ssim(&clamped(x), &clamped(y)) - ssim).abs() < 1e-5);
             let mut beyond = 0;
             for at in (0..y.pixels.len()).step_by(17) {
                 let shown = y.pixels[at];
@@ -300,7 +308,7 @@ mod tests {
 
     #[test]
     fn parts_of_rows_and_threads_make_no_difference() {
-        let (x, y) = (picture(31, 150, 1), picture(31, 150, 5));
+        let (x, y) = (clamped(&picture(31, 150, 1)), clamped(&picture(31, 150, 5)));
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| mean_ssim(&x, &y))

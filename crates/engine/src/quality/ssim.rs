@@ -76,8 +76,8 @@ impl Ssim {
     }
 }
 
-/// SSIM of two pictures of one size, the mean over pixels and colours of pictures clamped to [0, 1]. Fails when sizes
-/// differ and on pictures without pixels.
+/// SSIM of two pictures of one size, the mean over pixels and colours. Fails when sizes differ and on pictures without
+/// pixels.
 pub fn ssim(original: &Picture, marked: &Picture) -> Result<f64> {
     comparable(&[original, marked])?;
     Ok(mean_ssim(original, marked))
