@@ -8,6 +8,7 @@ use tempfile::{TempDir, TempPath};
 use crate::error::{Error, Result};
 
 /// A scene that has yet to get its name.
+#[derive(Debug)]
 pub(super) enum Aside {
     /// Of one file, under another name.
     File(TempPath),

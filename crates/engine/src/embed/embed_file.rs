@@ -270,7 +270,7 @@ mod tests {
         assert!(reason(&missing).starts_with(missing.to_str().unwrap()));
         let aside = reserve(&folder.path().join("out.ply")).unwrap();
         assert_eq!(
-            std::fs::metadata(&aside).unwrap().len(),
+            std::fs::metadata(aside.path()).unwrap().len(),
             std::fs::metadata(&input).unwrap().len()
         );
         drop(aside);

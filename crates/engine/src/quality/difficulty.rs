@@ -149,7 +149,13 @@ mod tests {
 
     #[test]
     fn many_colours_spread_and_stripes_have_texture() {
-        let two = |i: usize| if i % 2 == 0 { [0.8, 0.2, 0.2] } else { [0.2, 0.2, 0.8] };
+        let two = |i: usize| {
+            if i.is_multiple_of(2) {
+                [0.8, 0.2, 0.2]
+            } else {
+                [0.2, 0.2, 0.8]
+            }
+        };
         let found = Difficulty::of(&[view(8, 8, two)]).unwrap();
         assert!(found.chroma_spread > 0.3, "{found:?}");
         assert!(found.texture > 0.05 && found.thinness == 0.0, "{found:?}");

@@ -135,7 +135,8 @@ mod tests {
 
     #[test]
     fn agrees_with_the_definition_on_every_instruction_set_and_in_any_part() {
-        let products: [(Product, fn(f64, f64) -> f64); 5] = [
+        type Formula = fn(f64, f64) -> f64;
+        let products: [(Product, Formula); 5] = [
             (Product::First, |x, _| x),
             (Product::Second, |_, y| y),
             (Product::FirstSquared, |x, _| x * x),

@@ -110,8 +110,11 @@ fn chunks(file: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), String> {
     Ok((text, binary.map(|(_, data)| data)))
 }
 
-/// The type and the data of the chunk at a byte, if there is one before `end`.
-fn chunk(file: &[u8], at: usize, end: usize) -> Result<Option<([u8; 4], Range<usize>)>, String> {
+/// The type of a chunk of a binary glTF, and where its data lies.
+type Chunk = ([u8; 4], Range<usize>);
+
+/// The chunk at a byte, if there is one before `end`.
+fn chunk(file: &[u8], at: usize, end: usize) -> Result<Option<Chunk>, String> {
     if end.saturating_sub(at) < CHUNK {
         return Ok(None);
     }

@@ -20,7 +20,7 @@ pub(super) struct Part {
 /// Where colours are stored.
 #[derive(Debug)]
 pub(super) enum Colours {
-    Attributes(Splats),
+    Attributes(Box<Splats>),
     Spz(Box<Stream>),
 }
 

@@ -62,7 +62,7 @@ pub(super) fn parse(file: Vec<u8>, bad_rows: BadRows, sources: &Sources<'_>) -> 
                 }
                 take(&mut memory, splats.count(), splats.degree())?;
                 compressed.push(None);
-                Colours::Attributes(splats)
+                Colours::Attributes(Box::new(splats))
             }
             Some(view) => {
                 refuse_both(&document, one.primitive).map_err(of)?;

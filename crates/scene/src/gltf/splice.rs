@@ -29,6 +29,9 @@ impl Splice {
     }
 }
 
+/// Makes a buffer of the one that was read.
+type Rebuild<'s> = Box<dyn Fn(&[u8]) -> Vec<u8> + 's>;
+
 /// How a buffer of `length` bytes is made with `splices` in it, in their order, and its new length; adds to `edits` what
 /// the JSON has to say.
 pub(super) fn moved<'s>(
@@ -37,7 +40,7 @@ pub(super) fn moved<'s>(
     length: usize,
     splices: &'s [Splice],
     edits: &mut Vec<(Range<usize>, String)>,
-) -> io::Result<(impl Fn(&[u8]) -> Vec<u8> + 's, usize)> {
+) -> io::Result<(Rebuild<'s>, usize)> {
     let text = envelope.text();
     let document = envelope.document().map_err(io::Error::other)?;
     let views = spans::elements(text, "bufferViews");
@@ -93,5 +96,5 @@ pub(super) fn moved<'s>(
         new.extend_from_slice(&old[at..]);
         new
     };
-    Ok((make, new_length))
+    Ok((Box::new(make), new_length))
 }

@@ -32,7 +32,7 @@ fn header(encoding: &str, kind: &str, rows: &str, rest: usize) -> String {
     text + "end_header\n"
 }
 
-fn values(rows: usize, columns: usize) -> impl Iterator<Item = f32> {
+fn values(rows: usize, columns: usize) -> impl Iterator<Item = f32> + Clone {
     (0..rows * columns).map(|i| (i * 7 % 23) as f32 / 8.0 - 1.0)
 }
 
