@@ -145,12 +145,13 @@ fn a_kind_can_be_said_and_is_refused_where_there_is_no_place() {
         };
         assert_eq!(ViewSampler::seen_from(&object, 1, said).unwrap().kind(), kind);
     }
-    let flat = scene(SceneKind::Terrain, 1);
+    let mut flat = scene(SceneKind::Terrain, 1);
+    flat.positions.iter_mut().for_each(|position| position[1] = 0.0);
     let room = Viewpoints {
         kind: Some(SceneKind::Room),
         cameras: &[],
     };
-    let reason = ViewSampler::seen_from(&flat, 1, room).unwrap_err().to_string();
+    let reason = ViewSampler::seen_from(&flat, 1, room).map(|_| ()).unwrap_err().to_string();
     assert!(reason.contains("no free place"), "{reason}");
     let mut inside = ViewSampler::new(&scene(SceneKind::Room, 1), 1).unwrap();
     assert!(
