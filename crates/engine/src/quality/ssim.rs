@@ -154,7 +154,6 @@ mod tests {
     #[test]
     fn identical_and_constant_pictures_have_one_and_noise_lowers_it() {
         let a = random(32, 32, 3);
-        let device = Device::flex();
         assert!((ssim(&a, &a).unwrap() - 1.0).abs() < 1e-6);
         for value in [0.0, 0.5, 1.0] {
             let grey = Picture {
