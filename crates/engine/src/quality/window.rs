@@ -135,19 +135,18 @@ mod tests {
 
     #[test]
     fn agrees_with_the_definition_on_every_instruction_set_and_in_any_part() {
-        type Formula = fn(f64, f64) -> f64;
-        let products: [(Product, Formula); 5] = [
-            (Product::First, |x, _| x),
-            (Product::Second, |_, y| y),
-            (Product::FirstSquared, |x, _| x * x),
-            (Product::SecondSquared, |_, y| y * y),
-            (Product::Both, |x, y| x * y),
-        ];
+        let formula = |product: Product, x: f64, y: f64| match product {
+            Product::First => x,
+            Product::Second => y,
+            Product::FirstSquared => x * x,
+            Product::SecondSquared => y * y,
+            Product::Both => x * y,
+        };
         for (width, height, rows) in [(23, 17, 0..17), (23, 17, 3..9), (1, 1, 0..1), (4, 40, 30..40)] {
             let plane =
                 |step: usize| -> Vec<f32> { (0..width * height).map(|i| (i * step % 11) as f32 / 11.0).collect() };
             let (x, y) = (plane(3), plane(7));
-            for ((product, formula), set) in products
+            for (product, set) in Product::ALL
                 .iter()
                 .flat_map(|p| Instructions::present().map(move |s| (p, s)))
             {
@@ -158,7 +157,7 @@ mod tests {
                     let mut expected = 0.0;
                     for v in row.saturating_sub(RADIUS)..height.min(row + RADIUS + 1) {
                         for u in column.saturating_sub(RADIUS)..width.min(column + RADIUS + 1) {
-                            let value = formula(f64::from(x[v * width + u]), f64::from(y[v * width + u]));
+                            let value = formula(*product, f64::from(x[v * width + u]), f64::from(y[v * width + u]));
                             expected += weight(u.abs_diff(column)) * weight(v.abs_diff(row)) * value;
                         }
                     }
