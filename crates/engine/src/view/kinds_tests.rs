@@ -151,7 +151,10 @@ fn a_kind_can_be_said_and_is_refused_where_there_is_no_place() {
         kind: Some(SceneKind::Room),
         cameras: &[],
     };
-    let reason = ViewSampler::seen_from(&flat, 1, room).map(|_| ()).unwrap_err().to_string();
+    let reason = ViewSampler::seen_from(&flat, 1, room)
+        .map(|_| ())
+        .unwrap_err()
+        .to_string();
     assert!(reason.contains("no free place"), "{reason}");
     let mut inside = ViewSampler::new(&scene(SceneKind::Room, 1), 1).unwrap();
     assert!(
