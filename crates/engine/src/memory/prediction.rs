@@ -4,9 +4,10 @@ use crate::scene::Scene;
 
 /// Numbers of a Gaussian besides its colour: position, rotation, scale, opacity.
 const GEOMETRY: u64 = 11;
-/// Pictures of a step, as large as those that CLIP sees, that differentiation keeps for each view: L1, SSIM with its
-/// five windowed means, and the augmentation. Measured: a step of 16 views takes 62 MB more than one of 8 at 160 px.
-const KEPT_PICTURES: u64 = 18;
+/// Pictures of a step, as large as those that CLIP sees, that the loss and its gradient keep for each view on the CPU: the
+/// pictures themselves, the windowed means of SSIM, the tower's. Measured: a step of 16 views takes 30 MB more than one of
+/// 8 at 160 px, and one of 24 another 32 MB, with what is drawn.
+const KEPT_PICTURES: u64 = 11;
 /// Pictures of the size at which they are distorted that differentiation keeps for each view.
 const KEPT_DISTORTED: u64 = 18;
 /// Bytes of a Gaussian while a view is prepared: projected by chunks, put together, sorted.
