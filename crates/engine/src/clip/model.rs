@@ -1,7 +1,7 @@
 //! Both towers as one trainable burn module.
 use super::config::{ClipConfig, VisionTower};
 use super::params::param;
-use super::random_fourier::RandomFourierEncoder;
+use super::random_fourier::{Layout, RandomFourierEncoder};
 use super::resnet::ResNet;
 use super::text::TextTransformer;
 use super::vit::VisionTransformer;
@@ -70,9 +70,16 @@ impl ImageTower {
                 kernel,
                 surround,
                 tones: _,
-            } => Self::RandomFourier(RandomFourierEncoder::new(
-                vision, scales, *kernel, *surround, embed_dim, device,
-            )),
+                equalization,
+            } => {
+                let layout = Layout {
+                    scales,
+                    kernel: *kernel,
+                    surround: *surround,
+                    equalization: *equalization,
+                };
+                Self::RandomFourier(RandomFourierEncoder::new(vision, layout, embed_dim, device))
+            }
         }
     }
 

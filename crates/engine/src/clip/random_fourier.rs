@@ -37,28 +37,37 @@ struct Scale {
     size: usize,
     /// Side of the square whose mean is subtracted from a pixel.
     surround: usize,
+    /// What the density of a pixel's colour counts against it.
+    equalization: f32,
+}
+
+/// How the filters look at a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout<'a> {
+    /// Sides of the squares that are averaged into one pixel.
+    pub scales: &'a [usize],
+    /// Side of a filter.
+    pub kernel: usize,
+    /// Side of the square whose mean is subtracted from a pixel, 1 for nothing.
+    pub surround: usize,
+    /// What the density of a pixel's colour counts against it, 0 to 1.
+    pub equalization: f32,
 }
 
 impl RandomFourierEncoder {
     /// Lays out the tower; `embed_dim` is the width of its features.
-    pub fn new(
-        vision: &VisionConfig,
-        scales: &[usize],
-        kernel: usize,
-        surround: usize,
-        embed_dim: usize,
-        device: &Device,
-    ) -> Self {
+    pub fn new(vision: &VisionConfig, layout: Layout, embed_dim: usize, device: &Device) -> Self {
         let filters = vision.width;
         let scale = |&size: &usize| Scale {
-            weight: param([filters, 3, kernel, kernel], device),
+            weight: param([filters, 3, layout.kernel, layout.kernel], device),
             bias: param([filters], device),
             size,
-            surround,
+            surround: layout.surround,
+            equalization: layout.equalization,
         };
         Self {
-            scales: scales.iter().map(scale).collect(),
-            proj: LinearConfig::new(filters * scales.len(), embed_dim).init(device),
+            scales: layout.scales.iter().map(scale).collect(),
+            proj: LinearConfig::new(filters * layout.scales.len(), embed_dim).init(device),
         }
     }
 
@@ -96,6 +105,7 @@ impl RandomFourierEncoder {
             bias: set(scale.bias, phases.to_vec()),
             size: scale.size,
             surround: scale.surround,
+            equalization: scale.equalization,
         };
         self.scales = self.scales.into_iter().zip(weights.zip(phases)).map(fill).collect();
         self
@@ -118,7 +128,7 @@ impl Scale {
         let filters = weight.reshape([-1, 3]); // the kernel is one pixel
         let n = self.surround;
         if n == 1 {
-            return mean_sines(pictures, filters, phases, self.size);
+            return mean_sines(pictures, filters, phases, self.size, self.equalization);
         }
         let x = match self.size {
             1 => pictures,
@@ -128,6 +138,6 @@ impl Scale {
             .with_stride([1; 2])
             .with_padding([n / 2; 2])
             .with_count_include_pad(false);
-        mean_sines(x.clone() - avg_pool2d(x, inside), filters, phases, 1)
+        mean_sines(x.clone() - avg_pool2d(x, inside), filters, phases, 1, self.equalization)
     }
 }

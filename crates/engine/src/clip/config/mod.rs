@@ -64,6 +64,9 @@ pub enum VisionTower {
         surround: usize,
         /// How what was done to the tones of a picture is found.
         tones: Tones,
+        /// What the density of a pixel's colour counts against it, 0 to 1: its weight is the density to the power of minus
+        /// this. 0 weighs all pixels alike.
+        equalization: f32,
     },
 }
 
@@ -244,7 +247,11 @@ impl ClipConfig {
                 kernel,
                 surround,
                 tones: _,
+                equalization,
             } => {
+                if !(0.0..=1.0).contains(equalization) {
+                    return Err(format!("vision equalization is {equalization}, must be 0 to 1"));
+                }
                 within("vision scales", scales.len(), 16)?;
                 // Sines are taken of single pixels.
                 within("vision kernel", *kernel, 1)?;

@@ -52,6 +52,8 @@ enum Layers {
         surround: usize,
         #[serde(default, skip_serializing_if = "Tones::is_default")]
         tones: Tones,
+        #[serde(default, skip_serializing_if = "is_zero")]
+        equalization: f32,
     },
 }
 
@@ -78,6 +80,9 @@ struct Preprocess {
 /// The pixel alone.
 fn nothing_around() -> usize {
     1
+}
+fn is_zero(value: &f32) -> bool {
+    *value == 0.0
 }
 fn default_image_size() -> usize {
     224
@@ -137,11 +142,13 @@ pub(super) fn parse(mut value: Value) -> Result<ClipConfig, String> {
             kernel,
             surround,
             tones,
+            equalization,
         } => VisionTower::Statistics {
             scales,
             kernel,
             surround,
             tones,
+            equalization,
         },
     };
     let text = model.text_cfg;
@@ -185,12 +192,14 @@ pub(super) fn write(config: &ClipConfig) -> Result<String, String> {
             kernel,
             surround,
             tones,
+            equalization,
         } => {
             let layers = Layers::Statistics {
                 scales: scales.clone(),
                 kernel: *kernel,
                 surround: *surround,
                 tones: *tones,
+                equalization: *equalization,
             };
             (layers, None, default_head_width(), None)
         }

@@ -4,7 +4,7 @@
 //! processors with and without fused multiplication and addition they differ in their last bits.
 use rayon::prelude::*;
 
-use super::kernel::{Block, Differentiate, LANES, Slope, Sums, Wave};
+use super::kernel::{Block, Differentiate, LANES, Lanes, Slope, Sums, Wave, WeightedSums};
 use crate::simd::Instructions;
 
 /// Pixels of a task: their three colours fit the first cache.
@@ -33,8 +33,24 @@ fn blocks(picture: &[f32], first: usize, count: usize) -> Vec<Block> {
     (first..first + count).step_by(LANES).map(block).collect()
 }
 
-/// `[views][waves]`, of pictures `[views][3][pixels]`.
-pub(super) fn means(instructions: Instructions, pictures: &[f32], views: usize, waves: &[Wave]) -> Vec<f32> {
+/// Weights of pixels `first..first + count`, padded with zeros to whole blocks.
+fn lanes(weights: &[f32], first: usize, count: usize) -> Vec<Lanes> {
+    let of_block = |weights: &[f32]| {
+        let mut lanes = [0.0; LANES];
+        lanes[..weights.len()].copy_from_slice(weights);
+        lanes
+    };
+    weights[first..first + count].chunks(LANES).map(of_block).collect()
+}
+
+/// `[views][waves]`, of pictures `[views][3][pixels]` with weights `[views][pixels]`; without, all weigh alike.
+pub(super) fn means(
+    instructions: Instructions,
+    pictures: &[f32],
+    views: usize,
+    waves: &[Wave],
+    weights: Option<&[f32]>,
+) -> Vec<f32> {
     let len = pictures.len() / views.max(1);
     let pixels = len / 3;
     let chunks = pixels.div_ceil(CHUNK);
@@ -45,39 +61,51 @@ pub(super) fn means(instructions: Instructions, pictures: &[f32], views: usize, 
             let first = task % chunks * CHUNK;
             let count = CHUNK.min(pixels - first);
             let mut sums = vec![0.0; waves.len()];
-            instructions.run(Sums {
-                blocks: &blocks(picture, first, count),
-                count,
-                waves,
-                sums: &mut sums,
-            });
+            let blocks = &blocks(picture, first, count);
+            match weights {
+                None => instructions.run(Sums {
+                    blocks,
+                    count,
+                    waves,
+                    sums: &mut sums,
+                }),
+                Some(weights) => instructions.run(WeightedSums {
+                    blocks,
+                    weights: &lanes(weights, task / chunks * pixels + first, count),
+                    waves,
+                    sums: &mut sums,
+                }),
+            }
             sums
         })
         .collect();
+    let total = if weights.is_some() { 1.0 } else { pixels as f64 };
     let mean = |i: usize| {
         let (view, wave) = (i / waves.len(), i % waves.len());
         let of_view = sums[view * chunks..][..chunks].iter();
-        (of_view.map(|sums| f64::from(sums[wave])).sum::<f64>() / pixels as f64) as f32
+        (of_view.map(|sums| f64::from(sums[wave])).sum::<f64>() / total) as f32
     };
     (0..views * waves.len()).map(mean).collect()
 }
 
-/// `[views][3][pixels]`, for gradients `[views][waves]` and filters in radians.
+/// `[views][3][pixels]`, for gradients `[views][waves]` and filters in radians; weights as in [`means`].
 pub(super) fn gradients(
     instructions: Instructions,
     pictures: &[f32],
     views: usize,
     waves: &[Wave],
     filters: &[f32],
+    weights: Option<&[f32]>,
     gradient: &[f32],
 ) -> Vec<f32> {
     let len = pictures.len() / views.max(1);
     let pixels = len / 3;
     let chunks = pixels.div_ceil(CHUNK);
+    let share = if weights.is_some() { 1.0 } else { 1.0 / pixels as f32 };
     let slopes: Vec<Slope> = (0..views * waves.len())
         .map(|i| {
             let wave = i % waves.len();
-            let factor = gradient[i] / pixels as f32;
+            let factor = gradient[i] * share;
             Slope {
                 wave: waves[wave],
                 weights: std::array::from_fn(|c| filters[3 * wave + c] * factor),
@@ -105,7 +133,12 @@ pub(super) fn gradients(
             let start = first + index * LANES;
             let count = LANES.min(pixels - start);
             for (channel, lanes) in block.iter().enumerate() {
-                picture[channel * pixels + start..][..count].copy_from_slice(&lanes[..count]);
+                let out = &mut picture[channel * pixels + start..][..count];
+                out.copy_from_slice(&lanes[..count]);
+                if let Some(weights) = weights {
+                    let weights = &weights[task / chunks * pixels + start..];
+                    out.iter_mut().zip(weights).for_each(|(out, weight)| *out *= weight);
+                }
             }
         }
     }
@@ -145,11 +178,11 @@ mod tests {
             gaps.fold(0.0, f64::max)
         };
         for set in Instructions::present() {
-            let found = means(set, &pictures, views, &waves(&filters, &phases, 0.0));
+            let found = means(set, &pictures, views, &waves(&filters, &phases, 0.0), None);
             let off = gap(&found, &true_means);
             assert!(off < 2e-6, "{set:?}: {off}");
             let cosines = waves(&filters, &phases, QUARTER);
-            let found = gradients(set, &pictures, views, &cosines, &filters, &gradient);
+            let found = gradients(set, &pictures, views, &cosines, &filters, None, &gradient);
             let off = gap(&found, &true_slopes) / largest;
             assert!(off < 1e-5, "{set:?}: {off}");
         }

@@ -8,7 +8,8 @@ use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use super::{FloatTensor, MeanSines, MeanSinesBackward, TURN};
+use super::density::{CORNERS, GRID, LEAST};
+use super::{FloatTensor, MeanSines, TURN, WeightedSines};
 
 /// Units of a cube.
 const CUBE: u32 = 64;
@@ -24,15 +25,26 @@ fn reduce(angle: f32) -> f32 {
     angle - turns * TURN[0] - turns * TURN[1]
 }
 
-/// A unit for each picture, chunk of pixels and wave: `sums` is `[views][chunks][waves]`.
+/// A unit for each picture, chunk of pixels and wave: `sums` is `[views][chunks][waves]`. Weights are `[views][pixels]`,
+/// and not read unless `weighted`.
 #[cube(launch)]
-fn chunk_sums(pictures: &[f32], filters: &[f32], phases: &[f32], sums: &mut [f32], pixels: u32, chunks: u32) {
+fn chunk_sums(
+    pictures: &[f32],
+    filters: &[f32],
+    phases: &[f32],
+    weights: &[f32],
+    sums: &mut [f32],
+    pixels: u32,
+    chunks: u32,
+    #[comptime] weighted: bool,
+) {
     let unit = ABSOLUTE_POS;
     if unit < sums.len() {
         let waves = phases.len();
         let wave = unit % waves;
         let chunk = unit / waves % chunks as usize;
-        let picture = unit / waves / chunks as usize * 3 * pixels as usize;
+        let view = unit / waves / chunks as usize;
+        let picture = view * 3 * pixels as usize;
         let red = filters[3 * wave];
         let green = filters[3 * wave + 1];
         let blue = filters[3 * wave + 2];
@@ -46,7 +58,11 @@ fn chunk_sums(pictures: &[f32], filters: &[f32], phases: &[f32], sums: &mut [f32
                 + green * pictures[at + pixels as usize]
                 + blue * pictures[at + 2 * pixels as usize]
                 + phase;
-            sum += f32::sin(reduce(angle));
+            let mut sine = f32::sin(reduce(angle));
+            if weighted {
+                sine *= weights[view * pixels as usize + pixel];
+            }
+            sum += sine;
             pixel += 1;
         }
         sums[unit] = sum;
@@ -74,10 +90,12 @@ fn to_pixels(
     pictures: &[f32],
     filters: &[f32],
     phases: &[f32],
+    weights: &[f32],
     gradient: &[f32],
     out: &mut [f32],
     pixels: u32,
     scale: f32,
+    #[comptime] weighted: bool,
 ) {
     let unit = ABSOLUTE_POS;
     if 3 * unit < out.len() {
@@ -87,6 +105,10 @@ fn to_pixels(
         let r = pictures[at];
         let g = pictures[at + pixels as usize];
         let b = pictures[at + 2 * pixels as usize];
+        let mut share = scale;
+        if weighted {
+            share = weights[unit];
+        }
         let mut to_r = 0.0f32;
         let mut to_g = 0.0f32;
         let mut to_b = 0.0f32;
@@ -95,7 +117,7 @@ fn to_pixels(
             let green = filters[3 * wave + 1];
             let blue = filters[3 * wave + 2];
             let angle = red * r + green * g + blue * b + phases[wave];
-            let slope = f32::cos(reduce(angle)) * gradient[view * waves + wave] * scale;
+            let slope = f32::cos(reduce(angle)) * gradient[view * waves + wave] * share;
             to_r += red * slope;
             to_g += green * slope;
             to_b += blue * slope;
@@ -106,14 +128,174 @@ fn to_pixels(
     }
 }
 
+/// A channel's place on the grid of colours.
+#[cube]
+fn place(value: f32) -> f32 {
+    f32::clamp(value - LEAST, 0.0f32, (CORNERS - 1) as f32)
+}
+
+/// What a corner of the grid has of a colour in one channel.
+#[cube]
+fn share(place: f32, corner: usize) -> f32 {
+    max(1.0f32 - f32::abs(place - corner as f32), 0.0f32)
+}
+
+/// A unit for each picture, chunk of pixels and corner: what the corner has of the chunk's pixels, `[views][chunks][GRID]`.
+#[cube(launch)]
+fn chunk_counts(pictures: &[f32], counts: &mut [f32], pixels: u32, chunks: u32) {
+    let unit = ABSOLUTE_POS;
+    if unit < counts.len() {
+        let corner = unit % GRID;
+        let chunk = unit / GRID % chunks as usize;
+        let picture = unit / GRID / chunks as usize * 3 * pixels as usize;
+        let mut pixel = chunk * CHUNK;
+        let end = min(pixel + CHUNK, pixels as usize);
+        let mut sum = 0.0f32;
+        while pixel < end {
+            let at = picture + pixel;
+            sum += share(place(pictures[at]), corner / CORNERS / CORNERS)
+                * share(place(pictures[at + pixels as usize]), corner / CORNERS % CORNERS)
+                * share(place(pictures[at + 2 * pixels as usize]), corner % CORNERS);
+            pixel += 1;
+        }
+        counts[unit] = sum;
+    }
+}
+
+/// A unit for each picture and pixel: its density to the power of minus `equalization`.
+#[cube(launch)]
+fn rarities(pictures: &[f32], grid: &[f32], out: &mut [f32], pixels: u32, equalization: f32) {
+    let unit = ABSOLUTE_POS;
+    if unit < out.len() {
+        let view = unit / pixels as usize;
+        let at = view * 3 * pixels as usize + unit % pixels as usize;
+        let red = place(pictures[at]);
+        let green = place(pictures[at + pixels as usize]);
+        let blue = place(pictures[at + 2 * pixels as usize]);
+        let mut density = 0.0f32;
+        for corner in 0..GRID {
+            density += grid[view * GRID + corner]
+                * share(red, corner / CORNERS / CORNERS)
+                * share(green, corner / CORNERS % CORNERS)
+                * share(blue, corner % CORNERS);
+        }
+        out[unit] = f32::powf(max(density, 0.125f32), -equalization);
+    }
+}
+
+/// A unit for each picture and chunk: the sum of its pixels.
+#[cube(launch)]
+fn chunk_totals(values: &[f32], totals: &mut [f32], pixels: u32, chunks: u32) {
+    let unit = ABSOLUTE_POS;
+    if unit < totals.len() {
+        let view = unit / chunks as usize;
+        let mut pixel = unit % chunks as usize * CHUNK;
+        let end = min(pixel + CHUNK, pixels as usize);
+        let mut sum = 0.0f32;
+        while pixel < end {
+            sum += values[view * pixels as usize + pixel];
+            pixel += 1;
+        }
+        totals[unit] = sum;
+    }
+}
+
+/// A unit for each picture and pixel: its share of the sum of all.
+#[cube(launch)]
+fn shares_of_all(values: &[f32], totals: &[f32], out: &mut [f32], pixels: u32, chunks: u32) {
+    let unit = ABSOLUTE_POS;
+    if unit < out.len() {
+        let view = unit / pixels as usize;
+        let mut sum = 0.0f32;
+        for chunk in 0..chunks as usize {
+            sum += totals[view * chunks as usize + chunk];
+        }
+        out[unit] = values[unit] / sum;
+    }
+}
+
 impl MeanSines for Cube {
     fn mean_sines(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
         side: usize,
+        equalization: f32,
+    ) -> FloatTensor<Self> {
+        let weights = Self::weights(pictures.clone(), side, equalization);
+        Self::sums(pictures, filters, phases, weights, side)
+    }
+}
+
+impl WeightedSines for Cube {
+    fn weights(pictures: FloatTensor<Self>, side: usize, equalization: f32) -> Option<FloatTensor<Self>> {
+        if equalization == 0.0 {
+            return None;
+        }
+        let pictures = into_contiguous(averaged(pictures, side));
+        let shape = pictures.shape();
+        let (views, pixels) = (shape[0], shape[2] * shape[3]);
+        let chunks = pixels.div_ceil(CHUNK);
+        let client = pictures.client.clone();
+        let new = |shape: &[usize]| empty(&pictures, Shape::from(shape.to_vec()));
+        let counts = new(&[views, chunks, GRID]);
+        let grid_of_colours = new(&[views, GRID]);
+        let rarity = new(&[views, pixels]);
+        let totals = new(&[views, chunks]);
+        let weights = new(&[views, pixels]);
+        let (pixels, chunks) = (pixels as u32, chunks as u32);
+        let arg = |tensor: &CubeTensor| tensor.clone().into_buffer_arg();
+        let (count, dim) = grid(counts.shape().num_elements());
+        chunk_counts::launch(&client, count, dim, arg(&pictures), arg(&counts), pixels, chunks);
+        let (count, dim) = grid(views * GRID);
+        mean_of_chunks::launch(
+            &client,
+            count,
+            dim,
+            arg(&counts),
+            arg(&grid_of_colours),
+            GRID as u32,
+            chunks,
+            1.0,
+        );
+        let (count, dim) = grid(views * pixels as usize);
+        rarities::launch(
+            &client,
+            count,
+            dim,
+            arg(&pictures),
+            arg(&grid_of_colours),
+            arg(&rarity),
+            pixels,
+            equalization,
+        );
+        let (count, dim) = grid(views * chunks as usize);
+        chunk_totals::launch(&client, count, dim, arg(&rarity), arg(&totals), pixels, chunks);
+        let (count, dim) = grid(views * pixels as usize);
+        shares_of_all::launch(
+            &client,
+            count,
+            dim,
+            arg(&rarity),
+            arg(&totals),
+            arg(&weights),
+            pixels,
+            chunks,
+        );
+        Some(weights)
+    }
+
+    fn sums(
+        pictures: FloatTensor<Self>,
+        filters: FloatTensor<Self>,
+        phases: FloatTensor<Self>,
+        weights: Option<FloatTensor<Self>>,
+        side: usize,
     ) -> FloatTensor<Self> {
         let [pictures, filters, phases] = [averaged(pictures, side), filters, phases].map(into_contiguous);
+        let weighted = weights.is_some();
+        // Without weights nothing of the buffer is read.
+        let weights = weights.map_or_else(|| phases.clone(), into_contiguous);
         let shape = pictures.shape();
         let (views, waves) = (shape[0], phases.shape()[0]);
         let pixels = shape[2] * shape[3];
@@ -129,29 +311,32 @@ impl MeanSines for Cube {
             pictures.into_buffer_arg(),
             filters.into_buffer_arg(),
             phases.into_buffer_arg(),
+            weights.into_buffer_arg(),
             sums.clone().into_buffer_arg(),
             pixels as u32,
             chunks as u32,
+            weighted,
         );
         let (count, dim) = grid(views * waves);
-        let scale = 1.0 / pixels as f32;
+        let scale = if weighted { 1.0 } else { 1.0 / pixels as f32 };
         let (sums, out) = (sums.into_buffer_arg(), means.clone().into_buffer_arg());
         mean_of_chunks::launch(&client, count, dim, sums, out, waves as u32, chunks as u32, scale);
         means
     }
-}
 
-impl MeanSinesBackward for Cube {
-    fn mean_sines_backward(
+    fn sums_backward(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
+        weights: Option<FloatTensor<Self>>,
         gradient: FloatTensor<Self>,
         side: usize,
     ) -> FloatTensor<Self> {
         let all = pictures.clone();
         let tensors = [averaged(pictures, side), filters, phases, gradient];
         let [pictures, filters, phases, gradient] = tensors.map(into_contiguous);
+        let weighted = weights.is_some();
+        let weights = weights.map_or_else(|| phases.clone(), into_contiguous);
         let shape = pictures.shape();
         let pixels = shape[2] * shape[3];
         let client = pictures.client.clone();
@@ -164,10 +349,12 @@ impl MeanSinesBackward for Cube {
             pictures.into_buffer_arg(),
             filters.into_buffer_arg(),
             phases.into_buffer_arg(),
+            weights.into_buffer_arg(),
             gradient.into_buffer_arg(),
             out.clone().into_buffer_arg(),
             pixels as u32,
             1.0 / pixels as f32,
+            weighted,
         );
         match side {
             1 => out,

@@ -11,7 +11,7 @@ pub(super) const LANES: usize = 32;
 /// Coefficients of r, r^3, r^5... of sin 2 pi r: the minimax polynomial over [-1/2, 1/2], within 9.6e-8, in f32 within 8e-7.
 const SINE: [f32; 6] = [6.283_182_6, -41.341_42, 81.596_18, -76.580_1, 41.205_395, -12.271_263];
 
-type Lanes = [f32; LANES];
+pub(super) type Lanes = [f32; LANES];
 
 /// Three colours of a few pixels.
 #[derive(Clone, Copy)]
@@ -70,6 +70,32 @@ impl Vectorised for Sums<'_> {
                 for i in 0..rest {
                     let (slope, r) = sine::<FUSED>(wave, &self.blocks[whole], i);
                     lanes[i] = multiply_add::<FUSED>(slope, r, lanes[i]);
+                }
+            }
+            *sum = lanes.iter().sum();
+        }
+    }
+}
+
+/// Sums of the sines of each wave, times the weight of each pixel. Pixels that only fill a block have none.
+pub(super) struct WeightedSums<'a> {
+    pub blocks: &'a [Block],
+    pub weights: &'a [Lanes],
+    pub waves: &'a [Wave],
+    pub sums: &'a mut [f32],
+}
+
+impl Vectorised for WeightedSums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        for (wave, sum) in self.waves.iter().zip(self.sums) {
+            let mut lanes = [0.0; LANES];
+            for (block, weights) in self.blocks.iter().zip(self.weights) {
+                for i in 0..LANES {
+                    let (slope, r) = sine::<FUSED>(wave, block, i);
+                    lanes[i] = multiply_add::<FUSED>(slope * r, weights[i], lanes[i]);
                 }
             }
             *sum = lanes.iter().sum();

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 /// the squares that are averaged.
 struct Case {
     side: usize,
+    equalization: f32,
     sizes: [usize; 4],
     pictures: Vec<f32>,
     filters: Vec<f32>,
@@ -24,6 +25,7 @@ fn case(sizes: [usize; 4], norm: f32, side: usize) -> Case {
     let [views, height, width, waves] = sizes;
     Case {
         side,
+        equalization: 0.0,
         sizes,
         pictures: random(views * 3 * height * width, 2.5),
         filters: random(3 * waves, norm),
@@ -42,7 +44,7 @@ fn computed(case: &Case, device: &Device) -> [Vec<f32>; 2] {
     let filters = Tensor::<2>::from_data(tensor(&case.filters, vec![waves, 3]), &device);
     let phases = Tensor::<1>::from_data(tensor(&case.phases, vec![waves]), &device);
     let gradient = Tensor::<2>::from_data(tensor(&case.gradient, vec![views, waves]), &device);
-    let means = mean_sines(pictures.clone(), filters, phases, case.side);
+    let means = mean_sines(pictures.clone(), filters, phases, case.side, case.equalization);
     let found = (means.clone() * gradient).sum().backward();
     let numbers = |data: TensorData| data.iter::<f32>().collect();
     [
@@ -60,28 +62,55 @@ fn reference(case: &Case) -> [Vec<f64>; 2] {
     let mut means = vec![0.0; views * waves];
     let mut to_pictures = vec![0.0; case.pictures.len()];
     for view in 0..views {
-        for square in 0..rows * columns {
+        let inside = |square: usize, channel: usize| {
             let (top, left) = (square / columns * side, square % columns * side);
-            let inside = |channel: usize| {
-                let plane = (view * 3 + channel) * height * width;
-                (0..side * side).map(move |i| plane + (top + i / side) * width + left + i % side)
-            };
-            let colour = |channel: usize| inside(channel).map(|at| f64::from(case.pictures[at])).sum::<f64>() * share;
-            let colours: [f64; 3] = std::array::from_fn(colour);
+            let plane = (view * 3 + channel) * height * width;
+            (0..side * side).map(move |i| plane + (top + i / side) * width + left + i % side)
+        };
+        let colour = |square: usize| -> [f64; 3] {
+            std::array::from_fn(|channel| {
+                let values = inside(square, channel).map(|at| f64::from(case.pictures[at]));
+                values.sum::<f64>() * share
+            })
+        };
+        let colours: Vec<[f64; 3]> = (0..rows * columns).map(colour).collect();
+        let weights = weights_of(&colours, f64::from(case.equalization));
+        for (square, (colours, weight)) in colours.iter().zip(weights).enumerate() {
             for wave in 0..waves {
                 let filter = |channel: usize| f64::from(case.filters[3 * wave + channel]);
                 let dot: f64 = (0..3).map(|c| filter(c) * colours[c]).sum();
                 let angle = dot + f64::from(case.phases[wave]);
-                let pixels = (rows * columns) as f64;
-                means[view * waves + wave] += angle.sin() / pixels;
-                let slope = f64::from(case.gradient[view * waves + wave]) * angle.cos() / pixels;
+                means[view * waves + wave] += angle.sin() * weight;
+                let slope = f64::from(case.gradient[view * waves + wave]) * angle.cos() * weight;
                 for channel in 0..3 {
-                    inside(channel).for_each(|at| to_pictures[at] += slope * filter(channel) * share);
+                    inside(square, channel).for_each(|at| to_pictures[at] += slope * filter(channel) * share);
                 }
             }
         }
     }
     [means, to_pictures]
+}
+
+/// Weights of colours: the density of a colour is the sum over all corners of a grid of what the corner has of it, times
+/// what it has of all.
+fn weights_of(colours: &[[f64; 3]], equalization: f64) -> Vec<f64> {
+    let hat = |value: f64, corner: i32| (1.0 - (value.clamp(-2.0, 3.0) - f64::from(corner)).abs()).max(0.0);
+    let axis = -2..=3;
+    let corners = axis
+        .clone()
+        .flat_map(|r| axis.clone().flat_map(move |g| (-2..=3).map(move |b| [r, g, b])));
+    let mut densities = vec![0.0; colours.len()];
+    for corner in corners {
+        let has = |colour: &[f64; 3]| -> f64 { (0..3).map(|c| hat(colour[c], corner[c])).product() };
+        let all: f64 = colours.iter().map(has).sum();
+        densities
+            .iter_mut()
+            .zip(colours)
+            .for_each(|(density, colour)| *density += has(colour) * all);
+    }
+    let rarities: Vec<f64> = densities.iter().map(|density| density.powf(-equalization)).collect();
+    let sum: f64 = rarities.iter().sum();
+    rarities.iter().map(|rarity| rarity / sum).collect()
 }
 
 fn largest_gap(found: &[f32], expected: &[f64]) -> f64 {
@@ -99,16 +128,19 @@ fn agrees(device: &Device) {
         ([2, 47, 53, 20], 2),
         ([1, 9, 31, 5], 4),
     ] {
-        for norm in [1.0, 23.0, 400.0] {
-            let case = case(sizes, norm, side);
+        for (norm, equalization) in [(1.0, 0.0), (23.0, 0.0), (400.0, 0.0), (1.0, 1.0), (23.0, 0.2)] {
+            let case = Case {
+                equalization,
+                ..case(sizes, norm, side)
+            };
             let ([means, slopes], [true_means, true_slopes]) = (computed(&case, device), reference(&case));
             // An angle of a is rounded to a * 6e-8 before any sine is taken.
             let tolerance = 2e-6 + 7.5 * f64::from(norm) * 2e-7;
             let gap = largest_gap(&means, &true_means);
-            assert!(gap < tolerance, "{sizes:?} {side} {norm}: {gap}");
+            assert!(gap < tolerance, "{sizes:?} {side} {norm} {equalization}: {gap}");
             let largest = true_slopes.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             let gap = largest_gap(&slopes, &true_slopes) / largest;
-            assert!(gap < 4.0 * tolerance, "{sizes:?} {side} {norm}: {gap}");
+            assert!(gap < 4.0 * tolerance, "{sizes:?} {side} {norm} {equalization}: {gap}");
         }
     }
 }
@@ -131,7 +163,10 @@ fn wgpu_agrees_with_the_formula() {
 
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
-    let case = case([2, 47, 53, 20], 23.0, 2);
+    let case = Case {
+        equalization: 0.2,
+        ..case([2, 47, 53, 20], 23.0, 2)
+    };
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| computed(&case, &Device::flex()))
