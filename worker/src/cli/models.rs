@@ -85,6 +85,9 @@ pub struct Train {
     /// Share of lightness in the direction of a filter, against what a random direction has
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().luma)]
     luma: f32,
+    /// What the density of a pixel's colour counts against it: 0 weighs all pixels alike, 1 all colours
+    #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().equalization)]
+    equalization: f32,
     /// Width of the features
     #[arg(long, hide_short_help = true, default_value_t = TrainOptions::default().dims)]
     dims: usize,
@@ -106,6 +109,7 @@ struct Trained<'a> {
     filters: usize,
     norm: [f32; 2],
     luma: f32,
+    equalization: f32,
     steered: usize,
     roughness: f32,
     steering: Vec<f64>,
@@ -130,6 +134,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         surround: arguments.surround,
         norm: [arguments.least_norm, arguments.largest_norm],
         luma: arguments.luma,
+        equalization: arguments.equalization,
         dims: arguments.dims,
         text_width: arguments.text_width,
     };
@@ -166,6 +171,7 @@ fn train(arguments: &Train) -> Result<Exit> {
         filters: options.filters,
         norm: options.norm,
         luma: options.luma,
+        equalization: options.equalization,
         steered: options.steered,
         roughness: options.roughness,
         steering: trained.steering,

@@ -12,7 +12,7 @@ pub(crate) const KERNEL: usize = 1;
 /// by a radian. With weaker filters, colours that differ from view to view and from scene to scene weigh more than
 /// what a mark adds, above all on smooth surfaces; with stronger ones, the shading of a surface and the mixture of
 /// colours in a pixel turn the sine too far from view to view.
-pub(crate) const NORM: [f32; 2] = [20.0, 40.0];
+pub(crate) const NORM: [f32; 2] = [17.0, 34.0];
 
 /// Share of a filter's direction that is lightness, against what a random direction has. Shading and highlights turn
 /// lightness from view to view two to five times as far as the other two axes of colour, so that of what a mark does to

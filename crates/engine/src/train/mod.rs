@@ -57,6 +57,8 @@ pub struct TrainOptions {
     pub norm: [f32; 2],
     /// Share of lightness in the direction of a filter, against what a random direction has.
     pub luma: f32,
+    /// What the density of a pixel's colour counts against it, 0 to 1.
+    pub equalization: f32,
     /// Width of the features.
     pub dims: usize,
     /// Width of the text tower.
@@ -77,6 +79,7 @@ impl Default for TrainOptions {
             surround: 1,
             norm: filters::NORM,
             luma: filters::LUMA,
+            equalization: EQUALIZATION,
             dims: 152,
             text_width: 128,
         }
@@ -109,6 +112,10 @@ pub struct TrainedClip {
     pub retrieval: Retrieval,
 }
 
+/// What the density of a pixel's colour counts against it. Large plain areas say less of a scene than their size; much more
+/// than this and a mark's reach is in a few pixels of each view (docs/clip.md, "Rare colours weigh more").
+const EQUALIZATION: f32 = 0.2;
+
 /// Side of the pictures that the model takes.
 const IMAGE_SIZE: usize = 160;
 
@@ -131,6 +138,7 @@ pub fn config(options: &TrainOptions) -> ClipConfig {
                 kernel: filters::KERNEL,
                 surround: options.surround,
                 tones: Tones::Estimated,
+                equalization: options.equalization,
             },
         },
         text: TextConfig {
@@ -212,6 +220,12 @@ fn check(options: &TrainOptions) -> Result<()> {
         return Err(Error::BadOption {
             field: "--roughness",
             reason: format!("{} is outside 0 to 10", options.roughness),
+        });
+    }
+    if !(0.0..=1.0).contains(&options.equalization) {
+        return Err(Error::BadOption {
+            field: "--equalization",
+            reason: format!("{} is outside 0 to 1", options.equalization),
         });
     }
     Ok(())
