@@ -45,7 +45,7 @@ pub fn worker() -> PathBuf {
 /// The folder of the CLIP that the worker ships with, or the one that stands in for it.
 pub fn shipped_clip() -> PathBuf {
     std::env::var_os("GUARDSPLAT_CLIP").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../crates/engine/models/guardsplat-clip"),
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../crates/engine/models/guardsplat-2"),
         PathBuf::from,
     )
 }

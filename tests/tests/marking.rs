@@ -60,7 +60,7 @@ fn the_report_of_an_embedding_has_every_field() {
     assert_eq!((&report["steps"], &report["view_steps"]), (&3.into(), &6.into()));
     assert_eq!(
         (&report["device"], &report["clip"]),
-        (&"cpu".into(), &"guardsplat".into())
+        (&"cpu".into(), &"guardsplat-2".into())
     );
     assert_eq!(report["message"].as_str().map(str::len), Some(8));
     assert_eq!(report["message_recovered"], report["message"] == MESSAGE);
@@ -123,7 +123,7 @@ fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict
     }
     assert_eq!(
         (&report["device"], &report["clip"]),
-        (&"cpu".into(), &"guardsplat".into())
+        (&"cpu".into(), &"guardsplat-2".into())
     );
 
     let opposite = !u32::from_str_radix(&read, 16).unwrap();

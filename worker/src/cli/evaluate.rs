@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::evaluate::{Options, Progress, Robustness, Trade, Variant, attacks, plan, run as carry_out, variants};
 use clap::Args;
 use guardsplat_distortion::{RobustTo, Vae};
-use guardsplat_engine::clip::Parts;
+use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::embed::{self, Preset, Settings};
 use guardsplat_engine::extract::Engine;
@@ -264,7 +264,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or(load::SHIPPED),
+        Extractor::Clip => clip.unwrap_or(ShippedClip::NEWEST),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {

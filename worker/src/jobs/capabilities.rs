@@ -1,7 +1,7 @@
 //! The worker's capabilities: its device, memory and CLIPs, by which the server chooses jobs for it.
 use std::time::Duration;
 
-use guardsplat_engine::clip::Clip;
+use guardsplat_engine::clip::ShippedClip;
 use guardsplat_engine::memory::Limits;
 use guardsplat_engine::models::{LPIPS, Models, WEIGHTS};
 use guardsplat_proto::v1::LeaseJobRequest;
@@ -20,14 +20,18 @@ pub struct WorkerCapabilities {
     pub name: String,
     device: String,
     memory: u64,
-    shipped: Option<String>,
+    shipped: Option<Vec<String>>,
 }
 
 impl WorkerCapabilities {
     /// A worker called `name` on `device`, whose jobs may take `budget` bytes of memory, or all that the machine has.
     pub fn new(name: String, device: &str, budget: Option<u64>) -> Self {
-        // Without the shipped CLIP it is told when a job needs it, and to whoever made the job.
-        let shipped = Clip::shipped_hash().ok();
+        // Without a shipped CLIP it is told when a job needs it, and to whoever made the job.
+        let shipped = ShippedClip::ALL
+            .iter()
+            .map(ShippedClip::hash)
+            .collect::<Result<_, _>>()
+            .ok();
         Self {
             name,
             device: device
@@ -62,7 +66,7 @@ impl WorkerCapabilities {
         let hashes = added
             .filter_map(|mut entry| entry.files.remove(WEIGHTS))
             .map(|file| file.sha256);
-        std::iter::once(shipped).chain(hashes).take(MOST_CLIPS).collect()
+        shipped.into_iter().chain(hashes).take(MOST_CLIPS).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 //! it is used.
 use std::path::{Path, PathBuf};
 
-use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::clip::{Clip, Parts, ShippedClip};
 use guardsplat_engine::device::Compute;
 use guardsplat_engine::extract::{Engine, HiddenExtractor};
 use guardsplat_engine::memory::Limits;
@@ -16,16 +16,12 @@ pub fn cameras(path: Option<&Path>) -> Result<Vec<Camera>> {
     Ok(path.map(read_cameras).transpose()?.unwrap_or_default())
 }
 
-/// What the CLIP in the repository is called.
-pub const SHIPPED: &str = "guardsplat";
-
-/// The CLIP of that name, the shipped one without a name.
+/// The CLIP of that name, the newest shipped one without a name.
 pub fn clip(name: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
-    let name = name.unwrap_or(SHIPPED);
-    let clip = if name == SHIPPED {
-        Clip::shipped(&compute.device, parts)?
-    } else {
-        Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?
+    let name = name.unwrap_or(ShippedClip::NEWEST);
+    let clip = match ShippedClip::named(name) {
+        Some(shipped) => shipped.load(&compute.device, parts)?,
+        None => Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?,
     };
     let identity = ClipIdentity {
         name: name.to_owned(),

@@ -86,7 +86,7 @@ fn jobs_give_what_the_offline_commands_give() {
     let key_file = server.bytes(&made.key_file);
     assert!(key_file == bench.read("k.key"), "another key than offline");
     let key = made.key.unwrap();
-    assert_eq!((key.bits, key.clip.as_str(), key.seeded), (32, "guardsplat", true));
+    assert_eq!((key.bits, key.clip.as_str(), key.seeded), (32, "guardsplat-2", true));
     assert_eq!(key.clip_sha256.len(), 64);
     assert_eq!(made.result.unwrap().device, "cpu");
 

@@ -72,7 +72,7 @@ fn from_a_sample_to_a_verdict() {
     let bench = Bench::new();
     bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
     let key = bench.json("key create --bits 32 --seed 7 -o k.key --device cpu --json", 0);
-    assert_eq!((&key["bits"], &key["clip"]), (&32.into(), &"guardsplat".into()));
+    assert_eq!((&key["bits"], &key["clip"]), (&32.into(), &"guardsplat-2".into()));
 
     write(
         &bench.path("few.json"),
@@ -95,7 +95,7 @@ fn from_a_sample_to_a_verdict() {
     assert_eq!(report["identical"], false);
     assert_eq!(
         (&report["device"], &report["clip"]),
-        (&"cpu".into(), &"guardsplat".into())
+        (&"cpu".into(), &"guardsplat-2".into())
     );
     assert_eq!(report["message"].as_str().unwrap().len(), 8);
     assert!(report["message_recovered"].is_boolean());

@@ -11,6 +11,7 @@ mod params;
 mod preprocess;
 mod random_fourier;
 mod resnet;
+mod shipped;
 mod sines;
 mod tensor_file;
 mod text;
@@ -23,6 +24,7 @@ pub use model::{ClipModel, ImageTower, Parts, normalize};
 pub use preprocess::{normalized, preprocess, resize};
 pub use random_fourier::RandomFourierEncoder;
 pub use resnet::ResNet;
+pub use shipped::ShippedClip;
 pub use tensor_file::{TensorFile, TensorSource};
 pub use text::TextTransformer;
 pub use transformer::Transformer;
@@ -36,10 +38,6 @@ use crate::error::{Error, Result};
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use std::path::{Path, PathBuf};
-
-/// Configuration and weights of the project's own model; `docs/clip.md` tells how they came about.
-const SHIPPED_CONFIG: &str = include_str!("../../models/guardsplat-clip/config.json");
-static SHIPPED_WEIGHTS: &[u8] = include_bytes!("../../models/guardsplat-clip/model.safetensors");
 
 /// A loaded CLIP with frozen weights.
 #[derive(Debug)]
@@ -74,33 +72,13 @@ impl Clip {
         })
     }
 
-    /// The project's own small CLIP, which is part of the program; `$GUARDSPLAT_CLIP` names a folder to use instead.
+    /// The newest of the project's own small CLIPs ([`ShippedClip`]).
     ///
     /// # Errors
     /// As [`Clip::load`].
     pub fn shipped(device: &Device, parts: Parts) -> Result<Self> {
-        if let Some(dir) = std::env::var_os("GUARDSPLAT_CLIP") {
-            return Self::load(Path::new(&dir), device, parts);
-        }
-        let config = ClipConfig::parse("guardsplat-clip", SHIPPED_CONFIG)?;
-        let mut file = TensorFile::from_bytes("guardsplat-clip", SHIPPED_WEIGHTS)?;
-        let model = ClipModel::new(&config, parts, device).load(&mut file)?;
-        Ok(Self {
-            config,
-            hash: file.sha256()?,
-            model: model.freeze(),
-        })
-    }
-
-    /// The hash of the weights that [`Clip::shipped`] loads, without loading them.
-    ///
-    /// # Errors
-    /// As [`Clip::load`], of the file of weights.
-    pub fn shipped_hash() -> Result<String> {
-        match std::env::var_os("GUARDSPLAT_CLIP") {
-            Some(dir) => TensorFile::open(&weights_path(Path::new(&dir))?)?.sha256(),
-            None => TensorFile::from_bytes("guardsplat-clip", SHIPPED_WEIGHTS)?.sha256(),
-        }
+        let [newest, ..] = ShippedClip::ALL;
+        newest.load(device, parts)
     }
 
     /// A frozen model from its parts, for one that was just trained or that has no file.

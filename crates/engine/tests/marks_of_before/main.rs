@@ -1,7 +1,7 @@
 //! Marks are read for ever: keys and pictures of marks that shipped CLIPs made.
 use std::path::PathBuf;
 
-use guardsplat_engine::clip::{Clip, Parts};
+use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::extract::{Engine, read_pictures};
 use guardsplat_engine::message::Key;
@@ -13,7 +13,8 @@ fn a_mark_of_november_2026_is_read() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/marks_of_before/v1");
     let key = Key::read(&folder.join("mark.key")).unwrap();
     let compute = open(DeviceChoice::Cpu).unwrap();
-    let clip = Clip::shipped(&compute.device, Parts::Image).unwrap();
+    let clip = ShippedClip::named(&key.clip.name).unwrap();
+    let clip = clip.load(&compute.device, Parts::Image).unwrap();
     assert_eq!(clip.hash, key.clip.hash);
     let message = key.message("c0ffee42").unwrap();
     let engine = Engine::new(compute, clip, &key, None).unwrap();
