@@ -2,7 +2,8 @@
 use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, estimates, hypotheses, read_scene,
+    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, estimates, hypotheses, read_given,
+    read_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
@@ -54,7 +55,7 @@ pub fn read(
     for (index, path) in source.pictures.iter().enumerate() {
         let picture = read_picture(path, views.background)?;
         shown.see("picture", index, &picture)?;
-        logits.extend(engine.read_logits(&[picture])?);
+        logits.push(read_given(engine, &picture)?);
         progress(before + index + 1, total);
     }
     Ok((PooledLogits::new(logits)?, ignored))

@@ -7,6 +7,7 @@ mod photometric;
 mod picture_logits;
 mod pictures;
 mod pooled;
+mod restore;
 mod suspect_kind;
 mod window;
 
@@ -19,6 +20,7 @@ pub use photometric::{corrections, read_corrections};
 pub use picture_logits::{PictureLogits, estimates, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
+pub use restore::read_given;
 pub use suspect_kind::SuspectKind;
 
 use crate::error::Result;
@@ -35,12 +37,13 @@ pub fn default_size(engine: &Engine) -> u32 {
     engine.extractor.side().clamp(128, 512) as u32
 }
 
-/// Reads pictures, whatever their sizes.
+/// Reads pictures that somebody gave, whatever their sizes.
 ///
 /// # Errors
 /// No pictures, or a failing device.
 pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<PooledLogits> {
-    PooledLogits::new(engine.read_logits(pictures)?)
+    let logits = pictures.iter().map(|picture| read_given(engine, picture));
+    PooledLogits::new(logits.collect::<Result<_>>()?)
 }
 
 /// Renders `views` held-out 8-bit views of a scene as `sampler` has them, `size` by `size` pixels, and reads them. `done`

@@ -3,6 +3,7 @@ use guardsplat_codeword::Hypothesis;
 
 use super::blind::{BlindReading, Candidate, chosen};
 use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
+use super::restore::restored;
 use super::window::read_windows;
 use super::{Engine, PooledLogits, without_borders};
 use crate::clip::config::Tones;
@@ -36,6 +37,8 @@ impl PictureLogits {
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
+        let restored = restored(engine, picture);
+        let picture = restored.as_ref();
         let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
         let blind = match engine.extractor.tones() {
             Tones::Searched => None,

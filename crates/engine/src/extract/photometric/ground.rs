@@ -6,6 +6,8 @@ use crate::picture::Picture;
 const DISTANCE: [f32; 2] = [0.06, 0.12];
 /// Share of the border that must be ground.
 const SHARE: f32 = 0.5;
+/// Share of values cut at black or white from which on a ground was that: noise that is as often up as down cuts half.
+const CUT: f32 = 0.4;
 /// A ground is black or white when it is no further off than this.
 const CLEAN: f32 = 0.002;
 
@@ -16,10 +18,15 @@ pub(in crate::extract) fn whitened(picture: &Picture) -> Option<Picture> {
 
 /// The picture with all of that colour made white.
 pub(in crate::extract) fn whitened_from(picture: &Picture, ground: [f32; 3]) -> Picture {
+    replaced(picture, ground, [1.0; 3])
+}
+
+/// The picture with all of a colour made another one.
+pub(in crate::extract) fn replaced(picture: &Picture, colour: [f32; 3], by: [f32; 3]) -> Picture {
     let [near, far] = DISTANCE;
     let pixels = picture.pixels.as_chunks::<3>().0.iter().flat_map(|pixel| {
-        let scene = ((distance(pixel, ground) - near) / (far - near)).clamp(0.0, 1.0);
-        pixel.map(|v| v * scene + (1.0 - scene))
+        let kept = ((distance(pixel, colour) - near) / (far - near)).clamp(0.0, 1.0);
+        std::array::from_fn::<f32, 3, _>(|c| pixel[c] * kept + by[c] * (1.0 - kept))
     });
     Picture {
         pixels: pixels.collect(),
@@ -39,9 +46,25 @@ pub(in crate::extract) fn colour(picture: &Picture) -> Option<[f32; 3]> {
 /// The colour of the ground, whatever it is; `None` where the border is not of one colour.
 pub(in crate::extract) fn seen(picture: &Picture) -> Option<[f32; 3]> {
     let border = border(picture);
-    let colour: [f32; 3] = std::array::from_fn(|c| median(border.iter().map(|p| p[c]).collect()));
+    let colour = medians(&border);
     let count = border.iter().filter(|pixel| is_near(pixel, colour)).count();
     (!border.is_empty() && count as f32 >= SHARE * border.len() as f32).then_some(colour)
+}
+
+/// The colour that a ground had before noise, from the outermost pixels: their median in each channel, but white or black
+/// where noise was cut there, of half of the pixels.
+pub(in crate::extract) fn before_noise(picture: &Picture) -> [f32; 3] {
+    let border = border(picture);
+    let median = medians(&border);
+    std::array::from_fn(|c| {
+        let cut = |level: f32| border.iter().filter(|pixel| pixel[c] == level).count();
+        let was = |level: f32| cut(level) as f32 >= CUT * border.len() as f32;
+        [0.0, 1.0].into_iter().find(|level| was(*level)).unwrap_or(median[c])
+    })
+}
+
+fn medians(pixels: &[[f32; 3]]) -> [f32; 3] {
+    std::array::from_fn(|c| median(pixels.iter().map(|pixel| pixel[c]).collect()))
 }
 
 /// Whether a pixel may be of a ground of this colour.
