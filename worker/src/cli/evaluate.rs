@@ -264,7 +264,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or(ShippedClip::NEWEST),
+        Extractor::Clip => clip.unwrap_or_else(|| ShippedClip::for_bits(bits)),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {
@@ -277,7 +277,7 @@ fn engine(
     let known = path.is_file().then(|| Key::read(&path)).transpose()?;
     let known = match arguments.extractor {
         Extractor::Clip => {
-            let (_, identity) = load::clip(clip, &compute, Parts::Image)?;
+            let (_, identity) = load::clip(name, &compute, Parts::Image)?;
             // A key of another CLIP of that name is one of an earlier version.
             known.filter(|key| key.clip.hash == identity.hash)
         }

@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::read::Views;
 use crate::error::{Error, Result};
-use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, hypotheses};
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, hypotheses, read_given};
 use guardsplat_engine::picture::Picture;
 
 /// Views of a claim about pictures.
@@ -184,8 +184,7 @@ impl Suspect {
         if searched {
             return Ok(Self::Searched(PictureLogits::read(engine, picture, &[])?));
         }
-        let logits = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
-        Ok(Self::AsGiven(logits))
+        Ok(Self::AsGiven(read_given(engine, picture)?))
     }
 
     fn as_given(&self) -> &[f32] {

@@ -1,6 +1,6 @@
 //! Makes a key for the CLIP of a name.
 use guardsplat_engine::Result;
-use guardsplat_engine::clip::Parts;
+use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::Compute;
 use guardsplat_engine::extract::rasterizer;
 use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
@@ -22,7 +22,7 @@ pub struct ProjectionOverrides {
     pub keep: Option<usize>,
 }
 
-/// Makes a key for the CLIP called `clip`, the shipped one without a name.
+/// Makes a key for the CLIP called `clip`, without a name for the shipped one that is for messages of that length.
 pub fn create(
     options: &KeyOptions,
     overrides: ProjectionOverrides,
@@ -31,7 +31,8 @@ pub fn create(
     stop: &Stop,
     progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
-    let (clip, identity) = load::clip(clip, compute, Parts::Both)?;
+    let name = clip.unwrap_or_else(|| ShippedClip::for_bits(options.bits));
+    let (clip, identity) = load::clip(name, compute, Parts::Both)?;
     let ranked = clip.config.is_ranked();
     let kind = overrides.decoder.unwrap_or(match ranked {
         true => DecoderKind::Linear,

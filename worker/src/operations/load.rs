@@ -16,9 +16,8 @@ pub fn cameras(path: Option<&Path>) -> Result<Vec<Camera>> {
     Ok(path.map(read_cameras).transpose()?.unwrap_or_default())
 }
 
-/// The CLIP of that name, the newest shipped one without a name.
-pub fn clip(name: Option<&str>, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
-    let name = name.unwrap_or(ShippedClip::NEWEST);
+/// The CLIP of that name: a shipped one, or one that was added.
+pub fn clip(name: &str, compute: &Compute, parts: Parts) -> Result<(Clip, ClipIdentity)> {
     let clip = match ShippedClip::named(name) {
         Some(shipped) => shipped.load(&compute.device, parts)?,
         None => Clip::load(&Models::open()?.dir(name)?, &compute.device, parts)?,
@@ -51,7 +50,7 @@ pub fn engine(
     let mut engine = match &key.decoding {
         Decoding::Clip { .. } => {
             let name = clip_name.unwrap_or(&key.clip.name);
-            let (clip, identity) = clip(Some(name), &compute, Parts::Image)?;
+            let (clip, identity) = clip(name, &compute, Parts::Image)?;
             key.require_clip(path, &identity)?;
             Engine::new(compute, clip, key, lpips)?
         }

@@ -1,10 +1,13 @@
-//! The CLIPs that are part of the program: the newest, which new keys read with, and those of before, whose marks are read
-//! for ever. `docs/clip.md` tells how they came about.
+//! The CLIPs that are part of the program: those that new keys read with, by the length of their messages, and those of
+//! before, whose marks are read for ever. `docs/clip.md` tells how they came about.
 use super::{Clip, ClipConfig, ClipModel, Parts, TensorFile, weights_path};
 use crate::error::{Error, Result};
 use burn::module::Module;
 use burn::tensor::Device;
 use std::path::Path;
+
+/// The variable that names a folder to use instead of the newest.
+const INSTEAD: &str = "GUARDSPLAT_CLIP";
 
 /// A CLIP that is part of the program.
 pub struct ShippedClip {
@@ -16,13 +19,24 @@ pub struct ShippedClip {
     whole: Option<&'static str>,
 }
 
-/// The newest.
+/// The newest for messages of any length.
 const NEWEST: ShippedClip = ShippedClip {
     name: "guardsplat-2",
     config: include_str!("../../models/guardsplat-2/config.json"),
     weights: include_bytes!("../../models/guardsplat-2/model.safetensors"),
     whole: None,
 };
+
+/// For short messages: of lower radians, which stand more and tell fewer messages apart.
+const SHORT: ShippedClip = ShippedClip {
+    name: "guardsplat-short",
+    config: include_str!("../../models/guardsplat-short/config.json"),
+    weights: include_bytes!("../../models/guardsplat-short/model.safetensors"),
+    whole: None,
+};
+
+/// The longest message that [`SHORT`] is for. Of 32 bits it reads a scene of few colours at 93 %, where the newest reads 97.
+const SHORT_BITS: usize = 16;
 
 /// The first, of November 2026: all pixels weigh alike.
 const FIRST: ShippedClip = ShippedClip {
@@ -34,9 +48,18 @@ const FIRST: ShippedClip = ShippedClip {
 
 impl ShippedClip {
     /// All of them, the newest first.
-    pub const ALL: [Self; 2] = [NEWEST, FIRST];
-    /// What the newest is called.
+    pub const ALL: [Self; 3] = [NEWEST, SHORT, FIRST];
+    /// What the newest for messages of any length is called.
     pub const NEWEST: &'static str = NEWEST.name;
+
+    /// What a new key for messages of so many bits reads with: the newest, or where they are few the one for short
+    /// messages, unless `$GUARDSPLAT_CLIP` takes the place of the newest.
+    pub fn for_bits(bits: usize) -> &'static str {
+        match bits <= SHORT_BITS && std::env::var_os(INSTEAD).is_none() {
+            true => SHORT.name,
+            false => NEWEST.name,
+        }
+    }
 
     /// The one of this name.
     pub fn named(name: &str) -> Option<Self> {
@@ -84,7 +107,7 @@ impl ShippedClip {
     }
 
     fn instead(&self) -> Option<std::ffi::OsString> {
-        std::env::var_os("GUARDSPLAT_CLIP").filter(|_| self.name == Self::NEWEST)
+        std::env::var_os(INSTEAD).filter(|_| self.name == Self::NEWEST)
     }
 }
 
@@ -105,9 +128,13 @@ mod tests {
 
     #[test]
     fn names_and_hashes_differ() {
-        let [newest, first] = ShippedClip::ALL.map(|clip| (clip.name, clip.hash().unwrap()));
-        assert_ne!(newest.0, first.0);
-        assert_ne!(newest.1, first.1);
+        let [newest, short, first] = ShippedClip::ALL.map(|clip| (clip.name, clip.hash().unwrap()));
+        for (a, b) in [(&newest, &short), (&short, &first), (&newest, &first)] {
+            assert!(a.0 != b.0 && a.1 != b.1, "{a:?} {b:?}");
+        }
         assert_eq!(newest.0, ShippedClip::NEWEST);
+        for (bits, name) in [(8, short.0), (16, short.0), (17, newest.0), (64, newest.0)] {
+            assert_eq!(ShippedClip::for_bits(bits), name, "{bits}");
+        }
     }
 }

@@ -3,7 +3,7 @@ use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
 use super::view_pool::PooledView;
 use crate::error::Result;
-use crate::extract::{Engine, PooledLogits, default_size};
+use crate::extract::{Engine, default_size, read_pictures};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
@@ -64,7 +64,7 @@ impl EarlyStopping {
             .zip(&pictures)
             .map(|(view, picture)| psnr(&view.reference, picture))
             .collect::<Result<Vec<Psnr>>>()?;
-        let reading = PooledLogits::new(engine.read_logits(&pictures)?)?;
+        let reading = read_pictures(engine, &pictures)?;
         let check = Check {
             step,
             bit_accuracy: reading.compare(message, &engine.acceptance_rule(1))?.bit_accuracy,

@@ -1,7 +1,7 @@
 //! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views.
 use super::settings::Settings;
 use crate::error::{Error, Result};
-use crate::extract::{Comparison, Engine, PooledLogits, default_size};
+use crate::extract::{Comparison, Engine, PooledLogits, default_size, read_given};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
@@ -63,7 +63,7 @@ pub fn verify(
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let [before, after] = [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
         let after = after?;
-        logits.extend(engine.read_logits(std::slice::from_ref(&after))?);
+        logits.push(read_given(engine, &after)?);
         let before = before?;
         let mask = covered(&before, &engine.picture(original, &camera, [0.0; 3])?)?;
         of_covered.extend(psnr_covered(&before, &after, &mask)?);

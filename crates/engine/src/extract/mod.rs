@@ -64,7 +64,7 @@ pub fn read_scene(
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let picture = engine.picture(gaussians, &camera, background)?;
-        logits.extend(engine.read_logits(std::slice::from_ref(&picture))?);
+        logits.push(read_given(engine, &picture)?);
         done(index + 1, &picture)?;
     }
     PooledLogits::new(logits)

@@ -7,7 +7,6 @@
 mod candidates;
 mod joint;
 mod parts;
-mod plain;
 mod sample;
 mod score;
 mod search;
@@ -23,7 +22,6 @@ use crate::picture::Picture;
 use candidates::Search;
 pub(super) use joint::chosen;
 use parts::{Part, parts};
-use plain::without_plain_areas;
 
 /// Corrected pictures that are read together.
 const BATCH: usize = 16;
@@ -78,8 +76,6 @@ impl BlindReading {
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture, others: &[&Self]) -> Result<Self> {
-        let drawn = without_plain_areas(picture);
-        let picture = drawn.as_ref().unwrap_or(picture);
         let whole = engine.resized(picture)?;
         let parts = parts(engine, picture, &whole)?;
         let mut search = Search::of_parts(engine, &whole, &parts)?;

@@ -1,10 +1,14 @@
-//! Restoration: noise is taken out of a picture before it is read.
+//! Restoration: what is not of the scene is taken out of a picture before it is read.
 //!
-//! A tower of sines reads exact colours, so that noise blurs what it reads. Worse, a white ground with noise is not white any
-//! more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers more of a
-//! picture than the scene does. Nothing is guessed for it: the picture alone decides, so no claim pays for it.
+//! - **Noise.** A tower of sines reads exact colours, so that noise blurs what it reads. Worse, a white ground with noise is
+//!   not white any more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers
+//!   more of a picture than the scene does.
+//! - **Plain areas with sharp edges**: covers and boxes that somebody drew.
+//!
+//! Nothing is guessed: the picture alone decides, so that no claim pays for it.
 mod median;
 mod noise;
+mod plain;
 
 use std::borrow::Cow;
 
@@ -33,10 +37,14 @@ pub fn read_given(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
 
 /// The picture as it is read; as it is where there is no noise, or the extractor does not read exact colours.
 pub(super) fn restored<'a>(engine: &Engine, picture: &'a Picture) -> Cow<'a, Picture> {
-    match engine.extractor.reads_exact_colours() && noise::deviation(picture) >= NOISE {
+    if !engine.extractor.reads_exact_colours() {
+        return Cow::Borrowed(picture);
+    }
+    let clear = match noise::deviation(picture) >= NOISE {
         true => Cow::Owned(without_noise(picture)),
         false => Cow::Borrowed(picture),
-    }
+    };
+    plain::without_plain_areas(&clear).map_or(clear, Cow::Owned)
 }
 
 /// The picture after a median filter, its ground in the one colour that it had.
