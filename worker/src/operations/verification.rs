@@ -174,9 +174,10 @@ pub struct Compared {
     pub ignored: Vec<Ignored>,
 }
 
-/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read under every
-/// other hypothesis besides, and each pays by its share of the rate ([`shares`]): half is for pictures as they are, so that
-/// those who change nothing hardly pay for those who do.
+/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read under every other
+/// hypothesis besides, and so are those of a message that is too short to match, unless all of it is right. Each hypothesis
+/// pays by its share of the rate ([`shares`]): half is for pictures as they are, so that those who change nothing hardly pay
+/// for those who do.
 pub fn read_and_compare(
     engine: &Engine,
     source: &Source,
@@ -201,7 +202,9 @@ pub fn read_and_compare(
     // Without pictures there is nothing to guess. With them the first reading has what it would have among all.
     let given = if source.pictures.is_empty() { 1 } else { 2 };
     let as_given = best.reading.compare(message, &engine.acceptance_rule(given))?;
-    let decided = given == 1 || as_given.decision.verdict != Verdict::NoMatch;
+    // Of a message that is too short for a match the best reading is told all the same.
+    let all = as_given.decision.matched_bits as usize == message.len();
+    let decided = given == 1 || all || as_given.decision.verdict == Verdict::Match;
     let mut p_value = as_given.decision.p_value;
     best.comparison = Some(as_given);
     if decided {
