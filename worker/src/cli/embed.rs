@@ -17,8 +17,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Budget, Exit, Kind, print_json, print_line};
-use crate::operations::embed_settings::chosen;
-use crate::operations::{comparison_sheet, load};
+use guardsplat_operations::embed_settings::chosen;
+use guardsplat_operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {

@@ -17,7 +17,7 @@ use guardsplat_engine::view::{Extent, Openness, SceneKind, Split, ViewSampler};
 use serde::Serialize;
 
 use super::{Budget, Exit, Kind, print_json, print_line};
-use crate::operations::load;
+use guardsplat_operations::load;
 
 /// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
 const SIDE: u32 = 160;

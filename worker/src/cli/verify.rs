@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, Kind, print_json, print_line};
-use crate::operations::load;
-use crate::operations::verification::{VerificationReport, Views, read_and_compare};
+use guardsplat_operations::load;
+use guardsplat_operations::verification::{VerificationReport, Views, read_and_compare};
 
 #[derive(Args)]
 pub struct Arguments {

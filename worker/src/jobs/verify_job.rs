@@ -10,9 +10,9 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::operations::load;
-use crate::operations::thumbnails::Thumbnails;
-use crate::operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
+use guardsplat_operations::load;
+use guardsplat_operations::thumbnails::Thumbnails;
+use guardsplat_operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {

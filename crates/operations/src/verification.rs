@@ -11,7 +11,7 @@ use guardsplat_engine::scene::{BadRows, Ignored, Scene};
 use guardsplat_engine::view::{Camera, SceneKind, ViewSampler, Viewpoints};
 use serde::Serialize;
 
-use super::thumbnails::Thumbnails;
+use crate::thumbnails::Thumbnails;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";

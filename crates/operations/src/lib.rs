@@ -1,0 +1,8 @@
+//! What programs do with the engine, from what users choose to what they are told: shared by the offline commands, the
+//! jobs of a server and the Python package, so that all give the same bytes and figures. No command line, no gRPC.
+pub mod comparison_sheet;
+pub mod create_key;
+pub mod embed_settings;
+pub mod load;
+pub mod thumbnails;
+pub mod verification;
