@@ -40,7 +40,7 @@ def test_marks_in_memory_are_those_of_the_file(
 ) -> None:
     of_file = guardsplat.load_gaussians(marked)
     assert np.array_equal(in_memory.sh0, of_file["sh0"]) and np.array_equal(in_memory.shN, of_file["shN"])
-    assert in_memory.report.message_recovered
+    assert in_memory.report.bit_accuracy > 0.9 and in_memory.report.written
     splats = {**splats, "sh0": in_memory.sh0, "shN": in_memory.shN}
     guardsplat.save_gaussians(folder / "exported.ply", **splats)
     assert (folder / "exported.ply").read_bytes() == marked.read_bytes()
