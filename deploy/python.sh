@@ -4,6 +4,7 @@
 #
 #     deploy/python.sh              all of that
 #     deploy/python.sh wheel DIR    a wheel to hand out
+#     deploy/python.sh protos       generates python/guardsplat/v1 from the protos anew
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 target=$(mkdir -p "${CARGO_TARGET_DIR:-target}" && cd "${CARGO_TARGET_DIR:-target}" && pwd)
@@ -24,6 +25,12 @@ if ! cmp -s "$requirements" "$tools/installed.txt"; then
         "$tools/bin/pip" install --quiet --disable-pip-version-check --requirement "$requirements"; } ||
         unchecked "what tests need ($requirements) could not be fetched from PyPI"
     cp "$requirements" "$tools/installed.txt"
+fi
+if [ "${1:-}" = protos ]; then
+    cd proto
+    "$tools/bin/python" -m grpc_tools.protoc -I . --python_out=../python --pyi_out=../python \
+        guardsplat/v1/{artifact_service,job,job_service,key_service,registry_service}.proto
+    exit
 fi
 maturin=("$tools/bin/maturin" build --quiet --release --locked --manifest-path python/Cargo.toml)
 

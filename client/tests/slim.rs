@@ -73,7 +73,7 @@ const OF_SERVICES: [&str; 7] = [
 
 #[test]
 fn the_engine_and_what_is_done_with_it_know_no_service() {
-    for package in ["guardsplat-engine", "guardsplat-operations"] {
+    for package in ["guardsplat-engine", "guardsplat-operations", "guardsplat-python"] {
         let found = dependencies(package);
         for name in OF_SERVICES {
             assert!(!found.iter().any(|found| found == name), "{package}: {name}");

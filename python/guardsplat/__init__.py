@@ -11,6 +11,8 @@
 Keys are secret: whoever has one can read, forge and remove its marks.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from ._cameras import Camera, read_cameras, write_cameras
 from ._embed import MarkedColours, embed, embed_gaussians
 from ._engine import Key, __version__
@@ -26,16 +28,39 @@ from .errors import (
     BadOption,
     BadPicture,
     BadScene,
+    DamagedDownload,
     DeviceError,
     DoesNotFit,
     FileError,
     GuardSplatError,
+    JobCancelled,
+    JobFailed,
     NotFinite,
+    ServerLost,
+    ServiceError,
     Stopped,
     TargetMissed,
 )
 
+if TYPE_CHECKING:
+    from ._client.aio import AsyncClient
+    from ._client.client import Client
+
+
+def __getattr__(name: str) -> Any:
+    # The engine does without grpcio; clients are loaded when they are asked for.
+    if name not in ("Client", "AsyncClient"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from ._client.aio import AsyncClient
+        from ._client.client import Client
+    except ImportError as error:
+        raise ImportError(f"{error}; pip install 'guardsplat[client]'", name=error.name) from error
+    return Client if name == "Client" else AsyncClient
+
+
 __all__ = [
+    "AsyncClient",
     "BadCameras",
     "BadKey",
     "BadModel",
@@ -43,16 +68,22 @@ __all__ = [
     "BadPicture",
     "BadScene",
     "Camera",
+    "Client",
+    "DamagedDownload",
     "DeviceError",
     "DoesNotFit",
     "EmbedReport",
     "FileError",
     "GuardSplatError",
     "Inspection",
+    "JobCancelled",
+    "JobFailed",
     "Key",
     "MarkedColours",
     "NotFinite",
     "Progress",
+    "ServerLost",
+    "ServiceError",
     "Stopped",
     "TargetMissed",
     "Verdict",

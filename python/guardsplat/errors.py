@@ -113,3 +113,66 @@ class TargetMissed(GuardSplatError, RuntimeError):
     def __init__(self, message: str, *, report: Any = None, **named: Any) -> None:
         super().__init__(message, **named)
         self.report = report
+
+
+class ServiceError(GuardSplatError, RuntimeError):
+    """A server refused a call.
+
+    ``code`` is that of gRPC (``NOT_FOUND``), ``reason`` the server's for programs, ``field`` the first field of the request
+    that is wrong, ``violations`` what is wrong with each, ``metadata`` figures that go with the reason, and ``retry_after`` seconds after which
+    to try again, where the server says so.
+    """
+
+    code: str
+    reason: str | None
+    violations: dict[str, str]
+    metadata: dict[str, str]
+    retry_after: float | None
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: str = "UNKNOWN",
+        reason: str | None = None,
+        violations: dict[str, str] | None = None,
+        metadata: dict[str, str] | None = None,
+        retry_after: float | None = None,
+        **named: Any,
+    ) -> None:
+        super().__init__(message, **named)
+        self.code = code
+        self.reason = reason
+        self.violations = violations or {}
+        self.metadata = metadata or {}
+        self.retry_after = retry_after
+
+
+class ServerLost(ServiceError, ConnectionError):
+    """The server can't be reached, or was not for as long as it was waited for. Jobs go on without their client."""
+
+
+class JobFailed(GuardSplatError, RuntimeError):
+    """A job failed: ``job`` is its name and ``reason`` why, such as ``TARGET_MISSED`` or ``INVALID_INPUT``."""
+
+    job: str
+    reason: str
+
+    def __init__(self, message: str, *, job: str = "", reason: str = "", **named: Any) -> None:
+        super().__init__(message, **named)
+        self.job = job
+        self.reason = reason
+
+
+class JobCancelled(GuardSplatError, RuntimeError):
+    """A job, named by ``job``, was cancelled."""
+
+    job: str
+
+    def __init__(self, message: str, *, job: str = "", **named: Any) -> None:
+        super().__init__(message, **named)
+        self.job = job
+
+
+class DamagedDownload(GuardSplatError, RuntimeError):
+    """What arrived for ``path`` is not what was announced; nothing was written."""

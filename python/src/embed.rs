@@ -149,7 +149,7 @@ pub fn embed_gaussians<'py>(
     let (inner, path) = (&*key.inner, &key.path);
     let (report, colours) = run(py, progress, |context| {
         let engine = chosen.engine(path, inner, context)?;
-        let (colours, outcome) = guardsplat_engine::embed::embed_gaussians(
+        let (colours, mut outcome) = guardsplat_engine::embed::embed_gaussians(
             &engine,
             gaussians,
             &message,
@@ -157,6 +157,7 @@ pub fn embed_gaussians<'py>(
             &chosen.cameras,
             &mut |progress| tell(context, progress),
         )?;
+        outcome.written |= chosen.force;
         let report = EmbedReport::of(&outcome, &engine, inner, chosen.preset, start.elapsed());
         Ok((json(&report)?, colours))
     })?;
