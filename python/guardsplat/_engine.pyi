@@ -1,5 +1,6 @@
 """The native half of the package: ``python/src`` in Rust."""
 
+import os
 from typing import TypedDict, final
 
 from ._progress import ProgressTo
@@ -81,12 +82,12 @@ class Key:
         Without a seed it is random. With one it can be made again, and is no more secret than the seed.
         """
     @staticmethod
-    def load(path: str) -> Key:
+    def load(path: str | os.PathLike[str]) -> Key:
         """Reads a key file."""
     @staticmethod
     def from_bytes(data: bytes) -> Key:
         """A key from the bytes of its file."""
-    def save(self, path: str) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the key file, readable by its owner only; a file that is there is replaced."""
     def to_bytes(self) -> bytes:
         """The bytes of the key file. They hold the secret."""

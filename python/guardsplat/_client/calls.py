@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -191,15 +191,11 @@ class _Destination:
         self.written = 0
         if path.is_dir():
             raise FileError(f"{path}: a folder, not a file to write", path=path)
+        self._aside = path.parent / f".guardsplat-{uuid.uuid4().hex}.part"
         try:
-            number, self._aside = tempfile.mkstemp(prefix=".guardsplat-", suffix=".part", dir=path.parent)
+            self._file = open(self._aside, "xb")
         except OSError as error:
             raise _failed(path)(error) from error
-        # As any new file: the umask takes away what others may not do.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.fchmod(number, 0o666 & ~mask)
-        self._file = os.fdopen(number, "wb")
 
     def announced(self, artifact: artifacts.Artifact) -> None:
         if self._artifact is not None and self._artifact.sha256 != artifact.sha256:
@@ -228,7 +224,7 @@ class _Destination:
 
     def close(self) -> None:
         self._file.close()
-        Path(self._aside).unlink(missing_ok=True)
+        self._aside.unlink(missing_ok=True)
 
     def _damaged(self, reason: str) -> DamagedDownload:
         return DamagedDownload(f"{self._path}: {reason}", path=self._path)

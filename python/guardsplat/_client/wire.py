@@ -237,9 +237,7 @@ class Waiting:
             return done.value
 
     def _carry_out(self, step: Step) -> Any:
-        if isinstance(step, Call):
-            return self._methods.start(step.method, step.request, step.timeout)
-        if isinstance(step, Open):
+        if isinstance(step, (Call, Open)):
             return self._methods.start(step.method, step.request, step.timeout)
         if isinstance(step, Read):
             return next(step.stream, None)
