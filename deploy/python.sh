@@ -44,4 +44,4 @@ rm -rf "$target/python-wheel"
 CARGO="$PWD/deploy/cargo-workspace.sh" "${maturin[@]}" --compression-level 1 --out "$target/python-wheel"
 "$tools/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$target/python-wheel"/*.whl
 (cd python && "$tools/bin/mypy")
-GUARDSPLAT_PROGRAMS="$target/release" "$tools/bin/pytest" --config-file python/pyproject.toml --quiet python/tests
+CARGO_TARGET_DIR=$target "$tools/bin/pytest" --config-file python/pyproject.toml --quiet python/tests

@@ -11,8 +11,10 @@ import guardsplat
 import pytest
 
 MESSAGE = "c0ffee42"
-# The folder of the programs; deploy/python.sh sets it.
-PROGRAMS = Path(os.environ.get("GUARDSPLAT_PROGRAMS", Path(__file__).parents[2] / "target/release"))
+# Where cargo puts the programs.
+PROGRAMS = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")).resolve() / "release"
+# What the programs would take for settings is not of the tests.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("GUARDSPLAT_")}
 # Quick, and to the byte what the same machine computes again. A draft may miss its target, which is not what is tested.
 QUICK: dict[str, Any] = {"preset": "draft", "device": "cpu", "seed": 3, "force": True}
 
@@ -20,7 +22,7 @@ QUICK: dict[str, Any] = {"preset": "draft", "device": "cpu", "seed": 3, "force":
 def worker(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Runs the worker's program."""
     command = [str(PROGRAMS / "guardsplat-worker"), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=ENVIRONMENT)
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from typing import Any
 import guardsplat
 import numpy as np
 import pytest
-from conftest import MESSAGE, PROGRAMS
+from conftest import ENVIRONMENT, MESSAGE, PROGRAMS
 
 grpc = pytest.importorskip("grpc")
 
@@ -35,7 +35,7 @@ class Server:
         options = ["--embedded-worker", "true", "--worker-device", "cpu"]
         log = open(self.folder / "server.log", "a", encoding="utf-8")
         self.process = subprocess.Popen(
-            [*map(str, command), *options], stdout=subprocess.PIPE, stderr=log, text=True
+            [*map(str, command), *options], stdout=subprocess.PIPE, stderr=log, text=True, env=ENVIRONMENT
         )
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
