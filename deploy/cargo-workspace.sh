@@ -8,4 +8,6 @@ fi
 # maturin tells build scripts which Python it found; the stable interface is the same for all, and another environment
 # would be another build.
 unset PYO3_PYTHON PYO3_CONFIG_FILE PYO3_ENVIRONMENT_SIGNATURE PYO3_BUILD_EXTENSION_MODULE CARGO_ENCODED_RUSTFLAGS
-exec cargo build --release --workspace --locked --message-format json-render-diagnostics
+# TARGETS_BUILT is what the caller has built, all programs unless given: with tests, some dependencies have more features.
+# shellcheck disable=SC2086
+exec cargo build --release --workspace --locked ${TARGETS_BUILT:-} --message-format json-render-diagnostics

@@ -109,9 +109,9 @@ def test_verdicts(client: guardsplat.Client, of_server: Path, scene: Path, folde
     for index, picture in enumerate(guardsplat.render(of_server, views=2, device="cpu")):
         plt.imsave(views / f"{index}.png", picture)
     found = client.verify(views, key="website", message=MESSAGE)
-    assert found.Verdict.Name(found.verdict) == "VERDICT_MATCH" and found.views == 2
+    assert found.verdict == found.VERDICT_MATCH and found.views == 2
     none = client.verify(scene, key="website", message=MESSAGE, views=5)
-    assert none.Verdict.Name(none.verdict) == "VERDICT_NO_MATCH" and none.views == 5
+    assert none.verdict == none.VERDICT_NO_MATCH and none.views == 5
 
 
 def test_a_request_said_again_is_one_job(client: guardsplat.Client, server: Server, website: Any, scene: Path) -> None:
@@ -174,6 +174,8 @@ def test_the_registry(client: guardsplat.Client, scene: Path) -> None:
     assert [one.display_name for one in client.list_owners()] == ["Studio Nord"]
     assert client.public_key().pem.startswith("-----BEGIN PUBLIC KEY-----")
     assert "assets" in [key.display_name for key in client.list_keys()]
+    claim = client.verify(scene, key="assets", owner="Studio Nord", views=2)
+    assert claim.verdict == claim.VERDICT_NO_MATCH and claim.assets == 1
 
 
 def test_files_there_and_back(client: guardsplat.Client, tmp_path: Path) -> None:
@@ -254,7 +256,7 @@ def test_the_twin_in_an_event_loop(server: Server, scene: Path, marked: Path, tm
                 client.verify(marked, key=key.name, message=MESSAGE),
             )
             assert result.bit_accuracy > 0.9 and scenes
-            assert verdict.Verdict.Name(verdict.verdict) == "VERDICT_MATCH"
+            assert verdict.verdict == verdict.VERDICT_MATCH
             assert (tmp_path / "out.ply").read_bytes() == marked.read_bytes()
             with pytest.raises(guardsplat.ServiceError) as none:
                 await client.get_job(f"jobs/{uuid.uuid4()}")

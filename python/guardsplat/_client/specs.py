@@ -72,7 +72,7 @@ class Verify(Submission, total=False):
     asset: str
     """The claim that this asset's mark is there."""
     owner: str
-    """The claim that the mark of one of this owner's assets is there."""
+    """The claim that the mark of one of this owner's assets is there: ``owners/{owner}``, or a name."""
     search: bool
     """Searches all assets of the key."""
     views: int

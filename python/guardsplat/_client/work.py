@@ -49,6 +49,8 @@ class Work(Calls):
         verify_spec([], "", "", options)
         inputs = _inputs(suspects)
         key = yield from self.key(options["key"])
+        if options.get("owner"):
+            options = {**options, "owner": (yield from self.owner(options["owner"]))}
 
         def spec(names: list[str], cameras: str) -> jobs.Job:
             return jobs.Job(verify=verify_spec(list(dict.fromkeys(names)), key, cameras, options))
