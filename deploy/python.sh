@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The Python package: builds its wheel from what the workspace is built as, so that nothing is built twice, installs it into
-# an environment of its own below target/, checks its types and runs its tests.
+# an environment of its own below target/, checks style and types and runs its tests.
 #
 #     deploy/python.sh              all of that
 #     deploy/python.sh wheel DIR    a wheel to hand out
@@ -43,5 +43,7 @@ rm -rf "$target/python-wheel"
 # One that is thrown away need not be small.
 CARGO="$PWD/deploy/cargo-workspace.sh" "${maturin[@]}" --compression-level 1 --out "$target/python-wheel"
 "$tools/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$target/python-wheel"/*.whl
+"$tools/bin/ruff" check --quiet python tools/python_overhead.py
+"$tools/bin/ruff" format --quiet --check python
 (cd python && "$tools/bin/mypy")
 CARGO_TARGET_DIR=$target "$tools/bin/pytest" --config-file python/pyproject.toml --quiet python/tests

@@ -44,7 +44,7 @@ with tempfile.TemporaryDirectory() as folder:
     for _ in range(times):
         for name, command in runs.items():
             found[name].append(timed(command))
-            print(name, "wall %.2f s, processor %.2f s" % found[name][-1], flush=True)
+            print(name, "wall {:.2f} s, processor {:.2f} s".format(*found[name][-1]), flush=True)
     assert by_worker.read_bytes() == by_python.read_bytes()
 for place, what in enumerate(("wall", "processor")):
     worker, python = (statistics.median(run[place] for run in found[name]) for name in runs)

@@ -1,9 +1,10 @@
 """From a sample scene to a verdict, with plots; cells as notebooks have them. Needs matplotlib."""
 
 # %% A scene and a key. Any PLY, SPZ, SOG, glTF or .splat will do; keep the key file secret.
-import guardsplat
 import matplotlib.pyplot as plt
 import numpy as np
+
+import guardsplat
 
 guardsplat.sample("scene.ply", gaussians=20_000, seed=1)
 key = guardsplat.Key.create(bits=32, seed=7)
@@ -14,7 +15,9 @@ steps = []
 report = guardsplat.embed(
     "scene.ply", "marked.ply", key=key, message="c0ffee42", preset="draft", force=True, progress=steps.append
 )
-print(f"{report.bit_accuracy:.1%} of bits a view, PSNR {report.psnr_db:.1f} dB, {report.seconds:.0f} s on {report.device}")
+print(
+    f"{report.bit_accuracy:.1%} of bits a view, PSNR {report.psnr_db:.1f} dB, {report.seconds:.0f} s on {report.device}"
+)
 
 # %% How it was learned.
 learned = [step for step in steps if step.stage == "optimising"]

@@ -110,11 +110,22 @@ def embed(
         GuardSplatError: whatever else went wrong; nothing was written.
     """
     options = _options(
-        preset, seed, device, cameras, kind, size, robust_to, learn, ring, settings, clip, force, ignore_bad_rows, memory
+        preset,
+        seed,
+        device,
+        cameras,
+        kind,
+        size,
+        robust_to,
+        learn,
+        ring,
+        settings,
+        clip,
+        force,
+        ignore_bad_rows,
+        memory,
     )
-    text = _engine.embed(
-        os.fspath(path_in), os.fspath(path_out), key_of(key), message_of(message), options, progress
-    )
+    text = _engine.embed(os.fspath(path_in), os.fspath(path_out), key_of(key), message_of(message), options, progress)
     return _handed_out(report_of(EmbedReport, text), force)
 
 

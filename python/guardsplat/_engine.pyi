@@ -104,9 +104,7 @@ class Key:
     def bit_accuracy_unseen(self) -> float | None:
         """Share of bits that its decoder reads right of messages it was not made with."""
 
-def embed(
-    input: str, output: str, key: Key, message: str, options: EmbedOptions, progress: ProgressTo
-) -> str: ...
+def embed(input: str, output: str, key: Key, message: str, options: EmbedOptions, progress: ProgressTo) -> str: ...
 def embed_gaussians(
     arrays: Arrays, key: Key, message: str, options: EmbedOptions, progress: ProgressTo
 ) -> tuple[str, bytearray]: ...

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, Union
+from typing import Any, Protocol
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Progress:
     """Mean PSNR of these views in dB; ``None`` while they are identical."""
 
 
-ProgressTo = Union[Callable[[Progress], object], bool, None]
+ProgressTo = Callable[[Progress], object] | bool | None
 """A callback, which may raise to end the work; ``True`` for a bar (tqdm's where it is installed); or ``None``."""
 
 

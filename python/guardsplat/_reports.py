@@ -139,8 +139,7 @@ class Verdict:
         if self.p_value is None or self.threshold is None:
             return f"{words}: read {self.message}"
         return (
-            f"{words}: {self.matched_bits} of {self.bits} bits, "
-            f"p = {self.p_value:.2e} (threshold {self.threshold:g})"
+            f"{words}: {self.matched_bits} of {self.bits} bits, p = {self.p_value:.2e} (threshold {self.threshold:g})"
         )
 
 

@@ -120,9 +120,7 @@ def render(
     cameras their longer side. ``dtype`` is uint8, or float32 of values as rendered. With ``return_cameras`` a pair of the
     pictures and their cameras.
     """
-    options, kept = _options(
-        views, cameras, size, kind, background, seed, device, dtype, ignore_bad_rows, memory
-    )
+    options, kept = _options(views, cameras, size, kind, background, seed, device, dtype, ignore_bad_rows, memory)
     pictures, seen_by = _pictures(_engine.render(os.fspath(path), options, progress), kept)
     return (pictures, seen_by) if return_cameras else pictures
 

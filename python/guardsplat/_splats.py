@@ -87,9 +87,7 @@ def like(array: npt.NDArray[np.float32], given: Any) -> Any:
     return array.astype(array_of(given).dtype, copy=False)
 
 
-def load_gaussians(
-    path: str | os.PathLike[str], *, ignore_bad_rows: bool = False, memory: int | None = None
-) -> Splats:
+def load_gaussians(path: str | os.PathLike[str], *, ignore_bad_rows: bool = False, memory: int | None = None) -> Splats:
     """Reads a scene file of any format into arrays in gsplat's layout.
 
     Bands of spherical harmonics in which no Gaussian has anything but 0 are left out.

@@ -7,8 +7,9 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import guardsplat
 import pytest
+
+import guardsplat
 
 MESSAGE = "c0ffee42"
 # Where cargo puts the programs.
@@ -56,9 +57,7 @@ def told() -> list[guardsplat.Progress]:
 
 
 @pytest.fixture(scope="session")
-def report(
-    folder: Path, scene: Path, key: guardsplat.Key, told: list[guardsplat.Progress]
-) -> guardsplat.EmbedReport:
+def report(folder: Path, scene: Path, key: guardsplat.Key, told: list[guardsplat.Progress]) -> guardsplat.EmbedReport:
     return guardsplat.embed(scene, folder / "marked.ply", key=key, message=MESSAGE, progress=told.append, **QUICK)
 
 

@@ -8,9 +8,10 @@ import sys
 import time
 from pathlib import Path
 
-import guardsplat
 import pytest
 from conftest import MESSAGE
+
+import guardsplat
 
 PROGRAM = """
 import sys, guardsplat

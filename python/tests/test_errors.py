@@ -7,10 +7,11 @@ import pickle
 from pathlib import Path
 from typing import Any
 
-import guardsplat
 import numpy as np
 import pytest
 from conftest import MESSAGE
+
+import guardsplat
 
 
 def test_options_have_their_names_and_limits(scene: Path, key: guardsplat.Key, tmp_path: Path) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import guardsplat
 import numpy as np
 import pytest
 from conftest import MESSAGE, QUICK
+
+import guardsplat
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +66,9 @@ def test_bands_that_hold_nothing_stay_empty_and_precision_is_kept(splats: dict[s
 def test_tensors_come_back_as_tensors(splats: dict[str, Any], key: guardsplat.Key) -> None:
     torch = pytest.importorskip("torch")
     tensors = {name: torch.nn.Parameter(torch.from_numpy(array)) for name, array in splats.items()}
-    found = guardsplat.embed_gaussians(**tensors, key=key, message=MESSAGE, settings={"steps": 2}, force=True, device="cpu")
+    found = guardsplat.embed_gaussians(
+        **tensors, key=key, message=MESSAGE, settings={"steps": 2}, force=True, device="cpu"
+    )
     assert isinstance(found.sh0, torch.Tensor) and found.shN.shape == tensors["shN"].shape
 
 
@@ -105,9 +108,7 @@ def test_values_are_refused_with_row(
         ("scales", np.zeros((8000, 3), np.float16), "float32 or float64"),
     ],
 )
-def test_shapes_are_refused(
-    name: str, array: Any, limit: str, splats: dict[str, Any], key: guardsplat.Key
-) -> None:
+def test_shapes_are_refused(name: str, array: Any, limit: str, splats: dict[str, Any], key: guardsplat.Key) -> None:
     with pytest.raises(guardsplat.BadOption) as caught:
         guardsplat.embed_gaussians(**{**splats, name: array}, key=key, message=MESSAGE)
     assert (caught.value.field, caught.value.limit) == (name, limit)

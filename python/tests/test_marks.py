@@ -6,10 +6,11 @@ import json
 import threading
 from pathlib import Path
 
-import guardsplat
 import numpy as np
 import pytest
 from conftest import MESSAGE, worker
+
+import guardsplat
 
 
 def test_a_rendered_picture_matches_and_another_key_or_message_does_not(

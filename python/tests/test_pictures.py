@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import guardsplat
 import numpy as np
 import pytest
 from conftest import MESSAGE, worker
+
+import guardsplat
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,9 @@ def test_tensors(pictures: Any, key: guardsplat.Key) -> None:
     ],
     ids=["channels first", "grey", "int64", "nan", "0 to 255", "empty"],
 )
-def test_other_arrays_are_refused_with_row_and_limit(wrong: Any, limit: str, pictures: Any, key: guardsplat.Key) -> None:
+def test_other_arrays_are_refused_with_row_and_limit(
+    wrong: Any, limit: str, pictures: Any, key: guardsplat.Key
+) -> None:
     with pytest.raises(guardsplat.BadOption) as caught:
         read([pictures[0], wrong], key)
     error = caught.value

@@ -13,10 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import guardsplat
 import numpy as np
 import pytest
 from conftest import ENVIRONMENT, MESSAGE, PROGRAMS
+
+import guardsplat
 
 grpc = pytest.importorskip("grpc")
 
@@ -215,7 +216,14 @@ def test_a_server_that_dies_is_waited_for(tmp_path: Path, scene: Path) -> None:
         thread = threading.Thread(target=restart)
         thread.start()
         result = client.embed(
-            scene, tmp_path / "out.ply", key="website", message=MESSAGE, preset="draft", seed=3, force=True, progress=told
+            scene,
+            tmp_path / "out.ply",
+            key="website",
+            message=MESSAGE,
+            preset="draft",
+            seed=3,
+            force=True,
+            progress=told,
         )
         thread.join()
         assert result.bit_accuracy > 0.9 and (tmp_path / "out.ply").exists()

@@ -13,7 +13,8 @@ from ..v1 import job_service_pb2 as job_service
 from ..v1 import key_service_pb2 as keys
 from ..v1 import registry_service_pb2 as registry
 from .specs import Embed, EmbedAndWait, FileOrArtifact, KeyAndWait, Submission, Verify, VerifyAndWait
-from .wire import Looping, Target
+from .target import Target
+from .wire import Looping
 from .work import Work
 
 if TYPE_CHECKING:
@@ -129,7 +130,9 @@ class AsyncClient:
 
     async def delete_artifact(self, name: str) -> None:
         """Deletes an artifact."""
-        await self._driver.run(self._work.call("ArtifactService.DeleteArtifact", artifacts.DeleteArtifactRequest(name=name)))
+        await self._driver.run(
+            self._work.call("ArtifactService.DeleteArtifact", artifacts.DeleteArtifactRequest(name=name))
+        )
 
     async def list_keys(self) -> list[keys.Key]:
         """Keys, newest first."""

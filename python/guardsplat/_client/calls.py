@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import time
-import uuid
-from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from google.protobuf.message import Message
 
-from ..errors import DamagedDownload, FileError, ServerLost, ServiceError
+from ..errors import ServerLost, ServiceError
 from ..v1 import artifact_service_pb2 as artifacts
+from .files import Destination, metadata_of, requests_of
 from .wire import Call, Close, Open, Read, Sleep, Steps, Work
 
-_CHUNK = 1 << 20
 _PAGE = 1000
 _FIRST_PAUSE = 0.25
 _LONGEST_PAUSE = 10.0
@@ -60,14 +58,16 @@ class Calls:
                 break
         return found[:limit]
 
-    def upload(self, source: str | os.PathLike[str] | bytes, display_name: str | None = None) -> Steps[artifacts.Artifact]:
+    def upload(
+        self, source: str | os.PathLike[str] | bytes, display_name: str | None = None
+    ) -> Steps[artifacts.Artifact]:
         """Sends a file, or bytes, from the beginning again if the connection is lost."""
-        metadata = yield Work(lambda: _metadata(source, display_name))
+        metadata = yield Work(lambda: metadata_of(source, display_name))
         patience = self.patience()
         while True:
             try:
                 limit = self.timeout + metadata.size_bytes / _SLOWEST
-                sent = yield Call("ArtifactService.UploadArtifact", _requests(source, metadata), limit)
+                sent = yield Call("ArtifactService.UploadArtifact", requests_of(source, metadata), limit)
                 self.was_there = True
                 return sent
             except ServiceError as error:
@@ -83,14 +83,14 @@ class Calls:
 
     def download(self, name: str, path: str | os.PathLike[str]) -> Steps[artifacts.Artifact]:
         """Fetches an artifact into a file, whole or not at all, and goes on where a connection was lost."""
-        file = _Destination(Path(path))
+        file = Destination(Path(path))
         try:
             patience = self.patience()
             while True:
                 before = file.written
                 try:
                     artifact = yield from self._fetch(name, file)
-                    yield Work(lambda: file.finish(artifact))
+                    yield Work(partial(file.finish, artifact))
                     return artifact
                 except ServiceError as error:
                     if file.written > before:
@@ -99,7 +99,7 @@ class Calls:
         finally:
             file.close()
 
-    def _fetch(self, name: str, file: _Destination) -> Steps[artifacts.Artifact]:
+    def _fetch(self, name: str, file: Destination) -> Steps[artifacts.Artifact]:
         """One stream, from where the file ends."""
         request = artifacts.DownloadArtifactRequest(name=name, offset=file.written)
         stream = yield Open("ArtifactService.DownloadArtifact", request, None)
@@ -143,88 +143,3 @@ class Patience:
             raise ServerLost(told, code=error.code, reason=error.reason, metadata=error.metadata) from error
         self._next = min(2 * self._next, _LONGEST_PAUSE)
         return Sleep(wait)
-
-
-def _failed(path: str | os.PathLike[str]) -> Callable[[OSError], FileError]:
-    return lambda error: FileError(f"{os.fspath(path)}: {error.strerror}", path=path, errno=error.errno)
-
-
-def _chunks(source: str | os.PathLike[str] | bytes) -> Iterator[bytes]:
-    if isinstance(source, (bytes, bytearray)):
-        for start in range(0, len(source), _CHUNK):
-            yield bytes(source[start : start + _CHUNK])
-        return
-    try:
-        with open(source, "rb") as file:
-            while chunk := file.read(_CHUNK):
-                yield chunk
-    except OSError as error:
-        raise _failed(source)(error) from error
-
-
-def _metadata(source: str | os.PathLike[str] | bytes, display_name: str | None) -> artifacts.UploadMetadata:
-    digest, size = hashlib.sha256(), 0
-    for chunk in _chunks(source):
-        digest.update(chunk)
-        size += len(chunk)
-    named = "" if isinstance(source, (bytes, bytearray)) else Path(source).name
-    return artifacts.UploadMetadata(
-        display_name=named if display_name is None else display_name, size_bytes=size, sha256=digest.hexdigest()
-    )
-
-
-def _requests(
-    source: str | os.PathLike[str] | bytes, metadata: artifacts.UploadMetadata
-) -> Iterator[artifacts.UploadArtifactRequest]:
-    yield artifacts.UploadArtifactRequest(metadata=metadata)
-    for chunk in _chunks(source):
-        yield artifacts.UploadArtifactRequest(chunk=chunk)
-
-
-class _Destination:
-    """A file that appears whole or not at all."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._digest = hashlib.sha256()
-        self._artifact: artifacts.Artifact | None = None
-        self.written = 0
-        if path.is_dir():
-            raise FileError(f"{path}: a folder, not a file to write", path=path)
-        self._aside = path.parent / f".guardsplat-{uuid.uuid4().hex}.part"
-        try:
-            self._file = open(self._aside, "xb")
-        except OSError as error:
-            raise _failed(path)(error) from error
-
-    def announced(self, artifact: artifacts.Artifact) -> None:
-        if self._artifact is not None and self._artifact.sha256 != artifact.sha256:
-            raise self._damaged("the artifact is another one after the connection was lost")
-        self._artifact = artifact
-
-    def write(self, chunk: bytes) -> None:
-        try:
-            self._file.write(chunk)
-        except OSError as error:
-            raise _failed(self._path)(error) from error
-        self._digest.update(chunk)
-        self.written += len(chunk)
-
-    def finish(self, artifact: artifacts.Artifact) -> None:
-        if self.written != artifact.size_bytes:
-            raise self._damaged(f"{self.written} bytes arrived, not {artifact.size_bytes}")
-        if self._digest.hexdigest() != artifact.sha256:
-            raise self._damaged(f"SHA-256 is {self._digest.hexdigest()}, not {artifact.sha256}")
-        try:
-            self._file.flush()
-            os.fsync(self._file.fileno())
-            os.replace(self._aside, self._path)
-        except OSError as error:
-            raise _failed(self._path)(error) from error
-
-    def close(self) -> None:
-        self._file.close()
-        self._aside.unlink(missing_ok=True)
-
-    def _damaged(self, reason: str) -> DamagedDownload:
-        return DamagedDownload(f"{self._path}: {reason}", path=self._path)

@@ -13,7 +13,8 @@ from ..v1 import job_service_pb2 as job_service
 from ..v1 import key_service_pb2 as keys
 from ..v1 import registry_service_pb2 as registry
 from .specs import Embed, EmbedAndWait, FileOrArtifact, KeyAndWait, Submission, Verify, VerifyAndWait
-from .wire import Waiting, Target
+from .target import Target
+from .wire import Waiting
 from .work import Work
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from ..v1 import job_service_pb2 as job_service
 from ..v1 import key_service_pb2 as keys
 from ..v1 import registry_service_pb2 as registry
 from .calls import Calls
+from .inputs import inputs_of, is_name
 from .specs import WAITING, FileOrArtifact, Submission, Verify, embed_spec, key_spec, known, state_of, verify_spec
 from .specs import Embed as EmbedOptions
 from .wire import Call, Close, Open, Read, Steps
 
-_PICTURES = {".png", ".jpg", ".jpeg", ".webp"}
 _OVER = (jobs.Job.STATE_SUCCEEDED, jobs.Job.STATE_FAILED, jobs.Job.STATE_CANCELLED)
 _LONGEST_NAME = 63
 
@@ -47,7 +47,7 @@ class Work(Calls):
     def submit_verify(self, suspects: Any, options: dict[str, Any]) -> Steps[jobs.Job]:
         known(options, Verify)
         verify_spec([], "", "", options)
-        inputs = _inputs(suspects)
+        inputs = inputs_of(suspects)
         key = yield from self.key(options["key"])
         if options.get("owner"):
             options = {**options, "owner": (yield from self.owner(options["owner"]))}
@@ -79,7 +79,7 @@ class Work(Calls):
 
     def _sent(self, one: FileOrArtifact, sent: list[str]) -> Steps[str]:
         """The artifact's name."""
-        if isinstance(one, str) and _is_name("artifacts", one):
+        if isinstance(one, str) and is_name("artifacts", one):
             return one
         artifact = yield from self.upload(one)
         sent.append(artifact.name)
@@ -177,13 +177,13 @@ class Work(Calls):
 
     def key(self, text: str) -> Steps[str]:
         """``keys/{key}`` from that, or from what people call it."""
-        if _is_name("keys", text):
+        if is_name("keys", text):
             return text
         return (yield from self._called("key", text, self.list_keys()))
 
     def owner(self, text: str) -> Steps[str]:
         """``owners/{owner}`` from that, or from what people call it."""
-        if _is_name("owners", text):
+        if is_name("owners", text):
             return text
         return (yield from self._called("owner", text, self.list_owners()))
 
@@ -243,44 +243,10 @@ def _apart(options: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     return {name: value for name, value in options.items() if name not in WAITING}, waiting
 
 
-def _is_name(collection: str, text: str) -> bool:
-    before, _, identity = text.partition("/")
-    if before != collection:
-        return False
-    try:
-        uuid.UUID(identity)
-    except ValueError:
-        return False
-    return True
-
-
-def _inputs(suspects: Any) -> list[FileOrArtifact]:
-    """Files and artifacts; of folders the pictures, by name."""
-    found: list[FileOrArtifact] = []
-    for one in [suspects] if isinstance(suspects, (str, os.PathLike)) else suspects:
-        if not isinstance(one, (str, os.PathLike)):
-            raise TypeError(f"suspects: {type(one).__name__} is no path; guardsplat.verify reads arrays")
-        path = Path(one)
-        if not path.is_dir():
-            found.append(one)
-            continue
-        pictures = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in _PICTURES)
-        if not pictures:
-            raise BadOption(f"suspects: {path} is a folder without pictures", field="suspects", limit="png, jpg or webp")
-        found.extend(pictures)
-    if not found:
-        raise BadOption("suspects: there is none; give scenes or pictures", field="suspects", limit="one at least")
-    return found
-
-
 def _tell(hears: Any, job: jobs.Job) -> None:
     if job.state != jobs.Job.STATE_RUNNING or not job.HasField("progress"):
         return
     progress = job.progress
     stage = jobs.Progress.Stage.Name(progress.stage).removeprefix("STAGE_").lower()
-    figures = [
-        getattr(progress, field) if progress.HasField(field) else None for field in ("bit_accuracy", "psnr_db")
-    ]
+    figures = [getattr(progress, field) if progress.HasField(field) else None for field in ("bit_accuracy", "psnr_db")]
     hears(stage, progress.done, progress.total, *figures)
-
-
