@@ -58,6 +58,7 @@ stage dependencies bash deploy/check-dependencies.sh
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests
+TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
 # Longer runs are for people: docs/fuzzing.md.
 stage fuzz bash deploy/fuzz.sh 5
 echo "== all: $SECONDS s"

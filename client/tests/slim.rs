@@ -60,18 +60,23 @@ fn the_worker_would_be_noticed() {
     }
 }
 
+/// Packages of services and command lines.
+const OF_SERVICES: [&str; 7] = [
+    "tonic",
+    "prost",
+    "tokio",
+    "hyper",
+    "clap",
+    "guardsplat-proto",
+    "guardsplat-evaluation",
+];
+
 #[test]
-fn the_engine_knows_no_service() {
-    let found = dependencies("guardsplat-engine");
-    for name in [
-        "tonic",
-        "prost",
-        "tokio",
-        "hyper",
-        "clap",
-        "guardsplat-proto",
-        "guardsplat-evaluation",
-    ] {
-        assert!(!found.iter().any(|found| found == name), "{name}");
+fn the_engine_and_what_is_done_with_it_know_no_service() {
+    for package in ["guardsplat-engine", "guardsplat-operations", "guardsplat-python"] {
+        let found = dependencies(package);
+        for name in OF_SERVICES {
+            assert!(!found.iter().any(|found| found == name), "{package}: {name}");
+        }
     }
 }

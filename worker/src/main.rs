@@ -3,7 +3,6 @@ mod cli;
 mod error;
 mod evaluate;
 mod jobs;
-mod operations;
 
 fn main() -> std::process::ExitCode {
     cli::run()

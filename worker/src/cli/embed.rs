@@ -5,20 +5,18 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{
-    Job, Outcome, Preset, Progress, Ring, Settings, TrainableCoefficients, Verification, embed_with_files,
-};
-use guardsplat_engine::memory::MemoryRequirements;
+use guardsplat_engine::embed::{Job, Outcome, Preset, Progress, TrainableCoefficients, Verification, embed_with_files};
+use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
-use guardsplat_engine::quality::{Quality, write_picture};
-use guardsplat_engine::scene::{BadRows, Ignored};
+use guardsplat_engine::quality::write_picture;
+use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::{Error, Result};
-use serde::Serialize;
 
 use super::display::Display;
 use super::{Budget, Exit, Kind, print_json, print_line};
-use crate::operations::embed_settings::chosen;
-use crate::operations::{comparison_sheet, load};
+use guardsplat_operations::embed_report::EmbedReport;
+use guardsplat_operations::embed_settings::Choices;
+use guardsplat_operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -85,40 +83,9 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Report<'a> {
-    bit_accuracy: f64,
-    bit_accuracy_worst_view: f64,
-    message: String,
-    message_recovered: bool,
-    #[serde(flatten)]
-    quality: Quality,
-    psnr_covered_db: Option<f64>,
-    covered: f64,
-    steps: usize,
-    view_steps: usize,
-    seconds: f64,
-    device: &'a str,
-    clip: &'a str,
-    preset: &'a str,
-    bits: usize,
-    views: usize,
-    size: u32,
-    gaussians: usize,
-    seen_gaussians: usize,
-    changed_gaussians: usize,
-    ignored_rows: usize,
-    covering_views: usize,
-    predicted_memory_bytes: u64,
-    predicted_memory: MemoryRequirements,
-    peak_memory_bytes: Option<u64>,
-    written: bool,
-    target_missed: &'a [String],
-}
-
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let start = Instant::now();
-    let settings = settings(arguments)?;
+    let settings = choices(arguments)?.settings()?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;
     let engine = load::engine(
@@ -152,7 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if let Some(folder) = &arguments.report {
         write_report(folder, &outcome.verification)?;
     }
-    tell(arguments, &engine.compute.name, &key, &outcome, start)?;
+    tell(arguments, &engine, &key, &outcome, start)?;
     Ok(if outcome.missed.is_empty() {
         Exit::Done
     } else {
@@ -160,22 +127,18 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-fn settings(arguments: &Arguments) -> Result<Settings> {
-    let mut settings = arguments.preset.settings();
-    if let Some(path) = &arguments.settings {
-        let json = std::fs::read_to_string(path).map_err(Error::io(path))?;
-        settings = settings.overridden(&json)?;
-    }
-    if let Some(robust_to) = arguments.robust_to {
-        settings.robust_to = robust_to;
-    }
-    if let Some(elevation) = arguments.ring {
-        settings.ring = Some(Ring { elevation });
-    }
-    if let Some(kind) = arguments.kind {
-        settings.kind = Some(kind.scene());
-    }
-    chosen(settings.learning(arguments.learn), arguments.seed, arguments.size)
+fn choices(arguments: &Arguments) -> Result<Choices> {
+    let read = |path: &PathBuf| std::fs::read_to_string(path).map_err(Error::io(path));
+    Ok(Choices {
+        preset: arguments.preset,
+        seed: arguments.seed,
+        size: arguments.size,
+        robust_to: arguments.robust_to,
+        learn: arguments.learn,
+        ring: arguments.ring,
+        kind: arguments.kind.map(Kind::scene),
+        overrides: arguments.settings.as_ref().map(read).transpose()?,
+    })
 }
 
 fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {
@@ -219,36 +182,9 @@ fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     )
 }
 
-fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {
+fn tell(arguments: &Arguments, engine: &Engine, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {
     let found = &outcome.verification;
-    let report = Report {
-        bit_accuracy: found.comparison.bit_accuracy,
-        bit_accuracy_worst_view: found.comparison.bit_accuracy_worst_view,
-        message: found.message.to_string(),
-        message_recovered: found.message_recovered,
-        quality: found.quality,
-        psnr_covered_db: found.psnr_covered_db,
-        covered: found.covered,
-        steps: outcome.steps,
-        view_steps: outcome.view_steps,
-        seconds: start.elapsed().as_secs_f64(),
-        device,
-        clip: &key.clip.name,
-        preset: arguments.preset.name(),
-        bits: key.bits(),
-        views: found.views,
-        size: found.size,
-        gaussians: outcome.gaussians,
-        seen_gaussians: outcome.seen,
-        changed_gaussians: outcome.changed,
-        ignored_rows: outcome.ignored.as_ref().map_or(0, Ignored::count),
-        covering_views: outcome.covering_views,
-        predicted_memory_bytes: outcome.memory.total(),
-        predicted_memory: outcome.memory,
-        peak_memory_bytes: guardsplat_engine::memory::peak(),
-        written: outcome.written,
-        target_missed: &outcome.missed,
-    };
+    let report = EmbedReport::of(outcome, engine, key, arguments.preset, start.elapsed());
     if arguments.json {
         print_json(&report)?;
     } else {
@@ -258,7 +194,7 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
             .psnr_db
             .map_or("identical".into(), |db| format!("{db:.2} dB"));
         print_line(&format!(
-            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {device}",
+            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
             100.0 * report.bit_accuracy,
             100.0 * report.bit_accuracy_worst_view,
             report.message,
@@ -269,7 +205,8 @@ fn tell(arguments: &Arguments, device: &str, key: &Key, outcome: &Outcome, start
             },
             found.quality.ssim,
             outcome.steps,
-            report.seconds
+            report.seconds,
+            report.device
         ));
         if let Some(ignored) = &outcome.ignored {
             print_line(&ignored.to_string());

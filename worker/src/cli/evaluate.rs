@@ -21,7 +21,7 @@ use guardsplat_evaluation::report::store::Store;
 use super::display::Display;
 use super::{Budget, Exit, Extractor, print_line};
 use crate::error::{Error, Result};
-use crate::operations::{create_key, load};
+use guardsplat_operations::{create_key, load};
 
 #[derive(Args)]
 pub struct Arguments {

@@ -3,28 +3,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use guardsplat_engine::Result;
-use guardsplat_engine::clip::{Clip, Parts};
-use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::embed::{Preset, measure_view_on_cpu, predict_memory};
-use guardsplat_engine::extract::rasterizer;
-use guardsplat_engine::memory::{
-    Bytes, Limits, MemoryRequirements, ModelBytes, SceneSize, admission, picture_bytes, rendering_requirements,
-};
-use guardsplat_engine::quality::Difficulty;
-use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
-use guardsplat_engine::splat::{WeightCache, prepare, sh};
-use guardsplat_engine::view::{Extent, Openness, SceneKind, Split, ViewSampler};
-use serde::Serialize;
+use guardsplat_engine::memory::Bytes;
+use guardsplat_engine::scene::BadRows;
+use guardsplat_engine::view::Openness;
+use guardsplat_operations::inspect::{Asked, Found, Inspection, inspect};
+use guardsplat_operations::load;
 
 use super::{Budget, Exit, Kind, print_json, print_line};
-use crate::operations::load;
-
-/// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
-const SIDE: u32 = 160;
-/// Held-out views that tell how hard a scene is.
-const LOOKED_AT: u64 = 12;
-/// Side of pictures for the prediction of `render`: its own default.
-const PICTURE: u32 = 512;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -50,180 +35,15 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What there is to say of a scene.
-#[derive(Serialize)]
-struct Report {
-    format: &'static str,
-    file_bytes: u64,
-    gaussians: usize,
-    ignored_rows: usize,
-    #[serde(skip)]
-    ignored: Option<Ignored>,
-    sh_degree_stored: Option<u64>,
-    sh_degree_used: usize,
-    sh_degree_learned: usize,
-    colours_rounded: bool,
-    extent: Option<Where>,
-    kind: Option<Found>,
-    difficulty: Option<Difficulty>,
-    cameras: Option<Viewers>,
-    views: Option<u32>,
-    seen_gaussians: Option<usize>,
-    memory_limit_bytes: u64,
-    render: Need,
-    embed: Option<Need>,
-}
-
-/// Where a scene is.
-#[derive(Serialize)]
-struct Where {
-    centre: [f32; 3],
-    radius: f32,
-    up: [f32; 3],
-    on_ground: bool,
-}
-
-/// The kind of a scene.
-#[derive(Serialize)]
-struct Found {
-    /// By its geometry.
-    found: SceneKind,
-    /// The one that views are made for; none where cameras were given.
-    used: Option<SceneKind>,
-    /// What the geometry says.
-    #[serde(flatten)]
-    openness: Openness,
-}
-
-/// Cameras that were given.
-#[derive(Serialize)]
-struct Viewers {
-    training: usize,
-    held_out: usize,
-    /// How near a training view comes to an opaque Gaussian; none where no Gaussian is.
-    clearance: Option<f32>,
-}
-
-/// What a command will need of the memory.
-#[derive(Serialize)]
-struct Need {
-    bytes: u64,
-    parts: MemoryRequirements,
-    fits: bool,
-}
-
-impl Found {
-    fn text(&self) -> String {
-        let Openness {
-            hollow,
-            inside,
-            seen_from_front,
-            hidden_from_front,
-            hidden_from_behind,
-            seen_from_above,
-            flatness,
-            ..
-        } = self.openness;
-        let percent = |share: f32| format!("{:.0} %", 100.0 * share);
-        let used = match self.used {
-            Some(used) if used == self.found => used.to_string(),
-            Some(used) => format!("{used}, as was said, found to be {}", self.found),
-            None => format!("{}, which says nothing where cameras are given", self.found),
-        };
-        format!(
-            "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width",
-            percent(hollow),
-            percent(inside),
-            percent(seen_from_front),
-            percent(hidden_from_front),
-            percent(hidden_from_behind),
-            percent(seen_from_above),
-            flatness
-        )
-    }
-}
-
-impl Need {
-    fn new(parts: MemoryRequirements, limits: &Limits) -> Self {
-        Self {
-            bytes: parts.total(),
-            fits: limits.admit(&parts).is_ok(),
-            parts,
-        }
-    }
-
-    fn line(&self) -> String {
-        let fits = if self.fits { "fits" } else { "does not fit" };
-        format!("{}: {fits}", self.parts)
-    }
-}
-
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let limits = Limits::of_machine(arguments.budget.bytes());
-    let rest = MemoryRequirements::of_program();
-    admission::admit_reading(&arguments.scene, &limits, rest)?;
-    let head = admission::summary_of(&arguments.scene);
-    let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_with_files(&arguments.scene, bad_rows, limits.left(&rest))?;
-    let gaussians = &scene.gaussians;
-    let cameras = load::cameras(arguments.cameras.as_deref())?;
-    let size = SceneSize::of(&scene);
-    let render = rendering_requirements(size, picture_bytes(PICTURE, PICTURE));
-    let (mut extent, mut embed, mut seen, mut viewers) = (None, None, None, None);
-    let (mut kind, mut difficulty) = (None, None);
-    // Of nothing there is nothing to be seen.
-    if !gaussians.is_empty() {
-        extent = Some(Extent::of(gaussians)?);
-        let mut settings = Preset::Standard.settings();
-        settings.kind = arguments.kind.map(Kind::scene);
-        let view = measure_view_on_cpu(gaussians, &settings, &cameras)?;
-        let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
-        let clip = 4 * clip.parameters() as u64;
-        let models = ModelBytes {
-            learning: clip,
-            verifying: clip,
-        };
-        embed = Some(predict_memory(size, view, &settings, models));
-        let sampler = ViewSampler::seen_from(gaussians, 0, settings.viewpoints(&cameras))?;
-        let (found, openness) = SceneKind::of(gaussians)?;
-        kind = Some(Found {
-            found,
-            used: cameras.is_empty().then(|| sampler.kind()),
-            openness,
-        });
-        difficulty = Some(measure_difficulty(gaussians, &sampler)?);
-        seen = (arguments.views.map(|views| count_seen(gaussians, &sampler, views))).transpose()?;
-        viewers = sampler.given().map(|given| Viewers {
-            training: given.training_cameras(),
-            held_out: given.held_out_cameras(),
-            clearance: Some(given.clearance()).filter(|distance| distance.is_finite()),
-        });
-    }
-    let report = Report {
-        format: scene.format().name(),
-        file_bytes: size.file,
-        gaussians: gaussians.len(),
-        ignored_rows: scene.ignored().map_or(0, Ignored::count),
-        ignored: scene.ignored().cloned(),
-        sh_degree_stored: head.map(|head| head.degree),
-        sh_degree_used: gaussians.sh.degree,
-        sh_degree_learned: scene.learnable_degree(),
-        colours_rounded: !scene.exact(),
-        extent: extent.map(|extent| Where {
-            centre: extent.centre,
-            radius: extent.radius,
-            up: extent.up,
-            on_ground: extent.on_ground,
-        }),
-        kind,
-        difficulty,
-        cameras: viewers,
+    let asked = Asked {
         views: arguments.views,
-        seen_gaussians: seen,
-        memory_limit_bytes: limits.memory,
-        render: Need::new(render, &limits),
-        embed: embed.map(|parts| Need::new(parts, &limits)),
+        cameras: load::cameras(arguments.cameras.as_deref())?,
+        kind: arguments.kind.map(Kind::scene),
+        bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
+        memory: arguments.budget.bytes(),
     };
+    let report = inspect(&arguments.scene, &asked)?;
     if arguments.json {
         print_json(&report)?;
     } else {
@@ -232,35 +52,37 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// What some held-out views show.
-fn measure_difficulty(gaussians: &Gaussians, sampler: &ViewSampler) -> Result<Difficulty> {
-    let rasterizer = rasterizer(&open(DeviceChoice::Cpu)?)?;
-    let view = |index: u64| {
-        let view = prepare(
-            gaussians,
-            &sampler.camera(Split::HeldOut, index, SIDE),
-            WeightCache::None,
-        )?;
-        let colours = sh::colours(&gaussians.sh, None, &view);
-        let [white, black] = [1.0, 0.0].map(|ground| rasterizer.render(&view, &colours, [ground; 3]));
-        Ok([white?.to_8_bit(), black?.to_8_bit()])
+/// The kind of a scene and why, in words.
+fn kind_text(kind: &Found) -> String {
+    let Openness {
+        hollow,
+        inside,
+        seen_from_front,
+        hidden_from_front,
+        hidden_from_behind,
+        seen_from_above,
+        flatness,
+        ..
+    } = kind.openness;
+    let percent = |share: f32| format!("{:.0} %", 100.0 * share);
+    let used = match kind.used {
+        Some(used) if used == kind.found => used.to_string(),
+        Some(used) => format!("{used}, as was said, found to be {}", kind.found),
+        None => format!("{}, which says nothing where cameras are given", kind.found),
     };
-    Difficulty::of(&(0..LOOKED_AT).map(view).collect::<Result<Vec<_>>>()?)
+    format!(
+        "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width",
+        percent(hollow),
+        percent(inside),
+        percent(seen_from_front),
+        percent(hidden_from_front),
+        percent(hidden_from_behind),
+        percent(seen_from_above),
+        flatness
+    )
 }
 
-/// How many Gaussians so many training views show.
-fn count_seen(gaussians: &Gaussians, sampler: &ViewSampler, views: u32) -> Result<usize> {
-    let mut seen = vec![false; gaussians.len()];
-    for index in 0..u64::from(views) {
-        let camera = sampler.camera(Split::Training, index, SIDE);
-        for row in prepare(gaussians, &camera, WeightCache::Weights)?.visible {
-            seen[row as usize] = true;
-        }
-    }
-    Ok(seen.into_iter().filter(|seen| *seen).count())
-}
-
-fn tell(report: &Report) {
+fn tell(report: &Inspection) {
     let line = |name: &str, text: String| print_line(&format!("{name:10} {text}"));
     let file = Bytes(report.file_bytes);
     line("format", format!("{}, {file} uncompressed", report.format));
@@ -295,7 +117,7 @@ fn tell(report: &Report) {
         None => line("extent", "none: there is nothing to see or mark".into()),
     }
     if let Some(kind) = &report.kind {
-        line("kind", kind.text());
+        line("kind", kind_text(kind));
     }
     if let Some(seen) = &report.difficulty {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Exit, Extractor, print_json, print_line};
-use crate::operations::create_key;
+use guardsplat_operations::create_key;
 
 #[derive(Subcommand)]
 pub enum Command {

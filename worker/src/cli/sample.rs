@@ -2,15 +2,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use guardsplat_engine::scene::Format;
-use guardsplat_engine::scene::convert::convert_to;
-use guardsplat_engine::view::write_cameras;
-use guardsplat_engine::{Error, Result, sample};
+use guardsplat_engine::Result;
+use guardsplat_operations::sample::{self, Sample};
 
 use super::{Exit, Kind, print_line};
-
-/// Cameras of a scene that is not seen from all around.
-const CAMERAS: usize = 40;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -36,24 +31,17 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let kind = arguments.kind.scene();
-    let cameras = sample::cameras(kind, CAMERAS);
-    if arguments.cameras.is_some() && cameras.is_empty() {
-        return Err(Error::BadOption {
-            field: "--cameras",
-            reason: "an object is seen from all around; say --kind room, terrain or forward".into(),
-        });
-    }
-    let scene = sample::sample_of(kind, arguments.gaussians, arguments.sh_degree, arguments.seed)?;
-    if let Some(file) = &arguments.cameras {
-        write_cameras(file, &cameras)?;
-    }
-    // The format that the name says, and PLY for names that say none.
-    let format = Format::of_whole_name(&arguments.output).unwrap_or(Format::Ply);
-    convert_to(&scene.gaussians, format, &arguments.output)?;
+    let wanted = Sample {
+        kind: arguments.kind.scene(),
+        gaussians: arguments.gaussians,
+        sh_degree: arguments.sh_degree,
+        seed: arguments.seed,
+        cameras: arguments.cameras.clone(),
+    };
+    sample::write(&arguments.output, &wanted)?;
     print_line(&format!(
         "{} Gaussians of degree {} written to {}",
-        scene.gaussians.len(),
+        arguments.gaussians,
         arguments.sh_degree,
         arguments.output.display()
     ));

@@ -13,8 +13,9 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, Kind, print_json, print_line};
-use crate::operations::load;
-use crate::operations::verification::{VerificationReport, Views, read_and_compare};
+use guardsplat_operations::load;
+use guardsplat_operations::suspect::Suspect;
+use guardsplat_operations::verification::{VerificationReport, Views, read_and_compare};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -78,7 +79,7 @@ struct Report<'a> {
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let start = Instant::now();
-    let source = find_source(&arguments.paths)?;
+    let suspect: Suspect = find_source(&arguments.paths)?.into();
     let key = Key::read(&arguments.key)?;
     let message = arguments.message.as_deref().map(|text| key.message(text)).transpose()?;
     let engine = load::engine(
@@ -100,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         with_files: true,
     };
     let mut display = Display::new("reading");
-    let compared = read_and_compare(&engine, &source, &views, message.as_ref(), |done, total| {
+    let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
         display.set(done, total, String::new);
     })?;
     drop(display);

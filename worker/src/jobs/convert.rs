@@ -18,8 +18,8 @@ use guardsplat_proto::v1::verify_result::Verdict as ApiVerdict;
 use guardsplat_proto::v1::{self as api};
 
 use super::error::{Error, Result};
-use crate::operations::embed_settings::chosen;
-use crate::operations::verification::{VerificationReport, Views};
+use guardsplat_operations::embed_settings::chosen;
+use guardsplat_operations::verification::{VerificationReport, Views};
 
 /// What is behind scenes, and behind pictures with transparent pixels.
 const WHITE: [f32; 3] = [1.0; 3];

@@ -10,7 +10,7 @@ use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::Result;
 use super::transfer::Content;
-use crate::operations::create_key::{self, ProjectionOverrides};
+use guardsplat_operations::create_key::{self, ProjectionOverrides};
 
 /// A key, before it is stored.
 struct Made {

@@ -15,8 +15,8 @@ use super::attempt::{Attempt, Outcome as Finished};
 use super::convert;
 use super::error::{Error, Result};
 use super::transfer::Content;
-use crate::operations::thumbnails::small_png;
-use crate::operations::{comparison_sheet, load};
+use guardsplat_operations::thumbnails::small_png;
+use guardsplat_operations::{comparison_sheet, load};
 
 /// Views of the evidence.
 const SHOWN: usize = 3;

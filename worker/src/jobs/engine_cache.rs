@@ -7,7 +7,7 @@ use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::stop::Stop;
 
-use crate::operations::load;
+use guardsplat_operations::load;
 
 /// A device, and the engine of the last key on it.
 pub struct EngineCache {

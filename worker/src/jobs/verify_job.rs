@@ -10,9 +10,10 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
-use crate::operations::load;
-use crate::operations::thumbnails::Thumbnails;
-use crate::operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
+use guardsplat_operations::load;
+use guardsplat_operations::suspect::Suspect;
+use guardsplat_operations::thumbnails::Thumbnails;
+use guardsplat_operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
@@ -45,7 +46,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
         views.cameras = load::cameras(cameras_file.as_deref())?;
-        let source = find_source(&paths)?;
+        let suspect: Suspect = find_source(&paths)?.into();
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         // Nothing to compare with is no message of no bits.
@@ -56,7 +57,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
         let mut shown = Thumbnails::default();
         let (findings, framed) = if claim {
-            let read = read_hypotheses(engine, &source, &views, &mut shown, progress)?;
+            let read = read_hypotheses(engine, &suspect, &views, &mut shown, progress)?;
             for (picture, estimate) in read.estimates.iter().enumerate() {
                 tracing::info!(picture, estimate, "estimated what was done to a picture");
             }
@@ -65,7 +66,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
             (VerificationReport::new(reading, None, &read.ignored)?, read.readings)
         } else {
-            let compared = read_and_compare(engine, &source, &views, message.as_ref(), progress)?;
+            let compared = read_and_compare(engine, &suspect, &views, message.as_ref(), progress)?;
             (VerificationReport::of(&compared)?, Vec::new())
         };
         Ok(Verified {

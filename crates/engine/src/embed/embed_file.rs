@@ -3,21 +3,16 @@ use std::path::Path;
 
 use super::aside::Aside;
 use super::learned_offsets::LearnedOffsets;
-use super::optimise::optimise;
+use super::marking::{Outcome, Work, admit, mark};
 use super::progress::Progress;
-use super::resources::{measure_view, model_bytes, predict_memory};
+use super::resources::model_bytes;
 use super::settings::Settings;
-use super::verify::{Verification, verify};
 use crate::error::{Error, Result};
 use crate::extract::Engine;
-use crate::memory::{MemoryRequirements, SceneSize, admission};
+use crate::memory::{MemoryRequirements, admission};
 use crate::message::Message;
-use crate::scene::{BadRows, Format, Gaussians, Ignored, Scene};
+use crate::scene::{BadRows, Gaussians, Scene};
 use crate::view::Camera;
-
-/// Times that a mark is made weaker where held-out views show it more than they may. Once is enough where the file keeps
-/// changes as they are; where it rounds them, what is left is not as much less as was asked for.
-const WEAKENED: usize = 2;
 
 /// What to embed where.
 pub struct Job<'a> {
@@ -35,35 +30,6 @@ pub struct Job<'a> {
     pub force: bool,
     /// What becomes of rows with values that are not legal; ignored ones are in the output as they were.
     pub bad_rows: BadRows,
-}
-
-/// What became of a job.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// What the verification of the file found.
-    pub verification: Verification,
-    /// What misses the target, in words.
-    pub missed: Vec<String>,
-    /// Whether the output was written.
-    pub written: bool,
-    /// The format of input and output.
-    pub format: Format,
-    /// Steps taken.
-    pub steps: usize,
-    /// Views drawn in all steps.
-    pub view_steps: usize,
-    /// MemoryRequirements that was predicted.
-    pub memory: MemoryRequirements,
-    /// Gaussians of the scene.
-    pub gaussians: usize,
-    /// Rows of the file that are none, where some were ignored.
-    pub ignored: Option<Ignored>,
-    /// Gaussians that training views show; the others were left alone.
-    pub seen: usize,
-    /// Training views that it took to find them.
-    pub covering_views: usize,
-    /// Gaussians whose colours changed.
-    pub changed: usize,
 }
 
 /// Marks a scene file. A result that misses its target is not written, unless the job forces it.
@@ -103,51 +69,21 @@ fn embed_scene(
     admission::admit_marking(job.input, &engine.limits, rest)?;
     let scene = read(engine.limits.left(&rest))?;
     stop.check()?;
-    let memory = admit(engine, &scene, settings, job.cameras)?;
+    let work = Work {
+        message: job.message,
+        settings,
+        cameras: job.cameras,
+    };
+    let memory = admit(engine, &scene, &work)?;
     let aside = reserve(job, &scene)?;
     progress(Progress::Admitted(memory));
-    let mut optimised = optimise(engine, &scene, job.message, settings, job.cameras, progress)?;
-    let (mut verification, mut missed);
-    let mut weakened = 0;
-    loop {
-        stop.check()?;
-        progress(Progress::Writing);
-        let marked = write(job, &scene, &optimised.learned, &aside)?;
-        let total = settings.verify.views;
-        verification = verify(
-            engine,
-            &scene.gaussians,
-            &marked,
-            job.message,
-            settings,
-            job.cameras,
-            |done| progress(Progress::Verifying { done, total }),
-        )?;
-        missed = settings.target.missed(&verification, &engine.claim_rule());
-        match settings.target.weaken(&verification) {
-            Some(factor) if weakened < WEAKENED => optimised.learned.scale(factor, &scene),
-            _ => break,
-        }
-        weakened += 1;
-    }
-    let written = missed.is_empty() || job.force;
-    if written {
+    let marked = |learned: &LearnedOffsets| write(job, &scene, learned, &aside);
+    let (_, mut outcome) = mark(engine, &scene, &work, memory, progress, &marked)?;
+    outcome.written = outcome.missed.is_empty() || job.force;
+    if outcome.written {
         aside.persist(job.output)?;
     }
-    Ok(Outcome {
-        verification,
-        missed,
-        written,
-        format: scene.format(),
-        steps: optimised.steps,
-        view_steps: optimised.view_steps,
-        gaussians: scene.gaussians.len(),
-        ignored: scene.ignored().cloned(),
-        memory,
-        seen: optimised.learned.learnable.rows().len(),
-        covering_views: optimised.covering_views,
-        changed: optimised.learned.changed(&scene.gaussians.sh),
-    })
+    Ok(outcome)
 }
 
 /// Writes the scene with what was learned to the file aside, and reads back what it shows.
@@ -165,14 +101,6 @@ fn write(job: &Job<'_>, scene: &Scene, learned: &LearnedOffsets, aside: &Aside) 
     let marked = marked.map_err(|e| named(e, job.output))?;
     check_geometry(job.output, scene, &marked)?;
     Ok(marked.into_gaussians())
-}
-
-/// Predicts what memory the job will need, and refuses one that does not fit.
-fn admit(engine: &Engine, scene: &Scene, settings: &Settings, cameras: &[Camera]) -> Result<MemoryRequirements> {
-    let view = measure_view(engine, &scene.gaussians, settings, cameras)?;
-    let memory = predict_memory(SceneSize::of(scene), view, settings, model_bytes(engine, settings));
-    engine.limits.admit(&memory)?;
-    Ok(memory)
 }
 
 /// A file beside the output that holds as much as the output will; about as much in formats that are compressed. A

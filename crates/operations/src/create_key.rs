@@ -7,7 +7,7 @@ use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
 use guardsplat_engine::message::{DecoderKind, FitOptions, Key, KeyOptions};
 use guardsplat_engine::stop::Stop;
 
-use super::load;
+use crate::load;
 
 /// What the projection ignores and keeps of CLIP's features, where experiments ask for something else than usual.
 #[derive(Clone, Copy, Default)]

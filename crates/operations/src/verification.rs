@@ -2,17 +2,16 @@
 use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, PictureLogits, PooledLogits, Source, default_size, estimates, hypotheses, read_given,
-    read_scene,
+    Comparison, Engine, PictureLogits, PooledLogits, default_size, estimates, hypotheses, read_given, read_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
-use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
 use guardsplat_engine::view::{Camera, SceneKind, ViewSampler, Viewpoints};
 use serde::Serialize;
 
-use super::thumbnails::Thumbnails;
+use crate::suspect::Suspect;
+use crate::thumbnails::Thumbnails;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -40,42 +39,42 @@ pub struct Views {
 /// Logits of views or pictures.
 type Logits = Vec<Vec<f32>>;
 
-/// Reads all scenes and pictures of `source` together, and tells of rows of scenes that were ignored; `shown` keeps the first
+/// Reads all scenes and pictures of `suspect` together, and tells of rows of scenes that were ignored; `shown` keeps the first
 /// pictures, and `progress` hears how many views and pictures are done, and of how many.
 pub fn read(
     engine: &Engine,
-    source: &Source,
+    suspect: &Suspect,
     views: &Views,
     shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<(PooledLogits, Vec<Ignored>)> {
-    let (mut logits, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
-    let (before, total) = (logits.len(), count(source, views));
+    let (mut logits, ignored) = read_scenes(engine, suspect, views, shown, &mut progress)?;
+    let (before, total) = (logits.len(), count(suspect, views));
     // One at a time: thousands of large pictures need not fit in memory.
-    for (index, path) in source.pictures.iter().enumerate() {
-        let picture = read_picture(path, views.background)?;
+    for (index, picture) in suspect.pictures.iter().enumerate() {
+        let picture = picture.pixels(views.background)?;
         shown.see("picture", index, &picture)?;
-        logits.push(read_given(engine, &picture)?);
+        logits.push(read_given(engine, picture.as_ref())?);
         progress(before + index + 1, total);
     }
     Ok((PooledLogits::new(logits)?, ignored))
 }
 
 /// Views and pictures that are read.
-fn count(source: &Source, views: &Views) -> usize {
-    source.scenes.len() * views.count + source.pictures.len()
+fn count(suspect: &Suspect, views: &Views) -> usize {
+    suspect.scenes.len() * views.count + suspect.pictures.len()
 }
 
 fn read_scenes(
     engine: &Engine,
-    source: &Source,
+    suspect: &Suspect,
     views: &Views,
     shown: &mut Thumbnails,
     progress: &mut impl FnMut(usize, usize),
 ) -> Result<(Logits, Vec<Ignored>)> {
     let (mut logits, mut ignored) = (Logits::new(), Vec::new());
-    let total = count(source, views);
-    for path in &source.scenes {
+    let total = count(suspect, views);
+    for path in &suspect.scenes {
         let size = views.size.unwrap_or_else(|| default_size(engine));
         let rest = MemoryRequirements {
             models: engine.model_bytes(false),
@@ -121,26 +120,26 @@ pub struct HypothesisReadings {
 /// the same once more.
 pub fn read_hypotheses(
     engine: &Engine,
-    source: &Source,
+    suspect: &Suspect,
     views: &Views,
     shown: &mut Thumbnails,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<HypothesisReadings> {
-    let (of_scenes, ignored) = read_scenes(engine, source, views, shown, &mut progress)?;
-    if source.pictures.is_empty() {
+    let (of_scenes, ignored) = read_scenes(engine, suspect, views, shown, &mut progress)?;
+    if suspect.pictures.is_empty() {
         return Ok(HypothesisReadings {
             readings: vec![(Hypothesis::default(), PooledLogits::new(of_scenes)?)],
             estimates: Vec::new(),
             ignored,
         });
     }
-    let mut pictures = Vec::with_capacity(source.pictures.len());
-    for (index, path) in source.pictures.iter().enumerate() {
-        let picture = read_picture(path, views.background)?;
+    let mut pictures = Vec::with_capacity(suspect.pictures.len());
+    for (index, picture) in suspect.pictures.iter().enumerate() {
+        let picture = picture.pixels(views.background)?;
         shown.see("picture", index, &picture)?;
         let read = PictureLogits::read(engine, &picture, &pictures)?;
         pictures.push(read);
-        progress(of_scenes.len() + index + 1, count(source, views));
+        progress(of_scenes.len() + index + 1, count(suspect, views));
     }
     let together = |(hypothesis, logits): (Hypothesis, PooledLogits)| {
         let all = of_scenes.iter().cloned().chain(logits.views).collect();
@@ -174,20 +173,20 @@ pub struct Compared {
     pub ignored: Vec<Ignored>,
 }
 
-/// Reads `source` and compares it with `message`. Pictures that do not match as they are given are read under every other
+/// Reads `suspect` and compares it with `message`. Pictures that do not match as they are given are read under every other
 /// hypothesis besides, and so are those of a message that is too short to match, unless all of it is right. Each hypothesis
 /// pays by its share of the rate ([`shares`]): half is for pictures as they are, so that those who change nothing hardly pay
 /// for those who do.
 pub fn read_and_compare(
     engine: &Engine,
-    source: &Source,
+    suspect: &Suspect,
     views: &Views,
     message: Option<&Message>,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Compared> {
     // Nobody looks at what was compared with a raw message.
     let mut shown = Thumbnails::default();
-    let (reading, ignored) = read(engine, source, views, &mut shown, &mut progress)?;
+    let (reading, ignored) = read(engine, suspect, views, &mut shown, &mut progress)?;
     let mut best = Compared {
         reading,
         comparison: None,
@@ -200,7 +199,7 @@ pub fn read_and_compare(
         return Ok(best);
     };
     // Without pictures there is nothing to guess. With them the first reading has what it would have among all.
-    let given = if source.pictures.is_empty() { 1 } else { 2 };
+    let given = if suspect.pictures.is_empty() { 1 } else { 2 };
     let as_given = best.reading.compare(message, &engine.acceptance_rule(given))?;
     // Of a message that is too short for a match the best reading is told all the same.
     let all = as_given.decision.matched_bits as usize == message.len();
@@ -214,7 +213,7 @@ pub fn read_and_compare(
         readings: read,
         estimates,
         ..
-    } = read_hypotheses(engine, source, views, &mut shown, progress)?;
+    } = read_hypotheses(engine, suspect, views, &mut shown, progress)?;
     (best.hypotheses, best.estimates) = (read.len(), estimates);
     let tries = shares(&read.iter().map(|(hypothesis, _)| *hypothesis).collect::<Vec<_>>());
     for ((hypothesis, reading), tries) in read.into_iter().zip(tries).skip(1) {

@@ -1,0 +1,13 @@
+//! What programs do with the engine, from what users choose to what they are told: shared by the offline commands, the
+//! jobs of a server and the Python package, so that all give the same bytes and figures. No command line, no gRPC.
+pub mod comparison_sheet;
+pub mod create_key;
+pub mod embed_report;
+pub mod embed_settings;
+pub mod inspect;
+pub mod load;
+pub mod render;
+pub mod sample;
+pub mod suspect;
+pub mod thumbnails;
+pub mod verification;

@@ -1,0 +1,1 @@
+"""The client of a server, in pure Python over grpcio."""
