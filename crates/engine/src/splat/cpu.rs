@@ -5,6 +5,7 @@ use super::weights::Band;
 use super::{PreparedView, Rasterizer};
 use crate::error::Result;
 use crate::picture::Picture;
+use crate::simd::Instructions;
 use rayon::prelude::*;
 
 /// Draws on the CPU with rayon. One task a row of tiles; sums are ordered, so results do not depend on the threads.
@@ -22,6 +23,7 @@ impl Rasterizer for CpuRasterizer {
     fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture> {
         view.check("colours", colours.len(), 3 * view.visible.len())?;
         let (width, height) = (view.camera.width, view.camera.height);
+        let instructions = Instructions::widest();
         let mut pixels = vec![0.0; view.picture_len()];
         pixels
             .par_chunks_mut((width * TILE * 3) as usize)
@@ -38,7 +40,7 @@ impl Rasterizer for CpuRasterizer {
                     };
                     let left = match &mut cursor {
                         Some(cursor) => cursor.replay(list, &mut draw),
-                        None => &composite_tile(frame, &view.splats, list, &mut draw),
+                        None => &composite_tile(instructions, frame, &view.splats, list, &mut draw),
                     };
                     store(frame, width, &draw.image, left, background, out);
                 }
@@ -50,6 +52,7 @@ impl Rasterizer for CpuRasterizer {
         view.check("picture gradient", picture_gradient.len(), view.picture_len())?;
         let (width, height) = (view.camera.width, view.camera.height);
         let columns = view.tiles.columns as usize;
+        let instructions = Instructions::widest();
         let mut slots = vec![[0.0f32; 3]; view.tiles.pairs()];
         let mut bands = Vec::with_capacity(view.tiles.rows as usize);
         let mut rest = &mut slots[..];
@@ -77,7 +80,7 @@ impl Rasterizer for CpuRasterizer {
                         cursor.replay(list, &mut gather);
                     }
                     None => {
-                        composite_tile(frame, &view.splats, list, &mut gather);
+                        composite_tile(instructions, frame, &view.splats, list, &mut gather);
                     }
                 }
             }
