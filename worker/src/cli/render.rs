@@ -9,7 +9,7 @@ use guardsplat_engine::memory::{
 };
 use guardsplat_engine::quality::write_picture;
 use guardsplat_engine::scene::{BadRows, Scene};
-use guardsplat_engine::splat::{WeightCache, prepare, sh};
+use guardsplat_engine::splat::{Geometry, WeightCache, sh};
 use guardsplat_engine::view::{Camera, Split, ViewSampler, Viewpoints, read_cameras, write_cameras};
 use guardsplat_engine::{Error, Result};
 
@@ -107,8 +107,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         Format::Exr => "exr",
     };
     let mut display = Display::new("rendering");
+    let geometry = Geometry::new(&scene);
     for (index, camera) in cameras.iter().enumerate() {
-        let view = prepare(&scene, camera, WeightCache::None)?;
+        let view = geometry.prepare(camera, WeightCache::None)?;
         let colours = sh::colours(&scene.sh, None, &view);
         let picture = rasterizer.render(&view, &colours, arguments.background.rgb())?;
         write_picture(&folder.join(format!("view_{index:03}.{extension}")), &picture)?;

@@ -15,8 +15,7 @@ use crate::memory::Limits;
 use crate::message::Key;
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch, unbatch};
-use crate::scene::Gaussians;
-use crate::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
+use crate::splat::{CpuRasterizer, Geometry, GpuRasterizer, Rasterizer, WeightCache, sh};
 use crate::stop::Stop;
 use crate::view::Camera;
 
@@ -231,11 +230,11 @@ impl Engine {
     /// The 8-bit picture of a view that is drawn once.
     ///
     /// # Errors
-    /// Those of [`prepare`] and of the renderer; [`Error::Stopped`].
-    pub fn picture(&self, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
+    /// Those of [`Geometry::prepare`] and of the renderer; [`Error::Stopped`].
+    pub fn picture(&self, geometry: &Geometry<'_>, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
         self.stop.check()?;
-        let view = prepare(gaussians, camera, WeightCache::None)?;
-        let colours = sh::colours(&gaussians.sh, None, &view);
+        let view = geometry.prepare(camera, WeightCache::None)?;
+        let colours = sh::colours(geometry.sh(), None, &view);
         Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
     }
 
