@@ -3,5 +3,6 @@ pub mod comparison_sheet;
 pub mod create_key;
 pub mod embed_settings;
 pub mod load;
+pub mod machine;
 pub mod thumbnails;
 pub mod verification;

@@ -91,7 +91,7 @@ pub fn optimise(
             progress(Progress::Check(check));
         }
         timing.lap(Stage::Check);
-        timing.end_step(steps, TIMED_STEPS);
+        progress(Progress::Timed(timing.end_step(steps, TIMED_STEPS)));
         if enough {
             progress(Progress::Stopped { step: steps });
             break;
