@@ -140,7 +140,7 @@ fn cost(sh: &Sh, learnable: &Learnable, views: &[PreparedView]) -> Cost {
             sh::backward(
                 learnable,
                 sh::ColourGradient {
-                    view: view,
+                    view,
                     colours: &colours,
                     gradient: &of_colours,
                 },

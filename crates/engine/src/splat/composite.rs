@@ -11,12 +11,16 @@ pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 /// Pixels by which a row's bounds are widened against rounding.
 const ROW_SLACK: f32 = 0.01;
 const SIDE: usize = TILE as usize;
-const FETCH: usize = 64;
+/// Splats that are fetched at a time.
+pub(super) const FETCH: usize = 64;
 /// Room behind a tile's pixels, so that the last of them can be read with as many lanes as the first.
 const ROOM: usize = 16;
 
 /// Receives the contributions to a tile, splat by splat from front to back.
 pub(super) trait ContributionSink {
+    /// The next splats of the tile's list are these, or the first [`FETCH`] of them.
+    #[inline(always)]
+    fn expect(&mut self, _next: &[u32]) {}
     /// The next splat of the tile's list begins: its place in the list and its index.
     fn begin(&mut self, place: usize, splat: u32);
     /// It adds `weight` times its colour to `pixel` (row-major in the tile).
@@ -110,6 +114,7 @@ impl<S: ContributionSink> Composite<'_, S> {
             }
             if place % FETCH == 0 {
                 fetched.fetch(splats, &list[place..], frame);
+                sink.expect(&list[place..]);
             }
             let at = place % FETCH;
             let s = &fetched.splats[at];

@@ -2,6 +2,7 @@
 use super::{Changes, Learnable, PreparedView};
 use crate::scene::Sh;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Coefficients a channel at the highest degree.
 pub const MAX_COEFFICIENTS: usize = 25;
@@ -94,28 +95,38 @@ pub fn colours(sh: &Sh, changes: Option<Changes<'_>>, view: &PreparedView) -> Ve
 pub fn colours_of_views(sh: &Sh, changes: Option<Changes<'_>>, views: &[&PreparedView]) -> Vec<Vec<f32>> {
     let stride = sh.per_gaussian();
     let mut all: Vec<Vec<f32>> = views.iter().map(|view| vec![0.0; view.visible.len() * 3]).collect();
-    let mut tasks: Vec<Vec<(usize, std::ops::Range<usize>, &mut [f32])>> = Vec::new();
+    let mut tasks: Vec<Vec<ColoursOfPart<'_>>> = Vec::new();
     tasks.resize_with((sh.coefficients.len() / stride).div_ceil(ROWS), Vec::new);
-    for (index, (view, out)) in views.iter().zip(&mut all).enumerate() {
+    for (view, out) in views.iter().zip(&mut all) {
         let mut rest = &mut out[..];
         for (task, seen) in tasks.iter_mut().zip(parts(&view.visible)) {
             let (out, after) = std::mem::take(&mut rest).split_at_mut(3 * seen.len());
             rest = after;
-            task.push((index, seen, out));
+            task.push(ColoursOfPart { view, seen, out });
         }
     }
-    tasks.into_par_iter().flatten_iter().for_each(|(index, seen, out)| {
-        let view = views[index];
-        let degree = sh.degree.min(view.degree);
-        let seen = view.visible[seen.clone()].iter().zip(&view.directions[seen]);
-        for (out, (&row, &direction)) in out.as_chunks_mut::<3>().0.iter_mut().zip(seen) {
-            let at = row as usize * stride;
-            let changed = changes.and_then(|changes| changes.of(row)).unwrap_or_default();
-            let b = basis(degree, direction);
-            *out = sum(&b, &sh.coefficients[at..at + stride], changed).map(|c| c.max(0.0));
-        }
-    });
+    tasks
+        .into_par_iter()
+        .flatten_iter()
+        .for_each(|ColoursOfPart { view, seen, out }| {
+            let degree = sh.degree.min(view.degree);
+            let seen = view.visible[seen.clone()].iter().zip(&view.directions[seen]);
+            for (out, (&row, &direction)) in out.as_chunks_mut::<3>().0.iter_mut().zip(seen) {
+                let at = row as usize * stride;
+                let changed = changes.and_then(|changes| changes.of(row)).unwrap_or_default();
+                let b = basis(degree, direction);
+                *out = sum(&b, &sh.coefficients[at..at + stride], changed).map(|c| c.max(0.0));
+            }
+        });
     all
+}
+
+/// A part of the colours of a view.
+struct ColoursOfPart<'a> {
+    view: &'a PreparedView,
+    /// Which of the visible Gaussians.
+    seen: Range<usize>,
+    out: &'a mut [f32],
 }
 
 /// `0.5 + sum over k of b[k] (coefficients[k] + changed[k])`, by colour; there may be fewer changes than coefficients.
@@ -142,7 +153,7 @@ fn sum(b: &[f32; MAX_COEFFICIENTS], coefficients: &[f32], changed: &[f32]) -> [f
 }
 
 /// Where rows `0..ROWS`, `ROWS..2 ROWS` and so on are in ascending rows.
-fn parts(rows: &[u32]) -> impl Iterator<Item = std::ops::Range<usize>> {
+fn parts(rows: &[u32]) -> impl Iterator<Item = Range<usize>> {
     let mut start = 0;
     (1..).map(move |part: usize| {
         let end = start + rows[start..].partition_point(|row| (*row as usize) < part * ROWS);
@@ -191,7 +202,7 @@ pub fn backward_of_views(learnable: &Learnable, views: &[ColourGradient<'_>], ou
 
 impl ColourGradient<'_> {
     /// Of a range of the visible Gaussians; `out` starts at the slot `first`.
-    fn add(&self, learnable: &Learnable, seen: std::ops::Range<usize>, first: usize, out: &mut [f32]) {
+    fn add(&self, learnable: &Learnable, seen: Range<usize>, first: usize, out: &mut [f32]) {
         let (view, columns) = (self.view, learnable.columns());
         let degree = learnable.degree().min(view.degree);
         let (colours, gradients) = (self.colours.as_chunks::<3>().0, self.gradient.as_chunks::<3>().0);
