@@ -63,11 +63,10 @@ pub fn verify(
     let (mut of_covered, mut shares): (Vec<Psnr>, f64) = (Vec::new(), 0.0);
     for index in 0..settings.verify.views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let [before, after] = [&original, &marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
-        let after = after?;
+        let [before, on_black] = engine.pictures(&original, &camera, [[1.0; 3], [0.0; 3]])?;
+        let after = engine.picture(&marked, &camera, [1.0; 3])?;
         logits.extend(engine.read_logits(std::slice::from_ref(&after))?);
-        let before = before?;
-        let mask = covered(&before, &engine.picture(&original, &camera, [0.0; 3])?)?;
+        let mask = covered(&before, &on_black)?;
         of_covered.extend(psnr_covered(&before, &after, &mask)?);
         shares += cover::share(&mask);
         pairs.push((before, after));

@@ -232,10 +232,33 @@ impl Engine {
     /// # Errors
     /// Those of [`Geometry::prepare`] and of the renderer; [`Error::Stopped`].
     pub fn picture(&self, geometry: &Geometry<'_>, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
+        let [picture] = self.pictures(geometry, camera, [background])?;
+        Ok(picture)
+    }
+
+    /// [`Engine::picture`] of one view over each of some backgrounds.
+    ///
+    /// # Errors
+    /// Those of [`Engine::picture`].
+    pub fn pictures<const N: usize>(
+        &self,
+        geometry: &Geometry<'_>,
+        camera: &Camera,
+        backgrounds: [[f32; 3]; N],
+    ) -> Result<[Picture; N]> {
         self.stop.check()?;
         let view = geometry.prepare(camera, WeightCache::None)?;
         let colours = sh::colours(geometry.sh(), None, &view);
-        Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
+        let rasterizer = self.rasterizer()?;
+        let mut pictures = backgrounds.map(|_| Picture {
+            width: 0,
+            height: 0,
+            pixels: Vec::new(),
+        });
+        for (picture, background) in pictures.iter_mut().zip(backgrounds) {
+            *picture = rasterizer.render(&view, &colours, background)?.to_8_bit();
+        }
+        Ok(pictures)
     }
 
     /// `work` on each item, in order. On the CPU items run side by side; a GPU has one queue, and waiting for it on

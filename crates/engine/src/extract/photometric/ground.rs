@@ -1,6 +1,7 @@
 //! The ground behind a scene, where a picture shows it all around: noise, compression and changed tones leave it neither
 //! black nor white any more, and then it weighs more in a reading than the scene does.
 use crate::picture::Picture;
+use crate::simd::{Instructions, Vectorised};
 
 /// Distance from the ground's colour up to which a pixel is ground, and from which on it is none.
 const DISTANCE: [f32; 2] = [0.06, 0.12];
@@ -16,14 +17,34 @@ pub(in crate::extract) fn whitened(picture: &Picture) -> Option<Picture> {
 
 /// The picture with all of that colour made white.
 pub(in crate::extract) fn whitened_from(picture: &Picture, ground: [f32; 3]) -> Picture {
-    let [near, far] = DISTANCE;
-    let pixels = picture.pixels.as_chunks::<3>().0.iter().flat_map(|pixel| {
-        let scene = ((distance(pixel, ground) - near) / (far - near)).clamp(0.0, 1.0);
-        pixel.map(|v| v * scene + (1.0 - scene))
+    let mut pixels = vec![0.0; picture.pixels.len()];
+    Instructions::widest().run(Whiten {
+        pixels: picture.pixels.as_chunks().0,
+        ground,
+        out: pixels.as_chunks_mut().0,
     });
-    Picture {
-        pixels: pixels.collect(),
-        ..*picture
+    Picture { pixels, ..*picture }
+}
+
+/// Makes what is of a colour white.
+struct Whiten<'a> {
+    pixels: &'a [[f32; 3]],
+    ground: [f32; 3],
+    out: &'a mut [[f32; 3]],
+}
+
+impl Vectorised for Whiten<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let [near, far] = DISTANCE;
+        for (out, pixel) in self.out.iter_mut().zip(self.pixels) {
+            let scene = ((distance(pixel, self.ground) - near) / (far - near)).clamp(0.0, 1.0);
+            for c in 0..3 {
+                out[c] = pixel[c] * scene + (1.0 - scene);
+            }
+        }
     }
 }
 
@@ -62,9 +83,12 @@ pub(super) fn is_white(value: f32) -> bool {
 }
 
 /// How far a pixel is from a colour.
+#[inline(always)]
 fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
-    let differences = pixel.iter().zip(colour).map(|(v, c)| (v - c).abs());
-    differences.fold(0.0, f32::max)
+    let [red, green, blue] = [pixel[0] - colour[0], pixel[1] - colour[1], pixel[2] - colour[2]];
+    // Of two differences the larger; a maximum that minds NaN takes three times as long.
+    let larger = |a: f32, b: f32| if b > a { b } else { a };
+    larger(larger(larger(0.0, red.abs()), green.abs()), blue.abs())
 }
 
 /// The outermost pixels.
