@@ -434,7 +434,8 @@ fn the_machine_is_measured() {
     let bench = Bench::new();
     write(
         &bench.path("few.json"),
-        r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null, "verify": {"views": 1}}"#,
+        r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
+            "verify": {"views": 1, "message_views": 1}}"#,
     );
     let line = "bench --gaussians 60,200 --presets draft --repetitions 2 --settings few.json --device cpu";
     let told = bench.json(&format!("{line} --json"), 0);
@@ -464,7 +465,7 @@ fn the_machine_is_measured() {
         let sum: f64 = stages.iter().map(|stage| stage[1]["median"].as_f64().unwrap()).sum();
         assert!(stages.len() == 7 && sum > 0.0, "{steps}");
     }
-    let text = bench.exits(&line.replace("60,200", "60"), 0);
+    let text = bench.exits(&line.replace("60,200", "60").replace("repetitions 2", "repetitions 1"), 0);
     assert!(
         text.contains("60 Gaussians") && text.contains("loss and gradient: "),
         "{text}"
