@@ -465,7 +465,10 @@ fn the_machine_is_measured() {
         let sum: f64 = stages.iter().map(|stage| stage[1]["median"].as_f64().unwrap()).sum();
         assert!(stages.len() == 7 && sum > 0.0, "{steps}");
     }
-    let text = bench.exits(&line.replace("60,200", "60").replace("repetitions 2", "repetitions 1"), 0);
+    let text = bench.exits(
+        &line.replace("60,200", "60").replace("repetitions 2", "repetitions 1"),
+        0,
+    );
     assert!(
         text.contains("60 Gaussians") && text.contains("loss and gradient: "),
         "{text}"
