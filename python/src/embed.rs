@@ -183,6 +183,7 @@ fn tell(context: &Context, progress: Progress) {
         | Progress::Covered { .. }
         | Progress::Check(_)
         | Progress::Stopped { .. }
+        | Progress::Timed(_)
         | Progress::Writing => {}
     }
 }

@@ -3,6 +3,7 @@ mod cli;
 mod error;
 mod evaluate;
 mod jobs;
+mod machine;
 
 fn main() -> std::process::ExitCode {
     cli::run()

@@ -13,7 +13,7 @@ use guardsplat_engine::embed::{Adam, AdamOptions, Penalty};
 use guardsplat_engine::extract::rasterizer;
 use guardsplat_engine::sample::sample;
 use guardsplat_engine::scene::{Gaussians, Scene};
-use guardsplat_engine::splat::{Learnable, Rasterizer, WeightCache, prepare_timed, sh};
+use guardsplat_engine::splat::{Geometry, Learnable, Rasterizer, WeightCache, sh};
 use guardsplat_engine::view::{Split, ViewSampler};
 use plotters::prelude::*;
 
@@ -137,7 +137,7 @@ fn round(
     } else {
         WeightCache::None
     };
-    let (view, times) = prepare_timed(scene, &camera, cache)?;
+    let (view, times) = Geometry::new(scene).prepare_timed(&camera, cache)?;
     let start = Instant::now();
     let colours = sh::colours(&scene.sh, None, &view);
     let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
@@ -162,7 +162,15 @@ fn round(
 
     let start = Instant::now();
     let of_colours = rasterizer.backward(&view, &of_picture)?;
-    sh::backward(&learnable, &view, &colours, &of_colours, &mut gradient);
+    sh::backward(
+        &learnable,
+        sh::ColourGradient {
+            view: &view,
+            colours: &colours,
+            gradient: &of_colours,
+        },
+        &mut gradient,
+    );
     let backward = milliseconds(start);
 
     let slots = learnable.rows().len();

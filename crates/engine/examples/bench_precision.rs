@@ -13,7 +13,7 @@ use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::{BadRows, Gaussians, Scene};
-use guardsplat_engine::splat::{Learnable, WeightCache, prepare_averaged, sh};
+use guardsplat_engine::splat::{Geometry, Learnable, WeightCache, sh};
 use guardsplat_engine::view::{Split, ViewSampler};
 
 type Failure = Box<dyn std::error::Error>;
@@ -113,6 +113,7 @@ fn differences(engine: &Engine, scene: &Gaussians, both: [&Settings; 2]) -> Resu
     let rasterizer = engine.rasterizer()?;
     let (mut max, mut sum, mut count) = (0.0f64, 0.0, 0);
     let mut gradients = [vec![0.0; learnable.len()], vec![0.0; learnable.len()]];
+    let geometry = Geometry::new(scene);
     for index in 0..VIEWS {
         let mut pictures = Vec::new();
         for (settings, gradient) in both.into_iter().zip(&mut gradients) {
@@ -122,12 +123,20 @@ fn differences(engine: &Engine, scene: &Gaussians, both: [&Settings; 2]) -> Resu
             } else {
                 WeightCache::Weights
             };
-            let view = prepare_averaged(scene, &camera, settings.enlarged, cache)?;
+            let view = geometry.prepare_averaged(&camera, settings.enlarged, cache)?;
             let colours = sh::colours(&scene.sh, None, &view);
             let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
             let waves = waves(picture.width);
             let of_colours = rasterizer.backward(&view, &waves.pixels)?;
-            sh::backward(&learnable, &view, &colours, &of_colours, gradient);
+            sh::backward(
+                &learnable,
+                sh::ColourGradient {
+                    view: &view,
+                    colours: &colours,
+                    gradient: &of_colours,
+                },
+                gradient,
+            );
             pictures.push(picture.pixels);
         }
         if pictures[0].len() == pictures[1].len() {

@@ -137,7 +137,15 @@ fn cost(sh: &Sh, learnable: &Learnable, views: &[PreparedView]) -> Cost {
             };
             let colours = sh::colours(sh, Some(changes), view);
             let of_colours = vec![1e-3; colours.len()];
-            sh::backward(learnable, view, &colours, &of_colours, &mut gradient);
+            sh::backward(
+                learnable,
+                sh::ColourGradient {
+                    view,
+                    colours: &colours,
+                    gradient: &of_colours,
+                },
+                &mut gradient,
+            );
         }
         adam.step(1.0, penalty, &mut offsets, &mut gradient);
         ms = ms.min(start.elapsed().as_secs_f64() * 1e3);

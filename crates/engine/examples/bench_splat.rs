@@ -65,7 +65,15 @@ fn measure(
             lap(2);
             let gradient = rasterizer.backward(&view, &picture.pixels)?;
             lap(3);
-            sh::backward(&learnable, &view, &colours, &gradient, &mut sum);
+            sh::backward(
+                &learnable,
+                sh::ColourGradient {
+                    view: &view,
+                    colours: &colours,
+                    gradient: &gradient,
+                },
+                &mut sum,
+            );
             lap(4);
             visible += view.visible.len() / cameras.len();
             pairs += view.tiles.pairs() / cameras.len();

@@ -13,6 +13,7 @@ use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
 use guardsplat_engine::message::{ClipIdentity, FitOptions, Key, KeyOptions, Message, TrainingOptions};
 use guardsplat_engine::sample::sample;
 use guardsplat_engine::scene::{BadRows, Gaussians, Scene};
+use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::stop::Stop;
 use guardsplat_engine::testing::scene_path;
 use guardsplat_engine::view::{Split, ViewSampler};
@@ -208,7 +209,7 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     );
     let sampler = ViewSampler::new(&scene, 3).unwrap();
     let camera = sampler.camera(Split::HeldOut, 0, 32);
-    let first = engine.picture(&scene, &camera, [1.0; 3]).unwrap();
+    let first = engine.picture(&Geometry::new(&scene), &camera, [1.0; 3]).unwrap();
     assert_eq!(found.pairs[0].1, first);
     assert_eq!(read_pictures(&engine, &[first]).unwrap().views[0], reading.views[0]);
     assert!(found.quality.psnr.psnr_db.unwrap() > 20.0);

@@ -11,7 +11,7 @@ use guardsplat_engine::memory::{
 };
 use guardsplat_engine::quality::Difficulty;
 use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
-use guardsplat_engine::splat::{WeightCache, prepare, sh};
+use guardsplat_engine::splat::{Geometry, WeightCache, sh};
 use guardsplat_engine::view::{Camera, Extent, Openness, SceneKind, Split, ViewSampler};
 use serde::Serialize;
 
@@ -217,12 +217,9 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
 /// What some held-out views show.
 fn measure_difficulty(gaussians: &Gaussians, sampler: &ViewSampler) -> Result<Difficulty> {
     let rasterizer = rasterizer(&open(DeviceChoice::Cpu)?)?;
+    let geometry = Geometry::new(gaussians);
     let view = |index: u64| {
-        let view = prepare(
-            gaussians,
-            &sampler.camera(Split::HeldOut, index, SIDE),
-            WeightCache::None,
-        )?;
+        let view = geometry.prepare(&sampler.camera(Split::HeldOut, index, SIDE), WeightCache::None)?;
         let colours = sh::colours(&gaussians.sh, None, &view);
         let [white, black] = [1.0, 0.0].map(|ground| rasterizer.render(&view, &colours, [ground; 3]));
         Ok([white?.to_8_bit(), black?.to_8_bit()])
@@ -232,10 +229,11 @@ fn measure_difficulty(gaussians: &Gaussians, sampler: &ViewSampler) -> Result<Di
 
 /// How many Gaussians so many training views show.
 fn count_seen(gaussians: &Gaussians, sampler: &ViewSampler, views: u32) -> Result<usize> {
+    let geometry = Geometry::new(gaussians);
     let mut seen = vec![false; gaussians.len()];
     for index in 0..u64::from(views) {
         let camera = sampler.camera(Split::Training, index, SIDE);
-        for row in prepare(gaussians, &camera, WeightCache::Weights)?.visible {
+        for row in geometry.prepare(&camera, WeightCache::Weights)?.visible {
             seen[row as usize] = true;
         }
     }

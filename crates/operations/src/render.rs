@@ -9,7 +9,7 @@ use guardsplat_engine::memory::{
 };
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
-use guardsplat_engine::splat::{WeightCache, prepare, sh};
+use guardsplat_engine::splat::{Geometry, WeightCache, sh};
 use guardsplat_engine::view::{Camera, SceneKind, Split, ViewSampler, Viewpoints};
 
 /// Side of views where neither a size nor cameras say otherwise.
@@ -105,8 +105,9 @@ pub fn render(
         }
     };
     let rasterizer = rasterizer(&open(rendering.device)?)?;
+    let geometry = Geometry::new(gaussians);
     for (index, camera) in cameras.iter().enumerate() {
-        let view = prepare(gaussians, camera, WeightCache::None)?;
+        let view = geometry.prepare(camera, WeightCache::None)?;
         let colours = sh::colours(&gaussians.sh, None, &view);
         let picture = rasterizer.render(&view, &colours, rendering.background)?;
         each(index, cameras.len(), camera, picture)?;

@@ -5,6 +5,7 @@ use guardsplat_engine::extract::{DEFAULT_VIEWS, Engine, default_size, read_scene
 use guardsplat_engine::message::{Key, Message};
 use guardsplat_engine::quality::measure;
 use guardsplat_engine::scene::{Gaussians, Scene};
+use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::view::{Split, ViewSampler};
 use guardsplat_tests::{TestEnvironment, real_scene};
 
@@ -105,7 +106,8 @@ impl Attacked {
         let pairs: Vec<_> = (0..8)
             .map(|index| {
                 let camera = sampler.camera(Split::HeldOut, index, default_size(&self.engine));
-                let [one, other] = [one, other].map(|scene| self.engine.picture(scene, &camera, WHITE).unwrap());
+                let [one, other] =
+                    [one, other].map(|scene| self.engine.picture(&Geometry::new(scene), &camera, WHITE).unwrap());
                 (one, other)
             })
             .collect();

@@ -1,7 +1,7 @@
 //! Whoever has a marked scene renders it, throws its colours away, and trains new ones from the pictures.
 use guardsplat_engine::extract::default_size;
 use guardsplat_engine::scene::{Gaussians, Sh};
-use guardsplat_engine::splat::{Learnable, WeightCache, prepare, sh};
+use guardsplat_engine::splat::{Geometry, Learnable, WeightCache, sh};
 use guardsplat_engine::view::{Split, ViewSampler};
 
 use crate::attacked::Attacked;
@@ -20,6 +20,7 @@ fn trained(it: &Attacked, scene: &Gaussians, steps: &[usize], mut look: impl FnM
         },
         ..scene.clone()
     };
+    let geometry = Geometry::new(scene);
     let learnable = Learnable::all(&copy);
     let sampler = ViewSampler::new(scene, 4242).unwrap();
     let (mut first, mut second) = (vec![0.0_f32; 3 * count], vec![0.0_f32; 3 * count]);
@@ -27,8 +28,8 @@ fn trained(it: &Attacked, scene: &Gaussians, steps: &[usize], mut look: impl FnM
     for step in 1..=last {
         let camera = sampler.camera(Split::Training, step as u64, 2 * default_size(&it.engine));
         // The attacker has the scene, so as many pictures of it as they like, with 8 bits a channel.
-        let wanted = it.engine.picture(scene, &camera, WHITE).unwrap();
-        let view = prepare(&copy, &camera, WeightCache::None).unwrap();
+        let wanted = it.engine.picture(&geometry, &camera, WHITE).unwrap();
+        let view = geometry.prepare(&camera, WeightCache::None).unwrap();
         let colours = sh::colours(&copy.sh, None, &view);
         let rasterizer = it.engine.rasterizer().unwrap();
         let shown = rasterizer.render(&view, &colours, WHITE).unwrap();
@@ -40,7 +41,15 @@ fn trained(it: &Attacked, scene: &Gaussians, steps: &[usize], mut look: impl FnM
             .collect();
         let gradient = rasterizer.backward(&view, &gradient).unwrap();
         let mut change = vec![0.0; learnable.len()];
-        sh::backward(&learnable, &view, &colours, &gradient, &mut change);
+        sh::backward(
+            &learnable,
+            sh::ColourGradient {
+                view: &view,
+                colours: &colours,
+                gradient: &gradient,
+            },
+            &mut change,
+        );
         let [b1, b2] = [0.9_f32, 0.999];
         let correction = (1.0 - b2.powi(step as i32)).sqrt() / (1.0 - b1.powi(step as i32));
         for (i, g) in change.into_iter().enumerate() {

@@ -165,6 +165,7 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
         Progress::Stopped { step } => {
             display.say(&format!("enough after {step} steps: the held-out margin holds"));
         }
+        Progress::Timed(_) => {}
         Progress::Writing => display.finish(),
         Progress::Verifying { done, total } => {
             verifying

@@ -1,4 +1,5 @@
 //! The command line: what there is to say, and what the process exits with.
+mod bench;
 mod cameras;
 mod convert;
 mod display;
@@ -78,6 +79,8 @@ enum Command {
     Models(models::Command),
     /// Measures marks: scenes, lengths and seeds under attacks, kept in a folder, with reports
     Evaluate(Box<evaluate::Arguments>),
+    /// Measures how long marking and verifying take on this machine, with sample scenes
+    Bench(bench::Arguments),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
 }
@@ -193,6 +196,7 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Convert(arguments) => convert::run(&arguments)?,
         Command::Sample(arguments) => sample::run(&arguments)?,
         Command::Models(command) => models::run(command)?,
+        Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Run(arguments) => run::run(arguments),
     })
 }
@@ -256,6 +260,7 @@ mod tests {
             "cameras colmap/sparse/0 cameras.json",
             "sample OUT --gaussians 100 --sh-degree 2 --seed 4",
             "run --server http://127.0.0.1:50051 --device cpu --name a --stop-with-stdin --work-dir D --memory 16777216",
+            "bench --gaussians 1000,20000 --presets draft,standard --repetitions 3 --device cpu --key K --json",
             "models list",
             "models verify",
         ] {

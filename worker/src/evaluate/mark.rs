@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use guardsplat_evaluation::report::record::{Embedding, Mark};
 
-use super::machine::Machine;
 use super::read::Views;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use guardsplat_engine::embed::{Progress, Settings, optimise};
 use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Message;

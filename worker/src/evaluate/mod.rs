@@ -4,7 +4,6 @@
 //! the store yet, has claims made about marks and detectors judge them where that is asked for. What comes of it is told by [`guardsplat_evaluation::report`].
 mod claims;
 mod guessed;
-mod machine;
 mod mark;
 mod plan;
 mod read;

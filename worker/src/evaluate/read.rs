@@ -14,6 +14,7 @@ use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, read_given
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
 use guardsplat_engine::scene::Gaussians;
+use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::view::{Camera, Split, ViewSampler};
 
 /// Numbers of views from which the whole message is read.
@@ -63,9 +64,10 @@ pub(super) struct Views {
 
 impl Views {
     pub fn render(engine: &Engine, gaussians: &Gaussians, cameras: &[HeldOutCamera]) -> Result<Self> {
+        let geometry = Geometry::new(gaussians);
         let images = cameras
             .iter()
-            .map(|placed| to_image(&engine.picture(gaussians, &placed.camera, [1.0; 3])?))
+            .map(|placed| to_image(&engine.picture(&geometry, &placed.camera, [1.0; 3])?))
             .collect::<Result<_>>()?;
         Ok(Self {
             cameras: cameras.to_vec(),

@@ -12,13 +12,13 @@ use rand_chacha::ChaCha20Rng;
 use sha2::{Digest, Sha256};
 
 use super::claims::ClaimTrials;
-use super::machine::Machine;
 use super::mark::{Marking, path};
 use super::plan::{Plan, WantedMark};
 use super::read::{Views, cameras};
 use super::steganalysis::{Marked, SteganalysisRun};
 use super::trials::TrialRun;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use guardsplat_engine::embed;
 use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::{Key, Message};

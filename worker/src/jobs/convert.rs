@@ -125,6 +125,7 @@ pub fn embedding_progress(progress: &embed::Progress) -> Option<api::Progress> {
         embed::Progress::Admitted(_)
         | embed::Progress::Covered { .. }
         | embed::Progress::Check(_)
+        | embed::Progress::Timed(_)
         | embed::Progress::Stopped { .. }
         | embed::Progress::Writing => None,
     }

@@ -8,7 +8,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
 use crate::scene::Gaussians;
-use crate::splat::{Changes, sh};
+use crate::splat::{Changes, Geometry};
 use crate::view::{Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed.
@@ -23,7 +23,7 @@ impl EarlyStopping {
     /// was taken on.
     pub fn new(
         engine: &Engine,
-        gaussians: &Gaussians,
+        geometry: &Geometry<'_>,
         sampler: &ViewSampler,
         settings: &Settings,
         stop: EarlyStop,
@@ -33,7 +33,7 @@ impl EarlyStopping {
         let indices: Vec<u64> = (first..first + stop.views as u64).collect();
         let views = engine.each(&indices, |&index| {
             let camera = sampler.camera(Split::HeldOut, index, size);
-            let mut view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?;
+            let mut view = PooledView::new(engine, geometry, &camera, 1.0, settings.half_weights, [1.0; 3])?;
             view.reference = view.reference.to_8_bit();
             Ok(view)
         })?;
@@ -54,10 +54,9 @@ impl EarlyStopping {
         message: &Message,
         step: usize,
     ) -> Result<(Check, bool)> {
-        let pictures: Vec<Picture> = engine.each(&self.views, |v| {
-            let colours = sh::colours(&gaussians.sh, Some(changes), &v.view);
-            Ok(v.draw(engine, &colours)?.to_8_bit())
-        })?;
+        let colours = PooledView::colours(&self.views, &gaussians.sh, Some(changes));
+        let drawn: Vec<(&PooledView, Vec<f32>)> = self.views.iter().zip(colours).collect();
+        let pictures: Vec<Picture> = engine.each(&drawn, |(v, colours)| Ok(v.draw(engine, colours)?.to_8_bit()))?;
         let psnrs = self
             .views
             .iter()

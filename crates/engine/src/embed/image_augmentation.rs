@@ -3,8 +3,10 @@
 //! People compress pictures of some 800 pixels, and training views have 160: squares of JPEG's eight pixels would be five
 //! times too large there, and every pixel would have the noise of twenty-five. So a view that something is done to is
 //! enlarged first, and CLIP takes it in at its own size as always.
+use std::collections::BTreeMap;
+
 use burn::tensor::{Int, Tensor, TensorData};
-use guardsplat_distortion::{Draw, Layer};
+use guardsplat_distortion::{DistortionKind, Draw, Layer};
 use rand_chacha::ChaCha8Rng;
 
 use super::settings::Settings;
@@ -47,7 +49,11 @@ impl ImageAugmentation {
             return engine.logits(pictures);
         }
         let draws = self.layer.draw(pictures.dims()[0], rng);
-        let (clean, distorted): (Vec<usize>, Vec<usize>) = (0..draws.len()).partition(|&i| draws[i] == Draw::Clean);
+        // One kind after the other, so that no picture is put into another order while it is large.
+        let mut alike: BTreeMap<Option<DistortionKind>, Vec<usize>> = BTreeMap::new();
+        for (position, draw) in draws.iter().enumerate() {
+            alike.entry(draw.kind()).or_default().push(position);
+        }
         let device = pictures.device();
         let some = |positions: &[usize]| {
             let positions: Vec<i64> = positions.iter().map(|i| *i as i64).collect();
@@ -56,12 +62,13 @@ impl ImageAugmentation {
             pictures.clone().select(0, positions)
         };
         let mut parts = Vec::new();
-        if !clean.is_empty() {
-            parts.push(engine.logits(some(&clean))?);
-        }
-        if !distorted.is_empty() {
-            let chosen: Vec<Draw> = distorted.iter().map(|&i| draws[i].clone()).collect();
-            let large = resize(some(&distorted), self.side, self.side);
+        for (kind, positions) in &alike {
+            if kind.is_none() {
+                parts.push(engine.logits(some(positions))?);
+                continue;
+            }
+            let chosen: Vec<Draw> = positions.iter().map(|&i| draws[i].clone()).collect();
+            let large = resize(some(positions), self.side, self.side);
             let done = self.layer.apply_with(&chosen, large.clone(), CORNERS);
             let done = done.map_err(|e| Error::BadOption {
                 field: "distortions",
@@ -71,7 +78,7 @@ impl ImageAugmentation {
         }
         // Back in order: where each picture's row is among the parts.
         let mut order = vec![0_i64; draws.len()];
-        for (row, &position) in clean.iter().chain(&distorted).enumerate() {
+        for (row, &position) in alike.values().flatten().enumerate() {
             order[position] = row as i64;
         }
         let order = Tensor::<1, Int>::from_data(TensorData::new(order, [draws.len()]), &device);

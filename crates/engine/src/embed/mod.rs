@@ -37,7 +37,7 @@ pub use optimise::{Optimised, optimise};
 pub use optimizer::Optimizer;
 pub use preconditioned_sgd::{PreconditionedSgd, PreconditionedSgdOptions};
 pub use preset::Preset;
-pub use progress::{Check, LossTerms, Progress, Step};
+pub use progress::{Check, LossTerms, Progress, Step, StepTimes};
 pub use resources::{measure_view, measure_view_on_cpu, predict_memory};
 pub use settings::{EarlyStop, LossWeights, Ring, Settings, Verify};
 pub use target::Target;

@@ -21,7 +21,7 @@ use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
-use crate::splat::{Learnable, sh};
+use crate::splat::{Geometry, Learnable, sh};
 use crate::view::{Camera, ViewSampler};
 
 /// Steps between two reports of the timing.
@@ -62,15 +62,16 @@ pub fn optimise(
         });
     }
     let gaussians = &scene.gaussians;
+    let geometry = Geometry::new(gaussians);
     let mut sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
     if let Some(ring) = settings.ring {
         sampler.train_on_ring(ring.elevation.to_radians())?;
     }
     let mut held_out = settings
         .early_stop
-        .map(|stop| EarlyStopping::new(engine, gaussians, &sampler, settings, stop))
+        .map(|stop| EarlyStopping::new(engine, &geometry, &sampler, settings, stop))
         .transpose()?;
-    let (mut run, coverage) = Run::new(engine, scene, message, settings, sampler)?;
+    let (mut run, coverage) = Run::new(engine, scene, geometry, message, settings, sampler)?;
     progress(Progress::Covered {
         views: coverage.views,
         seen: coverage.count(),
@@ -90,7 +91,7 @@ pub fn optimise(
             progress(Progress::Check(check));
         }
         timing.lap(Stage::Check);
-        timing.end_step(steps, TIMED_STEPS);
+        progress(Progress::Timed(timing.end_step(steps, TIMED_STEPS)));
         if enough {
             progress(Progress::Stopped { step: steps });
             break;
@@ -114,6 +115,7 @@ enum OptimizerState {
 struct Run<'a> {
     engine: &'a Engine,
     scene: &'a Scene,
+    geometry: Geometry<'a>,
     settings: &'a Settings,
     loss: Loss<'a>,
     pool: ViewPool,
@@ -128,13 +130,14 @@ impl<'a> Run<'a> {
     fn new(
         engine: &'a Engine,
         scene: &'a Scene,
+        geometry: Geometry<'a>,
         message: &Message,
         settings: &'a Settings,
         sampler: ViewSampler,
     ) -> Result<(Self, Coverage)> {
         let of_parts = sampler.shows_parts();
         let mut pool = ViewPool::new(sampler, settings);
-        let coverage = pool.cover(engine, &scene.gaussians)?;
+        let coverage = pool.cover(engine, &geometry)?;
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
         let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
         augmentation.set_stream(u64::MAX - 1);
@@ -153,6 +156,7 @@ impl<'a> Run<'a> {
         let run = Self {
             engine,
             scene,
+            geometry,
             settings,
             loss: Loss::new(engine, settings, message),
             pool,
@@ -167,7 +171,7 @@ impl<'a> Run<'a> {
 
     /// One step; `step` counts from 1.
     fn step(&mut self, step: usize, timing: &mut StepTimer) -> Result<Step> {
-        let views = self.pool.batch(self.engine, &self.scene.gaussians)?;
+        let views = self.pool.batch(self.engine, &self.geometry)?;
         timing.lap(Stage::Prepare);
         let mut figures = self.differentiate(step, &views, timing)?;
 
@@ -200,7 +204,7 @@ impl<'a> Run<'a> {
     fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut StepTimer) -> Result<Step> {
         let (engine, scene) = (self.engine, &self.scene.gaussians);
         let changes = self.learned.changes();
-        let colours = engine.each(views, |v| Ok(v.colours(&scene.sh, Some(changes))))?;
+        let colours = PooledView::colours(views, &scene.sh, Some(changes));
         timing.lap(Stage::Colours);
         let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
         let pictures = engine.each(&drawn, |(v, colours)| v.draw(engine, colours))?;
@@ -217,10 +221,15 @@ impl<'a> Run<'a> {
         let drawn: Vec<(&PooledView, &Picture)> = views.iter().map(AsRef::as_ref).zip(&found.gradients).collect();
         let gradients = engine.each(&drawn, |(v, gradient)| v.backward(engine, gradient))?;
         timing.lap(Stage::Backward);
-        // One view after the other: sums in a fixed order.
-        for ((v, colours), gradient) in views.iter().zip(&colours).zip(&gradients) {
-            sh::backward(&self.learned.learnable, &v.view, colours, gradient, &mut self.gradient);
-        }
+        let of_views = views.iter().zip(&colours).zip(&gradients);
+        let of_views: Vec<sh::ColourGradient<'_>> = of_views
+            .map(|((v, colours), gradient)| sh::ColourGradient {
+                view: &v.view,
+                colours,
+                gradient,
+            })
+            .collect();
+        sh::backward_of_views(&self.learned.learnable, &of_views, &mut self.gradient);
         timing.lap(Stage::ShBackward);
         Ok(Step {
             step,
@@ -316,9 +325,10 @@ mod tests {
             .collect();
         for (message_weight, weight) in [(1.0, 0.0), (0.0, 1.0), (0.5, 2.0)] {
             (settings.lambda.message, settings.lambda.reconstruction) = (message_weight, weight);
+            let geometry = Geometry::new(&scene.gaussians);
             let sampler = ViewSampler::new(&scene.gaussians, 1).unwrap();
-            let (mut run, coverage) = Run::new(&engine, &scene, &message, &settings, sampler).unwrap();
-            let views = run.pool.batch(&engine, &scene.gaussians).unwrap();
+            let (mut run, coverage) = Run::new(&engine, &scene, geometry, &message, &settings, sampler).unwrap();
+            let views = run.pool.batch(&engine, &run.geometry).unwrap();
             // Offsets of Gaussians that no view shows have no slot.
             let columns = run.learned.learnable.columns();
             let start = start[..coverage.count() * columns].to_vec();

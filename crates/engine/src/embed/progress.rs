@@ -48,6 +48,27 @@ pub struct Check {
     pub margin: f64,
 }
 
+/// Where the wall time of a step went, in milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StepTimes {
+    /// New views: projected, sorted, weighed, and drawn as they are unmarked.
+    pub prepare: f64,
+    /// Colours of visible Gaussians.
+    pub colours: f64,
+    /// Pictures.
+    pub render: f64,
+    /// The loss, and its gradient to the pictures.
+    pub loss: f64,
+    /// The gradient to colours.
+    pub backward: f64,
+    /// The gradient to coefficients.
+    pub sh_backward: f64,
+    /// The optimiser.
+    pub optimiser: f64,
+    /// A look at held-out views, in steps that have one.
+    pub check: f64,
+}
+
 /// What is going on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "stage", rename_all = "snake_case")]
@@ -67,6 +88,8 @@ pub enum Progress {
     Step(Step),
     /// Held-out views were read.
     Check(Check),
+    /// A step has ended, with the look at held-out views, and took so long.
+    Timed(StepTimes),
     /// The held-out margin holds after so many steps, so there will be no more.
     Stopped {
         /// Steps done.

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::extract::{Engine, cpu_weight_cache};
 use crate::memory::{EmbeddingWorkload, MemoryRequirements, ModelBytes, SceneSize, ViewSize, embedding_requirements};
 use crate::scene::Gaussians;
-use crate::splat::{PreparedView, prepare};
+use crate::splat::{Geometry, PreparedView, prepare};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Predicts the most memory that an embedding with these settings has in use at once.
@@ -36,7 +36,15 @@ pub fn measure_view(
 ) -> Result<ViewSize> {
     let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
     let camera = sampler.camera(Split::Training, 0, settings.size);
-    let view = PooledView::new(engine, gaussians, &camera, 1.0, settings.half_weights, [1.0; 3])?.view;
+    let view = PooledView::new(
+        engine,
+        &Geometry::new(gaussians),
+        &camera,
+        1.0,
+        settings.half_weights,
+        [1.0; 3],
+    )?
+    .view;
     Ok(view_size(&view))
 }
 

@@ -7,8 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::scene::Gaussians;
-use crate::splat::PreparedView;
+use crate::splat::{Geometry, PreparedView};
 
 /// Largest deviation of noise on coefficients that a mark is to stand; smaller ones are drawn too.
 const NOISE: f32 = 0.1;
@@ -22,8 +21,6 @@ const SPZ: [f32; 2] = [1.0 / (255.0 * 0.15) / 3.464, 0.018];
 const SOG: [f32; 2] = [0.005, 0.03];
 /// The square of the constant spherical harmonic: with (n + 1)^2 of these, the mean square of all up to degree n.
 const MEAN_SQUARE: f32 = 0.079_577_47;
-/// The logit of an opacity that nobody sees.
-const UNSEEN: f32 = -100.0;
 
 /// What happens to the scene of one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,19 +54,13 @@ impl SceneAugmentation {
         }
     }
 
-    /// The scene with the Gaussians that are left out made invisible, where there are any; rows stay what they were.
-    pub fn pruned(self, gaussians: &Gaussians) -> Option<Gaussians> {
+    /// The scene without the Gaussians that are left out, where there are any; rows stay what they were.
+    pub fn pruned<'a>(self, geometry: &Geometry<'a>) -> Option<Geometry<'a>> {
         let Self::Prune { share, seed } = self else {
             return None;
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut pruned = gaussians.clone();
-        for logit in &mut pruned.opacity_logits {
-            if rng.random::<f32>() < share {
-                *logit = UNSEEN;
-            }
-        }
-        Some(pruned)
+        Some(geometry.without(|| rng.random::<f32>() < share))
     }
 
     /// What is added to the colours of the visible Gaussians of a view, `[visible][3]`; empty for nothing. Noise of the
@@ -90,7 +81,7 @@ impl SceneAugmentation {
 mod tests {
     use super::*;
     use crate::sample::sample;
-    use crate::splat::{WeightCache, prepare};
+    use crate::splat::WeightCache;
     use crate::view::{Split, ViewSampler};
 
     #[test]
@@ -117,13 +108,14 @@ mod tests {
     fn a_quarter_is_left_out_and_noise_has_its_deviation() {
         let scene = sample(4000, 2, 3).unwrap().gaussians;
         let camera = ViewSampler::new(&scene, 1).unwrap().camera(Split::Training, 0, 48);
-        let view = prepare(&scene, &camera, WeightCache::None).unwrap();
+        let geometry = Geometry::new(&scene);
+        let view = geometry.prepare(&camera, WeightCache::None).unwrap();
         let pruning = SceneAugmentation::Prune { share: 0.25, seed: 5 };
-        let pruned = pruning.pruned(&scene).unwrap();
-        let left = prepare(&pruned, &camera, WeightCache::None).unwrap().visible.len();
+        let pruned = pruning.pruned(&geometry).unwrap();
+        let left = pruned.prepare(&camera, WeightCache::None).unwrap().visible.len();
         let share = left as f64 / view.visible.len() as f64;
         assert!((share - 0.75).abs() < 0.05, "{share}");
-        assert!(pruning.noise(&view, 2).is_empty() && SceneAugmentation::None.pruned(&scene).is_none());
+        assert!(pruning.noise(&view, 2).is_empty() && SceneAugmentation::None.pruned(&geometry).is_none());
 
         let noise = SceneAugmentation::Noise {
             dc: 0.1,

@@ -6,6 +6,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
 use crate::scene::Gaussians;
+use crate::splat::Geometry;
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Pairs of pictures that are kept to look at.
@@ -56,16 +57,16 @@ pub fn verify(
     let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
     // From the original, so that both scenes are seen by the same cameras whatever happened to the other.
     let sampler = ViewSampler::seen_from(original, settings.seed, settings.viewpoints(cameras))?;
+    let [original, marked] = [original, marked].map(Geometry::new);
     let mut pairs = Vec::with_capacity(settings.verify.views);
     let mut logits = Vec::with_capacity(settings.verify.views);
     let (mut of_covered, mut shares): (Vec<Psnr>, f64) = (Vec::new(), 0.0);
     for index in 0..settings.verify.views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let [before, after] = [original, marked].map(|scene| engine.picture(scene, &camera, [1.0; 3]));
-        let after = after?;
+        let [before, on_black] = engine.pictures(&original, &camera, [[1.0; 3], [0.0; 3]])?;
+        let after = engine.picture(&marked, &camera, [1.0; 3])?;
         logits.push(read_given(engine, &after)?);
-        let before = before?;
-        let mask = covered(&before, &engine.picture(original, &camera, [0.0; 3])?)?;
+        let mask = covered(&before, &on_black)?;
         of_covered.extend(psnr_covered(&before, &after, &mask)?);
         shares += cover::share(&mask);
         pairs.push((before, after));

@@ -3,6 +3,7 @@
 //! The first ones are as many as show every Gaussian that can be seen; which these are is known from then on.
 //! Fixed sets of views are memorised instead of generalised from; always preparing all views anew wastes what a view
 //! keeps. So every step adds fresh views to the pool, and the oldest leave it.
+use std::borrow::Borrow;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -14,8 +15,8 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::picture::Picture;
-use crate::scene::{Gaussians, Sh};
-use crate::splat::{Changes, PreparedView, prepare_averaged, sh};
+use crate::scene::Sh;
+use crate::splat::{Changes, Geometry, PreparedView, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
@@ -38,7 +39,7 @@ impl PooledView {
     /// drawn with in half precision.
     pub fn new(
         engine: &Engine,
-        gaussians: &Gaussians,
+        geometry: &Geometry<'_>,
         camera: &Camera,
         times: f32,
         half: bool,
@@ -50,18 +51,19 @@ impl PooledView {
             background,
             augmentation: SceneAugmentation::None,
         };
-        Self::altered(engine, gaussians, camera, how)
+        Self::altered(engine, geometry, camera, how)
     }
 
     /// As [`PooledView::new`], of a scene to which something happened.
-    fn altered(engine: &Engine, gaussians: &Gaussians, camera: &Camera, how: TrainingView) -> Result<Self> {
-        let pruned = how.augmentation.pruned(gaussians);
-        let shown = pruned.as_ref().unwrap_or(gaussians);
-        let mut view = prepare_averaged(shown, camera, how.times, engine.weight_cache(camera.width, how.half))?;
+    fn altered(engine: &Engine, geometry: &Geometry<'_>, camera: &Camera, how: TrainingView) -> Result<Self> {
+        let pruned = how.augmentation.pruned(geometry);
+        let shown = pruned.as_ref().unwrap_or(geometry);
+        let cache = engine.weight_cache(camera.width, how.half);
+        let mut view = shown.prepare_averaged(camera, how.times, cache)?;
         if let SceneAugmentation::TruncateSh(degree) = how.augmentation {
             view.degree = view.degree.min(degree);
         }
-        let noise = how.augmentation.noise(&view, gaussians.sh.degree);
+        let noise = how.augmentation.noise(&view, geometry.sh().degree);
         let empty = Picture {
             width: 0,
             height: 0,
@@ -73,18 +75,21 @@ impl PooledView {
             noise,
             reference: empty,
         };
-        let colours = pooled.colours(&gaussians.sh, None);
-        pooled.reference = pooled.draw(engine, &colours)?;
+        let colours = Self::colours(&[&pooled], geometry.sh(), None);
+        pooled.reference = pooled.draw(engine, &colours[0])?;
         Ok(pooled)
     }
 
-    /// Colours of the visible Gaussians, with changes to the scene's.
-    pub fn colours(&self, sh: &Sh, changes: Option<Changes<'_>>) -> Vec<f32> {
-        let mut colours = sh::colours(sh, changes, &self.view);
-        for (colour, noise) in colours.iter_mut().zip(&self.noise) {
-            *colour = (*colour + noise).max(0.0);
+    /// Colours of the visible Gaussians of each view, with changes to the scene's.
+    pub fn colours<V: Borrow<Self>>(views: &[V], sh: &Sh, changes: Option<Changes<'_>>) -> Vec<Vec<f32>> {
+        let prepared: Vec<&PreparedView> = views.iter().map(|v| &v.borrow().view).collect();
+        let mut all = sh::colours_of_views(sh, changes, &prepared);
+        for (view, colours) in views.iter().zip(&mut all) {
+            for (colour, noise) in colours.iter_mut().zip(&view.borrow().noise) {
+                *colour = (*colour + noise).max(0.0);
+            }
         }
-        colours
+        all
     }
 
     /// The picture with these colours of the visible Gaussians.
@@ -160,12 +165,12 @@ impl ViewPool {
     }
 
     /// Fills the pool with the first views, as many as show every Gaussian that can be seen.
-    pub fn cover(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<Coverage> {
-        let mut seen = vec![false; gaussians.len()];
-        let mut energies = vec![0.0; gaussians.len()];
+    pub fn cover(&mut self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Coverage> {
+        let mut seen = vec![false; geometry.len()];
+        let mut energies = vec![0.0; geometry.len()];
         let (mut views, mut count) = (0, 0);
         loop {
-            let made = self.make(engine, gaussians, self.settings.views_per_step)?;
+            let made = self.make(engine, geometry, self.settings.views_per_step)?;
             views += made.len();
             let mut new = 0;
             for row in made.iter().flat_map(|view| &view.view.visible) {
@@ -189,13 +194,13 @@ impl ViewPool {
 
     /// The views of the next step. There are more fresh ones than the settings say while the pool does not hold enough
     /// others, and none once there were as many as the settings allow.
-    pub fn batch(&mut self, engine: &Engine, gaussians: &Gaussians) -> Result<Vec<Arc<PooledView>>> {
+    pub fn batch(&mut self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Vec<Arc<PooledView>>> {
         let s = &self.settings;
         let enough = s.views.is_some_and(|views| self.kept.len() >= views);
         let wanted = if enough { 0 } else { s.fresh_per_step };
         let old = (s.views_per_step - wanted).min(self.kept.len());
         let fresh = s.views_per_step - old;
-        let made = self.make(engine, gaussians, fresh)?;
+        let made = self.make(engine, geometry, fresh)?;
         let mut batch = made.clone();
         // A partial shuffle of the numbers of the kept views: all are distinct.
         let mut numbers: Vec<usize> = (0..self.kept.len()).collect();
@@ -209,13 +214,13 @@ impl ViewPool {
     }
 
     /// The next views; beyond the number that the settings allow it begins again with those that did not fit in memory.
-    fn make(&mut self, engine: &Engine, gaussians: &Gaussians, count: usize) -> Result<Vec<Arc<PooledView>>> {
+    fn make(&mut self, engine: &Engine, geometry: &Geometry<'_>, count: usize) -> Result<Vec<Arc<PooledView>>> {
         let all = self.settings.views.map_or(u64::MAX, |views| views as u64);
         let wanted: Vec<u64> = (self.next..self.next + count as u64).map(|i| i % all).collect();
         let made = engine.each(&wanted, |&index| {
             let camera = self.sampler.camera(Split::Training, index, self.settings.size);
-            let how = self.chosen(index, gaussians.sh.degree);
-            Ok(Arc::new(PooledView::altered(engine, gaussians, &camera, how)?))
+            let how = self.chosen(index, geometry.sh().degree);
+            Ok(Arc::new(PooledView::altered(engine, geometry, &camera, how)?))
         })?;
         self.next += count as u64;
         Ok(made)

@@ -15,8 +15,7 @@ use crate::memory::Limits;
 use crate::message::Key;
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch, unbatch};
-use crate::scene::Gaussians;
-use crate::splat::{CpuRasterizer, GpuRasterizer, Rasterizer, WeightCache, prepare, sh};
+use crate::splat::{CpuRasterizer, Geometry, GpuRasterizer, Rasterizer, WeightCache, sh};
 use crate::stop::Stop;
 use crate::view::Camera;
 
@@ -231,12 +230,35 @@ impl Engine {
     /// The 8-bit picture of a view that is drawn once.
     ///
     /// # Errors
-    /// Those of [`prepare`] and of the renderer; [`Error::Stopped`].
-    pub fn picture(&self, gaussians: &Gaussians, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
+    /// Those of [`Geometry::prepare`] and of the renderer; [`Error::Stopped`].
+    pub fn picture(&self, geometry: &Geometry<'_>, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
+        let [picture] = self.pictures(geometry, camera, [background])?;
+        Ok(picture)
+    }
+
+    /// [`Engine::picture`] of one view over each of some backgrounds.
+    ///
+    /// # Errors
+    /// Those of [`Engine::picture`].
+    pub fn pictures<const N: usize>(
+        &self,
+        geometry: &Geometry<'_>,
+        camera: &Camera,
+        backgrounds: [[f32; 3]; N],
+    ) -> Result<[Picture; N]> {
         self.stop.check()?;
-        let view = prepare(gaussians, camera, WeightCache::None)?;
-        let colours = sh::colours(&gaussians.sh, None, &view);
-        Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
+        let view = geometry.prepare(camera, WeightCache::None)?;
+        let colours = sh::colours(geometry.sh(), None, &view);
+        let rasterizer = self.rasterizer()?;
+        let mut pictures = backgrounds.map(|_| Picture {
+            width: 0,
+            height: 0,
+            pixels: Vec::new(),
+        });
+        for (picture, background) in pictures.iter_mut().zip(backgrounds) {
+            *picture = rasterizer.render(&view, &colours, background)?.to_8_bit();
+        }
+        Ok(pictures)
     }
 
     /// `work` on each item, in order. On the CPU items run side by side; a GPU has one queue, and waiting for it on

@@ -26,6 +26,7 @@ pub use suspect_kind::SuspectKind;
 use crate::error::Result;
 use crate::picture::Picture;
 use crate::scene::Gaussians;
+use crate::splat::Geometry;
 use crate::view::{Split, ViewSampler};
 
 /// Views that a scene is read from where nothing else is asked for.
@@ -60,10 +61,11 @@ pub fn read_scene(
     background: [f32; 3],
     mut done: impl FnMut(usize, &Picture) -> Result<()>,
 ) -> Result<PooledLogits> {
+    let geometry = Geometry::new(gaussians);
     let mut logits = Vec::with_capacity(views);
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let picture = engine.picture(gaussians, &camera, background)?;
+        let picture = engine.picture(&geometry, &camera, background)?;
         logits.push(read_given(engine, &picture)?);
         done(index + 1, &picture)?;
     }

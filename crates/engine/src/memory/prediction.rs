@@ -10,8 +10,10 @@ const GEOMETRY: u64 = 11;
 const KEPT_PICTURES: u64 = 11;
 /// Pictures of the size at which they are distorted that differentiation keeps for each view.
 const KEPT_DISTORTED: u64 = 18;
-/// Bytes of a Gaussian while a view is prepared: projected by chunks, put together, sorted.
-const PREPARING: u64 = 150;
+/// Bytes of a Gaussian while a view is prepared: projected by chunks, put together (44 each), sorted.
+const PREPARING: u64 = 120;
+/// Bytes of a Gaussian that all views of a scene are prepared from: its scales and its opacity, worked out.
+const GEOMETRY_OF_VIEWS: u64 = 28;
 
 /// What of a scene decides how much memory it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,7 +111,7 @@ pub fn picture_bytes(width: u32, height: u32) -> u64 {
 /// ([`picture_bytes`]).
 pub fn rendering_requirements(scene: SceneSize, picture: u64) -> MemoryRequirements {
     // The file has gone when views are prepared, one at a time.
-    let preparing = PREPARING * scene.gaussians;
+    let preparing = (PREPARING + GEOMETRY_OF_VIEWS) * scene.gaussians;
     MemoryRequirements {
         scene: scene.bytes(),
         pictures: (preparing + picture).saturating_sub(scene.file),
@@ -148,7 +150,7 @@ pub fn embedding_requirements(
         scene: scene.bytes(),
         offsets: 2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians,
         optimiser: 2 * learned + 4 * scene.gaussians,
-        views: (kept + in_hand + held_out) as u64,
+        views: (kept + in_hand + held_out) as u64 + GEOMETRY_OF_VIEWS * scene.gaussians,
         // First the one, then the other.
         pictures: differentiating.max(preparing),
         ..MemoryRequirements::of_program()
@@ -158,7 +160,7 @@ pub fn embedding_requirements(
         models: models.verifying,
         scene: 2 * scene.bytes(),
         offsets: optimising.offsets - learned,
-        pictures: 2 * work.verification_views as u64 * picture + preparing,
+        pictures: 2 * work.verification_views as u64 * picture + preparing + 2 * GEOMETRY_OF_VIEWS * scene.gaussians,
         ..MemoryRequirements::of_program()
     };
     if optimising.total() >= verifying.total() {

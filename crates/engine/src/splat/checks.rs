@@ -135,7 +135,15 @@ fn cached_and_fresh_weights_give_the_same_bytes() {
         let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
         let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
         let mut all = vec![0.0f32; g.sh.coefficients.len()];
-        sh::backward(&Learnable::all(&g), &view, &colours, &gradient, &mut all);
+        sh::backward(
+            &Learnable::all(&g),
+            sh::ColourGradient {
+                view: &view,
+                colours: &colours,
+                gradient: &gradient,
+            },
+            &mut all,
+        );
         (view, picture, all)
     };
     let (plain, kept) = (run(WeightCache::None), run(WeightCache::Weights));
@@ -195,7 +203,15 @@ fn the_number_of_threads_changes_nothing() {
             let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
             let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
             let mut all = vec![0.0f32; g.sh.coefficients.len()];
-            sh::backward(&Learnable::all(&g), &view, &colours, &gradient, &mut all);
+            sh::backward(
+                &Learnable::all(&g),
+                sh::ColourGradient {
+                    view: &view,
+                    colours: &colours,
+                    gradient: &gradient,
+                },
+                &mut all,
+            );
             (view, picture, all)
         })
     };

@@ -63,7 +63,15 @@ impl Agreement {
         let double: Vec<f64> = picture_gradient.iter().map(|v| f64::from(*v)).collect();
         let colour_gradient = rasterizer.backward(&view, &picture_gradient)?;
         let mut got = vec![0.0; gaussians.sh.coefficients.len()];
-        sh::backward(&Learnable::all(gaussians), &view, &colours, &colour_gradient, &mut got);
+        sh::backward(
+            &Learnable::all(gaussians),
+            sh::ColourGradient {
+                view: &view,
+                colours: &colours,
+                gradient: &colour_gradient,
+            },
+            &mut got,
+        );
         Ok(Self {
             worst,
             worst_uncertain,

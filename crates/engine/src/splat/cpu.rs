@@ -1,10 +1,11 @@
 //! Rasteriser for the CPU: sparse products where weights are kept, compositing anew where they are not.
-use super::composite::{ContributionSink, TileBounds, composite_tile};
+use super::composite::{ContributionSink, FETCH, TileBounds, composite_tile};
 use super::tiles::{TILE, TILE_PIXELS};
 use super::weights::Band;
 use super::{PreparedView, Rasterizer};
 use crate::error::Result;
 use crate::picture::Picture;
+use crate::simd::Instructions;
 use rayon::prelude::*;
 
 /// Draws on the CPU with rayon. One task a row of tiles; sums are ordered, so results do not depend on the threads.
@@ -22,6 +23,8 @@ impl Rasterizer for CpuRasterizer {
     fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture> {
         view.check("colours", colours.len(), 3 * view.visible.len())?;
         let (width, height) = (view.camera.width, view.camera.height);
+        let colours = colours.as_chunks().0;
+        let instructions = Instructions::widest();
         let mut pixels = vec![0.0; view.picture_len()];
         pixels
             .par_chunks_mut((width * TILE * 3) as usize)
@@ -33,12 +36,13 @@ impl Rasterizer for CpuRasterizer {
                     let frame = TileBounds::new(column, row as u32, width, height);
                     let mut draw = Draw {
                         colours,
+                        fetched: [[0.0; 4]; FETCH],
                         colour: [0.0; 4],
                         image: [[0.0; 4]; TILE_PIXELS],
                     };
                     let left = match &mut cursor {
                         Some(cursor) => cursor.replay(list, &mut draw),
-                        None => &composite_tile(frame, &view.splats, list, &mut draw),
+                        None => &composite_tile(instructions, frame, &view.splats, list, &mut draw),
                     };
                     store(frame, width, &draw.image, left, background, out);
                 }
@@ -50,6 +54,7 @@ impl Rasterizer for CpuRasterizer {
         view.check("picture gradient", picture_gradient.len(), view.picture_len())?;
         let (width, height) = (view.camera.width, view.camera.height);
         let columns = view.tiles.columns as usize;
+        let instructions = Instructions::widest();
         let mut slots = vec![[0.0f32; 3]; view.tiles.pairs()];
         let mut bands = Vec::with_capacity(view.tiles.rows as usize);
         let mut rest = &mut slots[..];
@@ -77,7 +82,7 @@ impl Rasterizer for CpuRasterizer {
                         cursor.replay(list, &mut gather);
                     }
                     None => {
-                        composite_tile(frame, &view.splats, list, &mut gather);
+                        composite_tile(instructions, frame, &view.splats, list, &mut gather);
                     }
                 }
             }
@@ -109,6 +114,9 @@ impl<'a> Cursor<'a> {
     fn replay(&mut self, list: &[u32], sink: &mut impl ContributionSink) -> &'a [f32; TILE_PIXELS] {
         let mut room = [0.0; TILE_PIXELS];
         for (place, &splat) in list.iter().enumerate() {
+            if place % FETCH == 0 {
+                sink.expect(&list[place..]);
+            }
             let end = self.band.ends[self.slot + place] as usize;
             sink.begin(place, splat);
             let range = self.entry..end;
@@ -126,17 +134,25 @@ impl<'a> Cursor<'a> {
 }
 
 struct Draw<'a> {
-    colours: &'a [f32],
+    colours: &'a [[f32; 3]],
+    /// Those of the next splats: they lie anywhere in memory, and fetching many at once lets the cache misses overlap.
+    fetched: [[f32; 4]; FETCH],
     colour: [f32; 4],
     image: TileImage,
 }
 
 impl ContributionSink for Draw<'_> {
     #[inline(always)]
-    fn begin(&mut self, _: usize, splat: u32) {
-        let at = 3 * splat as usize;
-        let c = &self.colours[at..at + 3];
-        self.colour = [c[0], c[1], c[2], 0.0];
+    fn expect(&mut self, next: &[u32]) {
+        for (fetched, splat) in self.fetched.iter_mut().zip(next) {
+            let [red, green, blue] = self.colours[*splat as usize];
+            *fetched = [red, green, blue, 0.0];
+        }
+    }
+
+    #[inline(always)]
+    fn begin(&mut self, place: usize, _: u32) {
+        self.colour = self.fetched[place % FETCH];
     }
 
     #[inline(always)]

@@ -1,12 +1,13 @@
 //! Splatting: pictures of a scene, and the gradient of a picture to the colours of its Gaussians.
 //!
 //! Geometry is frozen, so a pixel is `sum_i w_i max(0, SH_i(d) + 0.5) + T background` with weights that do not depend on
-//! what is learned. [`prepare`] computes per view what stays fixed; a [`Rasterizer`] applies it and its transpose.
+//! what is learned. [`Geometry::prepare`] computes per view what stays fixed; a [`Rasterizer`] applies it and its transpose.
 #[cfg(test)]
 mod checks;
 pub mod compare;
 mod composite;
 mod cpu;
+mod geometry;
 mod gpu;
 mod kernels;
 mod learnable;
@@ -22,9 +23,10 @@ use crate::error::Result;
 use crate::picture::Picture;
 
 pub use cpu::CpuRasterizer;
+pub use geometry::Geometry;
 pub use gpu::GpuRasterizer;
 pub use learnable::{Changes, Learnable};
-pub use prepare::{PrepareTimes, PreparedView, WeightCache, prepare, prepare_averaged, prepare_timed};
+pub use prepare::{PrepareTimes, PreparedView, WeightCache, prepare};
 pub use project::Splat2d;
 pub use tiles::{MAX_PAIRS, TILE, TileLists};
 

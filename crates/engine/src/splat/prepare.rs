@@ -1,9 +1,11 @@
 //! What is fixed for a view while only colours are learned: visible splats, tile lists, weights.
-use super::project::{Projector, Splat2d, TileRect};
+use super::geometry::Geometry;
+use super::project::{Projected, Projector, Splat2d};
 use super::tiles::{TILE, TileLists};
 use super::weights::SparseWeights;
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
+use crate::simd::Instructions;
 use crate::view::Camera;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -25,7 +27,7 @@ pub enum WeightCache {
     HalfWeights,
 }
 
-/// Where the time of [`prepare`] went.
+/// Where the time of [`Geometry::prepare`] went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PrepareTimes {
     /// Projecting and culling.
@@ -105,72 +107,48 @@ impl PreparedView {
     }
 }
 
-/// Projects, culls and sorts the Gaussians for `camera`; the result does not depend on the number of threads.
+/// [`Geometry::prepare`] for a scene that is looked at once.
 ///
 /// # Errors
-/// [`Error::BadOption`] when the camera's size or focal length is out of range, or the view has too many
-/// (Gaussian, tile) pairs for 32-bit lists.
+/// Those of [`Geometry::prepare`].
 pub fn prepare(gaussians: &Gaussians, camera: &Camera, cache: WeightCache) -> Result<PreparedView> {
-    prepare_timed(gaussians, camera, cache).map(|(view, _)| view)
+    Geometry::new(gaussians).prepare(camera, cache)
 }
 
-/// [`prepare`] for a view that stands for a picture `times` as large, at least 1, averaged down to the camera's size, at
-/// the cost of the small one. Splats have no finer detail than their width in both, so this is near, not exact.
-///
-/// # Errors
-/// Those of [`prepare`].
-pub fn prepare_averaged(
-    gaussians: &Gaussians,
-    camera: &Camera,
-    times: f32,
-    cache: WeightCache,
-) -> Result<PreparedView> {
-    prepare_with(gaussians, camera, f64::from(times.max(1.0)), cache).map(|(view, _)| view)
-}
-
-/// [`prepare`], and where its time went.
-///
-/// # Errors
-/// Those of [`prepare`].
-pub fn prepare_timed(
-    gaussians: &Gaussians,
-    camera: &Camera,
-    cache: WeightCache,
-) -> Result<(PreparedView, PrepareTimes)> {
-    prepare_with(gaussians, camera, 1.0, cache)
-}
-
-fn prepare_with(
-    gaussians: &Gaussians,
+pub(super) fn prepare_with(
+    geometry: &Geometry<'_>,
     camera: &Camera,
     larger: f64,
     cache: WeightCache,
 ) -> Result<(PreparedView, PrepareTimes)> {
     check_camera(camera)?;
+    let gaussians = geometry.gaussians;
     let mut clock = Instant::now();
     let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed();
     let mut times = PrepareTimes::default();
     let projector = Projector::new(camera, larger);
     let n = gaussians.len();
-    let chunks: Vec<Vec<(u32, (Splat2d, TileRect))>> = (0..n.div_ceil(CHUNK))
+    let instructions = Instructions::widest();
+    let chunks: Vec<Projected> = (0..n.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let rows = chunk * CHUNK..n.min((chunk + 1) * CHUNK);
-            rows.filter_map(|row| Some((row as u32, projector.project(gaussians, row)?)))
-                .collect()
+            projector.project(instructions, geometry, rows)
         })
         .collect();
-    let count = chunks.iter().map(Vec::len).sum();
+    let count = chunks.iter().map(|chunk| chunk.rows.len()).sum();
     let mut visible = Vec::with_capacity(count);
-    let mut projected = Vec::with_capacity(count);
-    for (row, one) in chunks.into_iter().flatten() {
-        visible.push(row);
-        projected.push(one);
+    let mut splats = Vec::with_capacity(count);
+    let mut rects = Vec::with_capacity(count);
+    for chunk in chunks {
+        visible.extend(chunk.rows);
+        splats.extend(chunk.splats);
+        rects.extend(chunk.rects);
     }
     times.project = lap();
     let (columns, rows) = (camera.width.div_ceil(TILE), camera.height.div_ceil(TILE));
-    let mut tiles = TileLists::new(columns, rows, &projected)?;
-    let mut splats: Vec<Splat2d> = projected.into_iter().map(|(splat, _)| splat).collect();
+    let mut tiles = TileLists::new(columns, rows, &splats, &rects)?;
+    drop(rects);
     times.sort = lap();
     let mut weights = None;
     if cache != WeightCache::None {

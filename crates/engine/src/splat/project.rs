@@ -1,9 +1,12 @@
 //! From a Gaussian in the world to an elliptic splat in the picture (EWA splatting, constants of the reference).
 use super::TILE;
+use super::geometry::Geometry;
 use crate::scene::Gaussians;
+use crate::simd::{Instructions, Vectorised};
 use crate::view::Camera;
 use crate::view::vector;
 use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// Gaussians at this view depth or nearer are not drawn.
 pub const NEAR: f32 = 0.2;
@@ -13,8 +16,6 @@ pub const LOW_PASS: f64 = 0.3;
 const PIXEL: f64 = 1.0 / 12.0;
 /// Smallest contribution that is drawn.
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
-/// Log scales are clamped to this: far beyond any scene, and its fourth power is still finite.
-const LOG_SCALE_LIMIT: f32 = 30.0;
 /// Slack on the bounds of an ellipse, so that rounding never drops a pixel that the alpha test would keep.
 const REACH_SLACK: f64 = 1e-2;
 
@@ -43,17 +44,28 @@ pub struct Splat2d {
     pub reach: f32,
 }
 
-/// Half-open range of tiles, columns then rows.
+/// Half-open range of tiles, columns then rows. A picture has at most 1024 each way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TileRect {
-    pub x: [u32; 2],
-    pub y: [u32; 2],
+    pub x: [u16; 2],
+    pub y: [u16; 2],
 }
 
 impl TileRect {
     pub fn area(&self) -> u64 {
         u64::from(self.x[1].saturating_sub(self.x[0])) * u64::from(self.y[1].saturating_sub(self.y[0]))
     }
+}
+
+/// Gaussians that may be seen, in ascending order of rows.
+#[derive(Default)]
+pub(crate) struct Projected {
+    /// Their rows.
+    pub rows: Vec<u32>,
+    /// Their splats.
+    pub splats: Vec<Splat2d>,
+    /// The tiles that each may touch.
+    pub rects: Vec<TileRect>,
 }
 
 /// The camera in double precision, with what every Gaussian needs of it.
@@ -109,100 +121,286 @@ impl Projector {
         }
     }
 
-    /// The splat of Gaussian `row` and the tiles it may touch, or `None` when it cannot be seen.
+    /// The splats of some rows, and the tiles that they may touch, of those that can be seen.
     ///
     /// Covariances are computed in double precision, as a sum of squares: unlike in the reference, a large log scale
     /// does not overflow and the determinant is never 0 or negative, so its test for that cannot fire.
-    /// A Gaussian whose numbers are not finite is not drawn.
-    pub fn project(&self, gaussians: &Gaussians, row: usize) -> Option<(Splat2d, TileRect)> {
-        let p = gaussians.positions[row].map(f64::from);
-        let w = &self.rotation;
-        let t: [f64; 3] =
-            std::array::from_fn(|r| w[r][0] * p[0] + w[r][1] * p[1] + w[r][2] * p[2] + self.translation[r]);
-        if !(t[2] > f64::from(NEAR) && t[2].is_finite()) {
-            return None;
+    /// A Gaussian whose numbers are not finite is not drawn. Nothing is fused: the bytes are the same on every
+    /// instruction set of an architecture.
+    pub fn project(&self, instructions: Instructions, geometry: &Geometry<'_>, rows: Range<usize>) -> Projected {
+        instructions.run(Project {
+            projector: self,
+            geometry,
+            rows,
+        })
+    }
+}
+
+/// Rows that are computed together, a register of them at a time.
+const BLOCK: usize = 64;
+
+struct Project<'a> {
+    projector: &'a Projector,
+    geometry: &'a Geometry<'a>,
+    rows: Range<usize>,
+}
+
+impl Vectorised for Project<'_> {
+    type Output = Projected;
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) -> Projected {
+        let mut out = Projected::default();
+        let mut block = Block::new();
+        for first in self.rows.clone().step_by(BLOCK) {
+            let rows = first..self.rows.end.min(first + BLOCK);
+            if block.place(self.projector, &self.geometry.gaussians.positions[rows.clone()]) {
+                block.cover(self.projector, self.geometry, rows.clone());
+                block.bound(self.projector);
+                block.collect(rows, &mut out);
+            }
         }
+        out
+    }
+}
+
+/// What is computed of some rows: one array a quantity.
+struct Block {
+    centre: [[f32; BLOCK]; 3],
+    rotation: [[f32; BLOCK]; 4],
+    scale: [[f64; BLOCK]; 3],
+    /// The centre in the camera's axes.
+    position: [[f64; BLOCK]; 3],
+    mean: [[f64; BLOCK]; 2],
+    /// Variances along the picture's axes.
+    variance: [[f64; BLOCK]; 2],
+    /// Radius in pixels as the reference has it.
+    radius: [f64; BLOCK],
+    inverse_x: [f32; BLOCK],
+    slope: [f32; BLOCK],
+    inverse_y: [f32; BLOCK],
+    opacity: [f32; BLOCK],
+    /// What of the opacity a mean over larger pixels leaves.
+    share: [f32; BLOCK],
+    reach: [f64; BLOCK],
+    /// Whether the row can be seen, as far as is known.
+    seen: [bool; BLOCK],
+    /// First tiles, and those behind the last.
+    tiles: [[[f64; BLOCK]; 2]; 2],
+}
+
+impl Block {
+    fn new() -> Self {
+        Block {
+            centre: [[0.0; BLOCK]; 3],
+            rotation: [[0.0; BLOCK]; 4],
+            scale: [[0.0; BLOCK]; 3],
+            position: [[0.0; BLOCK]; 3],
+            mean: [[0.0; BLOCK]; 2],
+            variance: [[0.0; BLOCK]; 2],
+            radius: [0.0; BLOCK],
+            inverse_x: [0.0; BLOCK],
+            slope: [0.0; BLOCK],
+            inverse_y: [0.0; BLOCK],
+            opacity: [0.0; BLOCK],
+            share: [0.0; BLOCK],
+            reach: [0.0; BLOCK],
+            seen: [false; BLOCK],
+            tiles: [[[0.0; BLOCK]; 2]; 2],
+        }
+    }
+
+    /// Puts centres into the camera's axes; returns whether any is far enough in front of it.
+    #[inline(always)]
+    fn place(&mut self, camera: &Projector, positions: &[[f32; 3]]) -> bool {
+        transpose(&mut self.centre, positions);
+        let w = &camera.rotation;
+        for r in 0..3 {
+            for i in 0..BLOCK {
+                let [x, y, z] = &self.centre;
+                let (x, y, z) = (f64::from(x[i]), f64::from(y[i]), f64::from(z[i]));
+                self.position[r][i] = w[r][0] * x + w[r][1] * y + w[r][2] * z + camera.translation[r];
+            }
+        }
+        for i in 0..BLOCK {
+            let depth = self.position[2][i];
+            self.seen[i] = (depth > f64::from(NEAR)) & (depth < f64::INFINITY);
+        }
+        self.seen[positions.len()..].fill(false);
+        self.seen.iter().any(|seen| *seen)
+    }
+
+    /// Ellipses and opacities.
+    #[inline(always)]
+    fn cover(&mut self, camera: &Projector, geometry: &Geometry<'_>, rows: Range<usize>) {
+        let count = rows.len();
+        transpose(&mut self.rotation, &geometry.gaussians.rotations[rows.clone()]);
+        transpose(&mut self.scale, &geometry.scales[rows.clone()]);
+        self.opacity[..count].copy_from_slice(&geometry.opacities[rows]);
+        for i in 0..BLOCK {
+            self.ellipse(camera, i);
+        }
+        if camera.fine < camera.low_pass {
+            for i in 0..BLOCK {
+                self.opacity[i] *= self.share[i];
+            }
+        }
+        for i in 0..count {
+            // What is no number cannot be seen either.
+            let opacity = f64::from(self.opacity[i]);
+            self.reach[i] = if self.seen[i] {
+                2.0 * (255.0 * opacity).ln()
+            } else {
+                f64::NAN
+            };
+        }
+    }
+
+    #[inline(always)]
+    fn ellipse(&mut self, camera: &Projector, i: usize) {
+        // Without `map` of arrays, which is not always inlined.
+        let t = [self.position[0][i], self.position[1][i], self.position[2][i]];
         let inverse_depth = 1.0 / (t[2] + 1e-7);
-        let mean: [f64; 2] = std::array::from_fn(|k| self.focal[k] * t[k] * inverse_depth + self.principal[k] - 0.5);
-        let m = self.footprint(t, rotation(gaussians.rotations[row]), gaussians.log_scales[row]);
+        let rotation = orientation([
+            self.rotation[0][i],
+            self.rotation[1][i],
+            self.rotation[2][i],
+            self.rotation[3][i],
+        ]);
+        let m = camera.footprint(t, rotation, [self.scale[0][i], self.scale[1][i], self.scale[2][i]]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (plain_xx, xy, plain_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
-        let low_pass = self.low_pass;
+        let low_pass = camera.low_pass;
         let (xx, yy) = (plain_xx + low_pass, plain_yy + low_pass);
         // Cauchy-Binet: det(M M^T) is the sum of the squared minors of M, which does not cancel.
-        let minor = |i: usize, j: usize| m[0][i] * m[1][j] - m[0][j] * m[1][i];
-        let minors = minor(0, 1).powi(2) + minor(0, 2).powi(2) + minor(1, 2).powi(2);
+        let square_of_minor = |i: usize, j: usize| {
+            let minor = m[0][i] * m[1][j] - m[0][j] * m[1][i];
+            minor * minor
+        };
+        let minors = square_of_minor(0, 1) + square_of_minor(0, 2) + square_of_minor(1, 2);
         let determinant = |low_pass: f64| low_pass * low_pass + low_pass * (plain_xx + plain_yy) + minors;
         let det = determinant(low_pass);
-        let mut opacity = gaussians.opacity(row);
-        if self.fine < low_pass {
-            opacity *= (determinant(self.fine) / det).sqrt() as f32;
-        }
-        let reach = 2.0 * (255.0 * f64::from(opacity)).ln();
-        if reach.is_nan() || reach < -1e-4 {
-            return None;
-        }
         let half = 0.5 * (xx - yy);
         let largest = 0.5 * (xx + yy) + (half * half + xy * xy).max(0.1).sqrt();
         let radius = (3.0 * largest.sqrt()).ceil();
-        let splat = Splat2d {
-            mean: mean.map(|v| v as f32),
-            inverse_x: (yy / det).sqrt() as f32,
-            slope: (xy / yy) as f32,
-            inverse_y: (1.0 / yy.sqrt()) as f32,
-            opacity,
-            depth: t[2] as f32,
-            reach: (reach + 1e-3) as f32,
-        };
-        let finite = splat
-            .mean
-            .iter()
-            .chain([&splat.inverse_x, &splat.slope, &splat.inverse_y])
-            .all(|v| v.is_finite());
-        if !finite || !radius.is_finite() {
-            return None;
+        for k in 0..2 {
+            self.mean[k][i] = camera.focal[k] * t[k] * inverse_depth + camera.principal[k] - 0.5;
         }
-        let q = reach + 1e-3;
-        let extent = [xx, yy].map(|variance| (q * variance).sqrt() + REACH_SLACK);
-        let x = self.tile_range(0, mean[0], radius, extent[0]);
-        let y = self.tile_range(1, mean[1], radius, extent[1]);
-        (x[0] < x[1] && y[0] < y[1]).then_some((splat, TileRect { x, y }))
+        self.variance[0][i] = xx;
+        self.variance[1][i] = yy;
+        self.radius[i] = radius;
+        self.inverse_x[i] = (yy / det).sqrt() as f32;
+        self.slope[i] = (xy / yy) as f32;
+        self.inverse_y[i] = (1.0 / yy.sqrt()) as f32;
+        self.share[i] = (determinant(camera.fine) / det).sqrt() as f32;
     }
 
-    /// Tiles along `axis`: those of the reference (from the 3 sigma radius), less those beyond the ellipse's bounds.
-    fn tile_range(&self, axis: usize, mean: f64, radius: f64, extent: f64) -> [u32; 2] {
-        let (tile, count) = (f64::from(TILE), f64::from(self.tiles[axis]));
-        // The conversion truncates, as the reference does, and here also rounds down: nothing is negative any more.
-        let clamp = |v: f64| v.clamp(0.0, count) as u32;
-        let low = clamp((mean - radius) / tile);
-        let high = clamp((mean + radius + tile - 1.0) / tile);
-        let first = clamp((mean - extent).ceil() / tile);
-        let end = mean + extent;
-        let last = if end < 0.0 { 0 } else { clamp(end / tile + 1.0) };
-        [low.max(first), high.min(last)]
+    /// Tiles that ellipses may touch: those of the reference (from the 3 sigma radius), less those beyond the ellipse's
+    /// bounds.
+    #[inline(always)]
+    fn bound(&mut self, camera: &Projector) {
+        let tile = f64::from(TILE);
+        for axis in 0..2 {
+            let tiles = f64::from(camera.tiles[axis]);
+            for i in 0..BLOCK {
+                let (mean, radius) = (self.mean[axis][i], self.radius[i]);
+                let extent = ((self.reach[i] + 1e-3) * self.variance[axis][i]).sqrt() + REACH_SLACK;
+                let low = floor_within((mean - radius) / tile, tiles);
+                let high = floor_within((mean + radius + tile - 1.0) / tile, tiles);
+                let first = floor_within((mean - extent).ceil() / tile, tiles);
+                let end = mean + extent;
+                let last = floor_within(end / tile + 1.0, tiles);
+                let last = if end < 0.0 { 0.0 } else { last };
+                self.tiles[axis][0][i] = if low > first { low } else { first };
+                self.tiles[axis][1][i] = if high < last { high } else { last };
+            }
+        }
+        for i in 0..BLOCK {
+            let [x, y] = &self.tiles;
+            let finite = |v: f32| v.abs() < f32::INFINITY;
+            self.seen[i] &= (self.reach[i] >= -1e-4)
+                & (x[0][i] < x[1][i])
+                & (y[0][i] < y[1][i])
+                & finite(self.mean[0][i] as f32)
+                & finite(self.mean[1][i] as f32)
+                & finite(self.inverse_x[i])
+                & finite(self.slope[i])
+                & finite(self.inverse_y[i])
+                & (self.radius[i] < f64::INFINITY);
+        }
     }
 
+    #[inline(always)]
+    fn collect(&self, rows: Range<usize>, out: &mut Projected) {
+        for (i, row) in rows.enumerate() {
+            if !self.seen[i] {
+                continue;
+            }
+            out.rows.push(row as u32);
+            out.splats.push(Splat2d {
+                mean: [self.mean[0][i] as f32, self.mean[1][i] as f32],
+                inverse_x: self.inverse_x[i],
+                slope: self.slope[i],
+                inverse_y: self.inverse_y[i],
+                opacity: self.opacity[i],
+                depth: self.position[2][i] as f32,
+                reach: (self.reach[i] + 1e-3) as f32,
+            });
+            let [[x0, x1], [y0, y1]] = &self.tiles;
+            out.rects.push(TileRect {
+                x: [x0[i] as u16, x1[i] as u16],
+                y: [y0[i] as u16, y1[i] as u16],
+            });
+        }
+    }
+}
+
+/// A quantity a row becomes a row a quantity.
+#[inline(always)]
+fn transpose<T: Copy, const N: usize>(out: &mut [[T; BLOCK]; N], rows: &[[T; N]]) {
+    for (i, row) in rows.iter().enumerate().take(BLOCK) {
+        for k in 0..N {
+            out[k][i] = row[k];
+        }
+    }
+}
+
+/// `x` rounded down, from 0 to `limit`; 0 for NaN. Stays a floating-point number, which registers hold as many of.
+#[inline(always)]
+fn floor_within(x: f64, limit: f64) -> f64 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    (if x < limit { x } else { limit }).floor()
+}
+
+impl Projector {
     /// `J W R S` (2 x 3): its product with its transpose is the 2D covariance before the low-pass filter.
-    fn footprint(&self, t: [f64; 3], r: [[f64; 3]; 3], log_scale: [f32; 3]) -> [[f64; 3]; 2] {
-        // A NaN passes the clamp and is caught by the caller's test for finite numbers.
-        let scale = log_scale.map(|s| f64::from(s.clamp(-LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)).exp());
-        std::array::from_fn(|k| {
-            let clamped = (t[k] / t[2]).clamp(-self.limit[k], self.limit[k]);
+    #[inline(always)]
+    fn footprint(&self, t: [f64; 3], r: [[f64; 3]; 3], scale: [f64; 3]) -> [[f64; 3]; 2] {
+        let mut m = [[0.0; 3]; 2];
+        for k in 0..2 {
+            let (slope, limit) = (t[k] / t[2], self.limit[k]);
+            let clamped = if slope < -limit { -limit } else { slope };
+            let clamped = if clamped > limit { limit } else { clamped };
             let (j, j_depth) = (self.focal[k] / t[2], -self.focal[k] * clamped / t[2]);
-            let jw: [f64; 3] = std::array::from_fn(|c| j * self.rotation[k][c] + j_depth * self.rotation[2][c]);
-            std::array::from_fn(|c| (jw[0] * r[0][c] + jw[1] * r[1][c] + jw[2] * r[2][c]) * scale[c])
-        })
+            let mut jw = [0.0; 3];
+            for c in 0..3 {
+                jw[c] = j * self.rotation[k][c] + j_depth * self.rotation[2][c];
+            }
+            for c in 0..3 {
+                m[k][c] = (jw[0] * r[0][c] + jw[1] * r[1][c] + jw[2] * r[2][c]) * scale[c];
+            }
+        }
+        m
     }
 }
 
 /// Rotation matrix of a quaternion w, x, y, z of any length; all zero (whole files of them exist) is the identity,
 /// as in the reference, where normalisation leaves a zero quaternion zero.
-fn rotation(q: [f32; 4]) -> [[f64; 3]; 3] {
-    let q = q.map(f64::from);
-    let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
-    vector::rotation(if norm > 0.0 && norm.is_finite() {
-        q.map(|v| v / norm)
-    } else {
-        [1.0, 0.0, 0.0, 0.0]
-    })
+#[inline(always)]
+fn orientation(q: [f32; 4]) -> [[f64; 3]; 3] {
+    let q = [f64::from(q[0]), f64::from(q[1]), f64::from(q[2]), f64::from(q[3])];
+    let norm = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    let usable = (norm > 0.0) & (norm < f64::INFINITY);
+    let one = |v: f64, otherwise: f64| if usable { v / norm } else { otherwise };
+    vector::rotation([one(q[0], 1.0), one(q[1], 0.0), one(q[2], 0.0), one(q[3], 0.0)])
 }

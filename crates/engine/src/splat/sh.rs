@@ -2,6 +2,7 @@
 use super::{Changes, Learnable, PreparedView};
 use crate::scene::Sh;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Coefficients a channel at the highest degree.
 pub const MAX_COEFFICIENTS: usize = 25;
@@ -78,114 +79,151 @@ pub fn basis(degree: usize, dir: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
     b
 }
 
+/// Rows of coefficients that one task takes: with what is learned of them they fit the second cache, so that memory is read
+/// once for all views.
+const ROWS: usize = 1024;
+
 /// Colours of the visible Gaussians of `view`, `[visible][3]`: `max(0, SH(direction) + 0.5)`.
 ///
 /// `changes` are added to the coefficients first; bands above the view's degree are left out. `view` must have been prepared from a scene of as many Gaussians as
 /// `sh` has.
 pub fn colours(sh: &Sh, changes: Option<Changes<'_>>, view: &PreparedView) -> Vec<f32> {
+    colours_of_views(sh, changes, &[view]).pop().unwrap_or_default()
+}
+
+/// [`colours`] of each of some views.
+pub fn colours_of_views(sh: &Sh, changes: Option<Changes<'_>>, views: &[&PreparedView]) -> Vec<Vec<f32>> {
     let stride = sh.per_gaussian();
-    let mut out = vec![0.0; view.visible.len() * 3];
-    let work = |((out, &row), &dir): ((&mut [f32], &u32), &[f32; 3])| {
-        let b = basis(sh.degree.min(view.degree), dir);
-        let at = row as usize * stride;
-        let mut c = [0.5f32; 3];
-        let coefficients = &sh.coefficients[at..at + stride];
-        let changed = changes.and_then(|changes| changes.of(row)).unwrap_or_default();
-        let (both, plain) = coefficients.split_at(changed.len());
-        for (k, (h, o)) in both.chunks_exact(3).zip(changed.chunks_exact(3)).enumerate() {
-            for j in 0..3 {
-                c[j] += b[k] * (h[j] + o[j]);
-            }
+    let mut all: Vec<Vec<f32>> = views.iter().map(|view| vec![0.0; view.visible.len() * 3]).collect();
+    let mut tasks: Vec<Vec<ColoursOfPart<'_>>> = Vec::new();
+    tasks.resize_with((sh.coefficients.len() / stride).div_ceil(ROWS), Vec::new);
+    for (view, out) in views.iter().zip(&mut all) {
+        let mut rest = &mut out[..];
+        for (task, seen) in tasks.iter_mut().zip(parts(&view.visible)) {
+            let (out, after) = std::mem::take(&mut rest).split_at_mut(3 * seen.len());
+            rest = after;
+            task.push(ColoursOfPart { view, seen, out });
         }
-        for (k, h) in plain.chunks_exact(3).enumerate() {
-            for j in 0..3 {
-                c[j] += b[changed.len() / 3 + k] * h[j];
-            }
-        }
-        for j in 0..3 {
-            out[j] = c[j].max(0.0);
-        }
-    };
-    (out.par_chunks_exact_mut(3), &view.visible, &view.directions)
+    }
+    tasks
         .into_par_iter()
-        .with_min_len(2048)
-        .for_each(|(o, r, d)| work(((o, r), d)));
-    out
+        .flatten_iter()
+        .for_each(|ColoursOfPart { view, seen, out }| {
+            let degree = sh.degree.min(view.degree);
+            let seen = view.visible[seen.clone()].iter().zip(&view.directions[seen]);
+            for (out, (&row, &direction)) in out.as_chunks_mut::<3>().0.iter_mut().zip(seen) {
+                let at = row as usize * stride;
+                let changed = changes.and_then(|changes| changes.of(row)).unwrap_or_default();
+                let b = basis(degree, direction);
+                *out = sum(&b, &sh.coefficients[at..at + stride], changed).map(|c| c.max(0.0));
+            }
+        });
+    all
 }
 
-/// Adds to `out` (`[slots][columns]`) what `colour_gradient` (`[visible][3]`) means for the learned coefficients.
-///
-/// `colours` are those that [`colours`] returned: where one is 0 it was clamped, and its gradient is 0.
-pub fn backward(learnable: &Learnable, view: &PreparedView, colours: &[f32], colour_gradient: &[f32], out: &mut [f32]) {
-    let part = Part {
-        learnable,
-        degree: learnable.degree().min(view.degree),
-        visible: &view.visible,
-        directions: &view.directions,
-        colours,
-        colour_gradient,
-    };
-    part.add(0, out);
+/// A part of the colours of a view.
+struct ColoursOfPart<'a> {
+    view: &'a PreparedView,
+    /// Which of the visible Gaussians.
+    seen: Range<usize>,
+    out: &'a mut [f32],
 }
 
-/// A range of the visible Gaussians; ranges own disjoint slots of the gradient because `visible` and slots ascend.
-#[derive(Clone, Copy)]
-struct Part<'a> {
-    learnable: &'a Learnable,
-    degree: usize,
-    visible: &'a [u32],
-    directions: &'a [[f32; 3]],
-    colours: &'a [f32],
-    colour_gradient: &'a [f32],
-}
-
-impl Part<'_> {
-    /// `out` starts at the slot `first`.
-    fn add(self, first: usize, out: &mut [f32]) {
-        let (n, columns) = (self.visible.len(), self.learnable.columns());
-        if n > 4096 {
-            let at = n / 2;
-            // Where the later part's first slot is; without one it has nothing to add to.
-            let slot = self.visible[at..].iter().find_map(|row| self.learnable.slot(*row));
-            let slot = slot.unwrap_or(first + out.len() / columns);
-            let (v, d) = (self.visible.split_at(at), self.directions.split_at(at));
-            let (c, g) = (self.colours.split_at(3 * at), self.colour_gradient.split_at(3 * at));
-            let (low, high) = out.split_at_mut((slot - first) * columns);
-            let left = Part {
-                visible: v.0,
-                directions: d.0,
-                colours: c.0,
-                colour_gradient: g.0,
-                ..self
-            };
-            let right = Part {
-                visible: v.1,
-                directions: d.1,
-                colours: c.1,
-                colour_gradient: g.1,
-                ..self
-            };
-            rayon::join(|| left.add(first, low), || right.add(slot, high));
-            return;
+/// `0.5 + sum over k of b[k] (coefficients[k] + changed[k])`, by colour; there may be fewer changes than coefficients.
+#[inline(always)]
+fn sum(b: &[f32; MAX_COEFFICIENTS], coefficients: &[f32], changed: &[f32]) -> [f32; 3] {
+    let mut sum = [0.5f32; 3];
+    let (both, plain) = coefficients.split_at(changed.len());
+    let (both, changed, plain) = (
+        both.as_chunks::<3>().0,
+        changed.as_chunks::<3>().0,
+        plain.as_chunks::<3>().0,
+    );
+    for (b, (h, o)) in b.iter().zip(both.iter().zip(changed)) {
+        for j in 0..3 {
+            sum[j] += b * (h[j] + o[j]);
         }
-        for i in 0..n {
+    }
+    for (b, h) in b[both.len()..].iter().zip(plain) {
+        for j in 0..3 {
+            sum[j] += b * h[j];
+        }
+    }
+    sum
+}
+
+/// Where rows `0..ROWS`, `ROWS..2 ROWS` and so on are in ascending rows.
+fn parts(rows: &[u32]) -> impl Iterator<Item = Range<usize>> {
+    let mut start = 0;
+    (1..).map(move |part: usize| {
+        let end = start + rows[start..].partition_point(|row| (*row as usize) < part * ROWS);
+        std::mem::replace(&mut start, end)..end
+    })
+}
+
+/// What a picture of a view says of its colours.
+#[derive(Clone, Copy, Debug)]
+pub struct ColourGradient<'a> {
+    /// The view.
+    pub view: &'a PreparedView,
+    /// Its colours as [`colours`] returned them: where one is 0 it was clamped, and its gradient is 0.
+    pub colours: &'a [f32],
+    /// The gradient to them, `[visible][3]`.
+    pub gradient: &'a [f32],
+}
+
+/// Adds to `out` (`[slots][columns]`) what a gradient to colours means for the learned coefficients.
+pub fn backward(learnable: &Learnable, of_view: ColourGradient<'_>, out: &mut [f32]) {
+    backward_of_views(learnable, &[of_view], out);
+}
+
+/// [`backward`] of each of some views, one after the other for every coefficient: sums in a fixed order.
+pub fn backward_of_views(learnable: &Learnable, views: &[ColourGradient<'_>], out: &mut [f32]) {
+    let columns = learnable.columns();
+    let mut tasks = Vec::new();
+    let mut rest = out;
+    let mut first = 0;
+    for slots in parts(learnable.rows()).take(learnable.gaussians().div_ceil(ROWS)) {
+        let (out, after) = rest.split_at_mut(slots.len() * columns);
+        rest = after;
+        tasks.push((first, out, Vec::with_capacity(views.len())));
+        first = slots.end;
+    }
+    for of_view in views {
+        let seen = parts(&of_view.view.visible);
+        tasks.iter_mut().zip(seen).for_each(|(task, seen)| task.2.push(seen));
+    }
+    tasks.into_par_iter().for_each(|(first, out, seen)| {
+        for (of_view, seen) in views.iter().zip(seen) {
+            of_view.add(learnable, seen, first, out);
+        }
+    });
+}
+
+impl ColourGradient<'_> {
+    /// Of a range of the visible Gaussians; `out` starts at the slot `first`.
+    fn add(&self, learnable: &Learnable, seen: Range<usize>, first: usize, out: &mut [f32]) {
+        let (view, columns) = (self.view, learnable.columns());
+        let degree = learnable.degree().min(view.degree);
+        let (colours, gradients) = (self.colours.as_chunks::<3>().0, self.gradient.as_chunks::<3>().0);
+        for i in seen {
             let mut g = [0.0f32; 3];
             for j in 0..3 {
-                if self.colours[3 * i + j] > 0.0 {
-                    g[j] = self.colour_gradient[3 * i + j];
+                if colours[i][j] > 0.0 {
+                    g[j] = gradients[i][j];
                 }
             }
             if g == [0.0; 3] {
                 continue;
             }
-            let Some(slot) = self.learnable.slot(self.visible[i]) else {
+            let Some(slot) = learnable.slot(view.visible[i]) else {
                 continue;
             };
-            let b = basis(self.degree, self.directions[i]);
+            let b = basis(degree, view.directions[i]);
             let at = (slot - first) * columns;
-            for (k, out) in out[at..at + columns].chunks_exact_mut(3).enumerate() {
+            for (out, b) in out[at..at + columns].as_chunks_mut::<3>().0.iter_mut().zip(b) {
                 for j in 0..3 {
-                    out[j] += b[k] * g[j];
+                    out[j] += b * g[j];
                 }
             }
         }

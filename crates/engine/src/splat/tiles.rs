@@ -28,47 +28,37 @@ pub struct TileLists {
 }
 
 impl TileLists {
-    /// Sorts `projected` (in ascending row order) into tiles. Ties in depth go to the lower row: the order is total.
-    /// Slots are left for [`TileLists::with_slots`], when it is known which pairs stay.
-    pub(crate) fn new(columns: u32, rows: u32, projected: &[(Splat2d, TileRect)]) -> Result<Self> {
-        let pairs: u64 = projected.iter().map(|(_, rect)| rect.area()).sum();
+    /// Sorts `splats` (in ascending row order) into the tiles of `rects`. Ties in depth go to the lower row: the order is
+    /// total. Slots are left for [`TileLists::with_slots`], when it is known which pairs stay.
+    pub(crate) fn new(columns: u32, rows: u32, splats: &[Splat2d], rects: &[TileRect]) -> Result<Self> {
+        let pairs: u64 = rects.iter().map(TileRect::area).sum();
         check_pairs(pairs)?;
-        // Depths are positive, so their bits sort as they do; the index makes keys unique and the sort stable.
-        let mut order: Vec<u64> = projected
-            .iter()
-            .enumerate()
-            .map(|(i, (s, _))| u64::from(s.depth.to_bits()) << 32 | i as u64)
-            .collect();
-        order.par_sort_unstable();
+        let tiles_of = |rect: &TileRect| {
+            let columns = columns as usize;
+            let [x, y] = [rect.x, rect.y].map(|[first, end]| usize::from(first)..usize::from(end));
+            y.flat_map(move |y| (y * columns + x.start)..(y * columns + x.end))
+        };
         let mut start = vec![0u32; columns as usize * rows as usize + 1];
-        for (_, rect) in projected {
-            for y in rect.y[0]..rect.y[1] {
-                for x in rect.x[0]..rect.x[1] {
-                    start[(y * columns + x) as usize + 1] += 1;
-                }
-            }
+        for rect in rects {
+            tiles_of(rect).for_each(|tile| start[tile + 1] += 1);
         }
         for i in 1..start.len() {
             start[i] += start[i - 1];
         }
         let mut next = start.clone();
-        let mut splats = vec![0u32; pairs as usize];
-        for key in order {
-            let index = key as u32;
-            let rect = projected[index as usize].1;
-            for y in rect.y[0]..rect.y[1] {
-                for x in rect.x[0]..rect.x[1] {
-                    let next = &mut next[(y * columns + x) as usize];
-                    splats[*next as usize] = index;
-                    *next += 1;
-                }
+        let mut lists = vec![0u32; pairs as usize];
+        for index in by_depth(splats) {
+            for tile in tiles_of(&rects[index as usize]) {
+                let next = &mut next[tile];
+                lists[*next as usize] = index;
+                *next += 1;
             }
         }
         Ok(TileLists {
             columns,
             rows,
             start,
-            splats,
+            splats: lists,
             ..TileLists::default()
         })
     }
@@ -139,6 +129,41 @@ impl TileLists {
     }
 }
 
+/// Most bits that the sort looks at in a pass: counts of all their values fit the first cache.
+const DIGIT: u32 = 11;
+
+/// Indices of splats by depth, those of the same depth in ascending order.
+///
+/// A radix sort, least significant digit first: it takes time in proportion to the splats, and is stable. Depths are
+/// positive, so their bits sort as they do; digits cover the bits in which they differ.
+fn by_depth(splats: &[Splat2d]) -> Vec<u32> {
+    let depths = || splats.iter().map(|s| s.depth.to_bits());
+    let least = depths().min().unwrap_or(0);
+    let bits = 32 - (depths().max().unwrap_or(0) - least).leading_zeros();
+    let passes = bits.div_ceil(DIGIT).max(1);
+    let digit = bits.div_ceil(passes);
+    let mut keys: Vec<u64> = depths()
+        .enumerate()
+        .map(|(i, depth)| u64::from(depth - least) << 32 | i as u64)
+        .collect();
+    let mut sorted = vec![0u64; keys.len()];
+    for pass in 0..passes {
+        let place = |key: u64| (key >> (32 + pass * digit)) as usize & ((1 << digit) - 1);
+        let mut next = vec![0u32; (1 << digit) + 1];
+        keys.iter().for_each(|key| next[place(*key) + 1] += 1);
+        for i in 1..next.len() {
+            next[i] += next[i - 1];
+        }
+        for key in &keys {
+            let next = &mut next[place(*key)];
+            sorted[*next as usize] = *key;
+            *next += 1;
+        }
+        std::mem::swap(&mut keys, &mut sorted);
+    }
+    keys.into_iter().map(|key| key as u32).collect()
+}
+
 fn check_pairs(pairs: u64) -> Result<()> {
     if pairs <= MAX_PAIRS {
         return Ok(());
@@ -175,6 +200,30 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
+    fn at_depth(depth: f32) -> Splat2d {
+        Splat2d {
+            depth,
+            ..Splat2d::zeroed()
+        }
+    }
+
+    #[test]
+    fn depths_are_sorted_whatever_bits_they_differ_in() {
+        let sorted = |depths: &[f32]| {
+            let splats: Vec<Splat2d> = depths.iter().copied().map(at_depth).collect();
+            let mut expected: Vec<u32> = (0..splats.len() as u32).collect();
+            expected.sort_by(|a, b| depths[*a as usize].total_cmp(&depths[*b as usize]));
+            assert_eq!(by_depth(&splats), expected, "{depths:?}");
+        };
+        let spread = |scale: f32| (0..3000).map(move |i: u32| 0.2 + scale * (i.wrapping_mul(7919) % 1009) as f32);
+        sorted(&spread(1e-2).collect::<Vec<_>>());
+        sorted(&spread(1e-7).chain(spread(1e30)).collect::<Vec<_>>());
+        sorted(&[f32::MAX, 0.21, f32::MAX, 3.0]);
+        sorted(&[5.0; 9]);
+        sorted(&[1.0]);
+        sorted(&[]);
+    }
+
     #[test]
     fn too_many_pairs_are_refused_with_their_number() {
         let rect = TileRect { x: [0, 50], y: [0, 50] };
@@ -187,22 +236,9 @@ mod tests {
 
     #[test]
     fn lists_go_front_to_back_and_ties_to_the_lower_row() {
-        let at = |depth, x: [u32; 2]| {
-            (
-                Splat2d {
-                    depth,
-                    ..Splat2d::zeroed()
-                },
-                TileRect { x, y: [0, 1] },
-            )
-        };
-        let lists = TileLists::new(
-            2,
-            1,
-            &[at(2.0, [0, 2]), at(1.0, [1, 2]), at(2.0, [0, 1]), at(0.5, [0, 2])],
-        )
-        .unwrap()
-        .with_slots(4);
+        let splats = [2.0, 1.0, 2.0, 0.5].map(at_depth);
+        let rects = [[0, 2], [1, 2], [0, 1], [0, 2]].map(|x| TileRect { x, y: [0, 1] });
+        let lists = TileLists::new(2, 1, &splats, &rects).unwrap().with_slots(4);
         assert_eq!(lists.of(0), [3, 0, 2]);
         assert_eq!(lists.of(1), [3, 1, 0]);
         assert_eq!(lists.slot_start, [0, 2, 3, 4, 6]);
@@ -213,16 +249,8 @@ mod tests {
 
     #[test]
     fn pruning_renumbers() {
-        let at = |depth, x: [u32; 2]| {
-            (
-                Splat2d {
-                    depth,
-                    ..Splat2d::zeroed()
-                },
-                TileRect { x, y: [0, 1] },
-            )
-        };
-        let lists = TileLists::new(2, 1, &[at(2.0, [0, 2]), at(1.0, [1, 2]), at(3.0, [0, 1])]).unwrap();
+        let rects = [[0, 2], [1, 2], [0, 1]].map(|x| TileRect { x, y: [0, 1] });
+        let lists = TileLists::new(2, 1, &[2.0, 1.0, 3.0].map(at_depth), &rects).unwrap();
         // Tile 0: 0, 2; tile 1: 1, 0. Drop splat 1, and splat 0 from tile 1.
         let pruned = lists
             .pruned(&[true, true, false, false], &[0, u32::MAX, 1])

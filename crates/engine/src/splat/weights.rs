@@ -1,8 +1,9 @@
 //! The weights of a view, kept: what every splat contributes to every pixel.
 use super::composite::{ContributionSink, TileBounds, composite_tile};
 use super::project::Splat2d;
-use super::tiles::{TILE_PIXELS, TileLists};
+use super::tiles::{TILE, TILE_PIXELS, TileLists};
 use crate::error::{Error, Result};
+use crate::simd::Instructions;
 use crate::view::Camera;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
@@ -130,13 +131,11 @@ impl Band {
     ) -> Result<(Self, Vec<bool>)> {
         let first = (row * tiles.columns) as usize;
         let slots = (tiles.start[first + tiles.columns as usize] - tiles.start[first]) as usize;
-        scratch.pixels.clear();
-        scratch.weights.clear();
+        let instructions = Instructions::widest();
         let mut collect = Collect {
             scratch,
-            pixels: [0; TILE_PIXELS],
-            weights: [0.0; TILE_PIXELS],
-            count: 0,
+            begin: 0,
+            end: 0,
             ends: Vec::with_capacity(slots),
             keep: Vec::with_capacity(slots),
         };
@@ -145,19 +144,20 @@ impl Band {
             let list = tiles.of(first + column as usize);
             let before = collect.keep.len();
             let frame = TileBounds::new(column, row, camera.width, camera.height);
-            transmittance.push(composite_tile(frame, splats, list, &mut collect));
+            transmittance.push(composite_tile(instructions, frame, splats, list, &mut collect));
             // Once all pixels are finished the walk ends early; the splats behind have no weight.
             collect.keep.resize(before + list.len(), false);
         }
-        if collect.scratch.weights.len() > u32::MAX as usize {
+        if collect.end > u32::MAX as usize {
             return Err(Error::BadOption {
                 field: "size",
                 reason: "a row of tiles has more than 2^32 weights; render a smaller picture or keep no weights".into(),
             });
         }
-        let Collect { ends, keep, .. } = collect;
+        let Collect { ends, keep, end, .. } = collect;
         // Copies of the exact size: growing in place would leave up to half of the memory unused.
-        let (pixels, weights) = (scratch.pixels.as_slice().into(), Numbers::new(&scratch.weights, half));
+        let pixels = scratch.pixels[..end].into();
+        let weights = Numbers::new(&scratch.weights[..end], half);
         Ok((
             Band {
                 ends,
@@ -170,19 +170,21 @@ impl Band {
     }
 }
 
-/// Entries of a band while it grows, kept from band to band.
+/// Entries of a band while it grows, kept from band to band; longer than what is in use.
 #[derive(Default)]
 struct Scratch {
     pixels: Vec<u8>,
     weights: Vec<f32>,
 }
 
+/// Entries that a pair may write: one a pixel, and what is written too many at a time.
+const PAIR_ROOM: usize = TILE_PIXELS + TILE as usize;
+
 struct Collect<'a> {
     scratch: &'a mut Scratch,
-    /// Entries of the current pair, at most one a pixel.
-    pixels: [u8; TILE_PIXELS],
-    weights: [f32; TILE_PIXELS],
-    count: usize,
+    /// Where the entries of the current pair begin and end.
+    begin: usize,
+    end: usize,
     ends: Vec<u32>,
     keep: Vec<bool>,
 }
@@ -190,25 +192,51 @@ struct Collect<'a> {
 impl ContributionSink for Collect<'_> {
     #[inline(always)]
     fn begin(&mut self, _: usize, _: u32) {
-        self.count = 0;
+        self.begin = self.end;
+        let room = self.end + PAIR_ROOM;
+        if self.scratch.weights.len() < room {
+            self.scratch.pixels.resize(2 * room, 0);
+            self.scratch.weights.resize(2 * room, 0.0);
+        }
     }
 
     #[inline(always)]
     fn add(&mut self, pixel: usize, weight: f32) {
-        // The remainder changes nothing, and tells the compiler that the index is in range.
-        self.pixels[self.count % TILE_PIXELS] = pixel as u8;
-        self.weights[self.count % TILE_PIXELS] = weight;
-        self.count += 1;
+        self.scratch.pixels[self.end] = pixel as u8;
+        self.scratch.weights[self.end] = weight;
+        self.end += 1;
+    }
+
+    #[inline(always)]
+    fn add_run<const W: usize>(&mut self, first: usize, weights: &[f32; W], count: usize, all: bool) {
+        let to = self.end..self.end + W;
+        let pixels = &mut self.scratch.pixels[to.clone()];
+        let kept = &mut self.scratch.weights[to];
+        if all {
+            // What is behind the last is overwritten by what comes next, or not counted.
+            pixels
+                .iter_mut()
+                .enumerate()
+                .for_each(|(k, pixel)| *pixel = (first as u8).wrapping_add(k as u8));
+            kept.copy_from_slice(weights);
+            self.end += count;
+        } else {
+            let mut end = 0;
+            for (k, weight) in weights[..count].iter().enumerate() {
+                pixels[end] = (first + k) as u8;
+                kept[end] = *weight;
+                end += usize::from(*weight > 0.0);
+            }
+            self.end += end;
+        }
     }
 
     #[inline(always)]
     fn end(&mut self, _: usize, stopped: bool) {
-        let keep = stopped || self.count > 0;
+        let keep = stopped || self.end > self.begin;
         self.keep.push(keep);
         if keep {
-            self.scratch.pixels.extend_from_slice(&self.pixels[..self.count]);
-            self.scratch.weights.extend_from_slice(&self.weights[..self.count]);
-            self.ends.push(self.scratch.weights.len() as u32);
+            self.ends.push(self.end as u32);
         }
     }
 }

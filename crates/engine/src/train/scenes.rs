@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::picture::Picture;
 use crate::sample::sample;
 use crate::scene::Gaussians;
-use crate::splat::{PreparedView, Rasterizer, WeightCache, prepare, sh};
+use crate::splat::{Geometry, PreparedView, Rasterizer, WeightCache, sh};
 use crate::view::{Split, ViewSampler};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -64,11 +64,12 @@ impl ViewedScene {
             }
         }
         let sampler = ViewSampler::around(&gaussians, seed)?;
+        let geometry = Geometry::new(&gaussians);
         let views = (0..views as u64)
             .into_par_iter()
             .map(|view| {
                 let camera = sampler.camera(Split::Training, view, IMAGE_SIZE as u32);
-                prepare(&gaussians, &camera, WeightCache::Weights)
+                geometry.prepare(&camera, WeightCache::Weights)
             })
             .collect::<Result<_>>()?;
         Ok(Self { gaussians, views })

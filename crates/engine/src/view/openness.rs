@@ -8,6 +8,7 @@ use super::extent::{Extent, weights};
 use super::solid::SolidGrid;
 use super::vector::dot;
 use crate::scene::Gaussians;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Gaussians that look around.
@@ -69,7 +70,7 @@ impl Openness {
         let count = rows.len().max(1) as f32;
         let cones: Vec<u64> = looks.iter().map(|side| cone(*side, &looks)).collect();
         let (mut inside, mut seen_from, mut hidden_from) = (0, [0.0f32; LOOKS], [0.0f32; LOOKS]);
-        for row in rows {
+        let looked = |row: usize| {
             let place = gaussians.positions[row];
             let (mut escaped, mut far) = (0u64, 0);
             for (bit, look) in looks.iter().enumerate() {
@@ -78,6 +79,10 @@ impl Openness {
                     Some(way) => far += usize::from(way > FAR * length),
                 }
             }
+            (escaped, far)
+        };
+        let looked: Vec<(u64, usize)> = rows.into_par_iter().with_min_len(64).map(looked).collect();
+        for (escaped, far) in looked {
             let share = |count: usize| count as f32 / LOOKS as f32;
             inside += usize::from(share(escaped.count_ones() as usize) <= BURIED && share(far) >= FACING_FREE);
             for (side, cone) in cones.iter().enumerate() {

@@ -94,11 +94,12 @@ impl SolidGrid {
     pub fn cell(&self, place: [f32; 3]) -> Option<usize> {
         let mut number = 0;
         for k in (0..3).rev() {
-            let along = ((place[k] - self.low[k]) / self.side).floor();
+            let along = (place[k] - self.low[k]) / self.side;
             if !(along >= 0.0 && along < self.counts[k] as f32) {
                 return None;
             }
-            number = number * self.counts[k] + along as usize;
+            // The conversion rounds down.
+            number = number * self.counts[k] + along as u32 as usize;
         }
         Some(number)
     }

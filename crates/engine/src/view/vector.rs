@@ -53,6 +53,7 @@ pub(crate) fn frame(up: [f32; 3]) -> [[f32; 3]; 3] {
 }
 
 /// The matrix, by rows, of a rotation by a quaternion (w, x, y, z) of length 1.
+#[inline(always)]
 pub(crate) fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     [
         [

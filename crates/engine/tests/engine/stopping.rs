@@ -39,7 +39,8 @@ fn whatever_is_computed_ends_when_it_is_asked_to() {
     };
     let told = stopped_at(|progress| matches!(progress, Progress::Step(step) if step.step == 2));
     // Before the steps it is told what memory is needed, and which Gaussians can be seen.
-    assert_eq!(told.len(), 4);
+    // Before the steps it is told what memory is needed, and which Gaussians can be seen; of each step also how long it took.
+    assert_eq!(told.len(), 6);
     let told = stopped_at(|progress| matches!(progress, Progress::Verifying { done: 1, .. }));
     assert!(matches!(told.last(), Some(Progress::Verifying { done: 1, .. })));
     // The last view is read and only compared afterwards.

@@ -39,7 +39,15 @@ fn compare(name: &str, g: &Gaussians, rasterizer: &dyn Rasterizer) {
             let picture = rasterizer.render(&view, &colours, BACKGROUND).unwrap().pixels;
             let signs: Vec<f32> = (0..picture.len()).map(|i| (i as f32 * 0.61).sin()).collect();
             let of_colours = rasterizer.backward(&view, &signs).unwrap();
-            sh::backward(&learnable, &view, &colours, &of_colours, gradient);
+            sh::backward(
+                &learnable,
+                sh::ColourGradient {
+                    view: &view,
+                    colours: &colours,
+                    gradient: &of_colours,
+                },
+                gradient,
+            );
             pictures.push(picture);
         }
         for (single, half) in pictures[0].iter().zip(&pictures[1]) {

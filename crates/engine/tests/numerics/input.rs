@@ -25,7 +25,15 @@ fn draw_with(machine: &Machine, cache: WeightCache, g: &Gaussians, camera: &Came
     let pixels = machine.rasterizer.render(&view, &colours, BACKGROUND).unwrap().pixels;
     let of_colours = machine.rasterizer.backward(&view, &vec![1.0; pixels.len()]).unwrap();
     let mut gradient = vec![0.0; g.sh.coefficients.len()];
-    sh::backward(&Learnable::all(g), &view, &colours, &of_colours, &mut gradient);
+    sh::backward(
+        &Learnable::all(g),
+        sh::ColourGradient {
+            view: &view,
+            colours: &colours,
+            gradient: &of_colours,
+        },
+        &mut gradient,
+    );
     assert!(pixels.iter().chain(&gradient).all(|v| v.is_finite()));
     Drawn {
         visible: view.visible.len(),

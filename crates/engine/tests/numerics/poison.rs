@@ -114,7 +114,15 @@ fn in_range(machine: &Machine, g: &Gaussians) -> TestCaseResult {
         let ones = vec![1.0; picture.pixels.len()];
         let of_colours = machine.rasterizer.backward(&view, &ones).unwrap();
         let mut gradient = vec![0.0; g.sh.coefficients.len()];
-        sh::backward(&Learnable::all(g), &view, &colours, &of_colours, &mut gradient);
+        sh::backward(
+            &Learnable::all(g),
+            sh::ColourGradient {
+                view: &view,
+                colours: &colours,
+                gradient: &of_colours,
+            },
+            &mut gradient,
+        );
         prop_assert!(gradient.iter().all(|v| v.is_finite()));
     }
     Ok(())

@@ -6,6 +6,8 @@
 //! coarser than what a mark changes, so a mark cannot make its own colours common.
 use rayon::prelude::*;
 
+use crate::simd::{Instructions, Vectorised};
+
 /// Least value of a channel on the grid, of normalised pictures; what is below counts as this.
 pub(super) const LEAST: f32 = -2.0;
 /// Corners a channel, 1 apart, which is about a quarter of the way from black to white; white is at most 2.15.
@@ -13,58 +15,189 @@ pub(super) const CORNERS: usize = 6;
 /// Corners of the grid.
 pub(super) const GRID: usize = CORNERS * CORNERS * CORNERS;
 
+/// Pixels that are computed together, a register of them at a time.
+const BLOCK: usize = 64;
+/// Room for the grid's corners, so that an index of eight bits is in range.
+const ROOM: usize = 256;
+/// How far the corners of a cell are behind its first.
+const BEHIND: [usize; 8] = {
+    let mut behind = [0; 8];
+    let mut i = 0;
+    while i < 8 {
+        behind[i] = ((i >> 2) * CORNERS + (i >> 1 & 1)) * CORNERS + (i & 1);
+        i += 1;
+    }
+    behind
+};
+
 /// Weights `[views][pixels]` of normalised pictures `[views][3][pixels]`; those of a view add up to 1.
-pub(super) fn weights(pictures: &[f32], views: usize, equalization: f32) -> Vec<f32> {
+pub(super) fn weights(instructions: Instructions, pictures: &[f32], views: usize, equalization: f32) -> Vec<f32> {
     let len = pictures.len() / views.max(1);
     let pixels = len / 3;
     let mut weights = vec![0.0; views * pixels];
     if pixels > 0 {
         let views = weights.par_chunks_exact_mut(pixels).zip(pictures.par_chunks_exact(len));
-        views.for_each(|(weights, picture)| of_picture(picture, equalization, weights));
+        views.for_each(|(weights, picture)| {
+            instructions.run(Weigh {
+                picture,
+                equalization,
+                weights,
+            });
+        });
     }
     weights
 }
 
-fn of_picture(picture: &[f32], equalization: f32, weights: &mut [f32]) {
-    let pixels = weights.len();
-    let colour = |pixel: usize| std::array::from_fn(|channel| picture[channel * pixels + pixel]);
-    let mut grid = vec![0.0_f32; GRID];
-    for pixel in 0..pixels {
-        for (corner, share) in corners(colour(pixel)) {
-            grid[corner] += share;
+/// Of one picture. Nothing is fused: the bytes are the same on every instruction set of an architecture.
+struct Weigh<'a> {
+    picture: &'a [f32],
+    equalization: f32,
+    weights: &'a mut [f32],
+}
+
+impl Vectorised for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let power = -f64::from(self.equalization);
+        let mut cells = Cells::new();
+        let mut grid = [0.0_f32; ROOM];
+        let pixels = self.weights.len();
+        for first in (0..pixels).step_by(BLOCK) {
+            let count = cells.fill(self.picture, pixels, first);
+            cells.count(&mut grid, count);
+        }
+        let mut sums = [0.0_f64; BLOCK];
+        for (block, weights) in self.weights.chunks_mut(BLOCK).enumerate() {
+            cells.fill(self.picture, pixels, block * BLOCK);
+            let mut found = [0.0_f32; BLOCK];
+            for k in 0..BLOCK {
+                found[k] = power_of(cells.density(&grid, k), power);
+            }
+            for ((weight, found), sum) in weights.iter_mut().zip(&found).zip(&mut sums) {
+                *weight = *found;
+                *sum += f64::from(*found);
+            }
+        }
+        let scale = (1.0 / sums.iter().sum::<f64>()) as f32;
+        self.weights.iter_mut().for_each(|weight| *weight *= scale);
+    }
+}
+
+/// Where some pixels are on the grid.
+struct Cells {
+    colours: [[f32; BLOCK]; 3],
+    /// The first corner of each one's cell.
+    first: [u32; BLOCK],
+    /// Its shares of the cell's corners.
+    shares: [[f32; BLOCK]; 8],
+}
+
+impl Cells {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            colours: [[0.0; BLOCK]; 3],
+            first: [0; BLOCK],
+            shares: [[0.0; BLOCK]; 8],
         }
     }
-    let mut sum = 0.0_f64;
-    for (pixel, weight) in weights.iter_mut().enumerate() {
-        let shares = corners(colour(pixel));
-        let density: f32 = shares.iter().map(|(corner, share)| share * grid[*corner]).sum();
-        // A pixel alone in its cell holds an eighth at least; colours that are no numbers hold nothing.
-        *weight = density.max(0.125).powf(-equalization);
-        sum += f64::from(*weight);
+
+    /// Finds pixels from `first` on in a picture of so many; returns how many there are.
+    #[inline(always)]
+    fn fill(&mut self, picture: &[f32], pixels: usize, first: usize) -> usize {
+        let count = BLOCK.min(pixels - first);
+        for (channel, colours) in self.colours.iter_mut().enumerate() {
+            colours[..count].copy_from_slice(&picture[channel * pixels + first..][..count]);
+        }
+        for k in 0..BLOCK {
+            let (r, to_r) = place(self.colours[0][k]);
+            let (g, to_g) = place(self.colours[1][k]);
+            let (b, to_b) = place(self.colours[2][k]);
+            let corners = CORNERS as f32;
+            self.first[k] = whole((r * corners + g) * corners + b);
+            for i in 0..8 {
+                let red = if i >> 2 == 1 { to_r } else { 1.0 - to_r };
+                let green = if i >> 1 & 1 == 1 { to_g } else { 1.0 - to_g };
+                let blue = if i & 1 == 1 { to_b } else { 1.0 - to_b };
+                self.shares[i][k] = red * green * blue;
+            }
+        }
+        count
     }
-    let scale = (1.0 / sum) as f32;
-    weights.iter_mut().for_each(|weight| *weight *= scale);
+
+    /// Adds the first `count` pixels to the grid, one after the other.
+    #[inline(always)]
+    fn count(&self, grid: &mut [f32; ROOM], count: usize) {
+        for k in 0..count.min(BLOCK) {
+            for i in 0..8 {
+                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k];
+            }
+        }
+    }
+
+    /// What the corners around a pixel hold, by its shares of them.
+    #[inline(always)]
+    fn density(&self, grid: &[f32; ROOM], k: usize) -> f32 {
+        let mut density = 0.0;
+        for i in 0..8 {
+            density += self.shares[i][k] * grid[(self.first[k] as usize + BEHIND[i]) % ROOM];
+        }
+        // A pixel alone in its cell holds an eighth at least; colours that are no numbers hold nothing.
+        if density > 0.125 { density } else { 0.125 }
+    }
 }
 
-/// The eight corners around a colour, and its shares of them.
+/// The corner before a value, and how far it is on the way to the next; of NaN the first corner, and NaN.
 #[inline(always)]
-fn corners(colour: [f32; 3]) -> [(usize, f32); 8] {
-    let [(r, to_r), (g, to_g), (b, to_b)] = colour.map(place);
-    let first = (r * CORNERS + g) * CORNERS + b;
-    std::array::from_fn(|i| {
-        let (dr, dg, db) = (i >> 2, i >> 1 & 1, i & 1);
-        let share = |d: usize, to: f32| if d == 1 { to } else { 1.0 - to };
-        let corner = first + (dr * CORNERS + dg) * CORNERS + db;
-        (corner, share(dr, to_r) * share(dg, to_g) * share(db, to_b))
-    })
+fn place(value: f32) -> (f32, f32) {
+    let at = value - LEAST;
+    let at = if at < 0.0 { 0.0 } else { at };
+    let last = (CORNERS - 1) as f32;
+    let at = if at > last { last } else { at };
+    let mut corner = 0.0;
+    for k in 1..CORNERS - 1 {
+        corner += if at >= k as f32 { 1.0 } else { 0.0 };
+    }
+    (corner, at - corner)
 }
 
-/// The corner before a value, and how far it is on the way to the next.
+/// A whole number from 0 to 255 as an integer: added to 2^23 it is in the lowest bits.
 #[inline(always)]
-fn place(value: f32) -> (usize, f32) {
-    let at = (value - LEAST).clamp(0.0, (CORNERS - 1) as f32);
-    let corner = (at as usize).min(CORNERS - 2);
-    (corner, at - corner as f32)
+fn whole(x: f32) -> u32 {
+    (x + 8_388_608.0).to_bits() & 0xff
+}
+
+/// `x` to a power from -1 to 1, for normal numbers above 0: in f64 within 1e-9, so that in f32 it is rounded as it should.
+///
+/// `2^(power log2 x)`: the logarithm of the mantissa by the series of the inverse hyperbolic tangent, the power of two by
+/// that of the exponential function.
+#[inline(always)]
+fn power_of(x: f32, power: f64) -> f32 {
+    /// Adding and subtracting 1.5 * 2^52 rounds to a whole number, which is then in the lowest bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    // The mantissa from the root of 1/2 to that of 2, and the exponent that goes with it.
+    let bits = x.to_bits();
+    let above = bits.wrapping_sub(0x3f35_04f3);
+    let exponent = f64::from((above as i32) >> 23);
+    let mantissa = f64::from(f32::from_bits((above & 0x007f_ffff) + 0x3f35_04f3));
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let z = s * s;
+    let mut series = 1.0 / 13.0;
+    for k in [11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
+        series = series * z + 1.0 / k;
+    }
+    let log2 = exponent + s * series * (2.0 * std::f64::consts::LOG2_E);
+    let y = power * log2;
+    let shifted = y + ROUND;
+    let r = (y - (shifted - ROUND)) * std::f64::consts::LN_2;
+    let mut series = 1.0 / 40_320.0;
+    for factorial in [5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0] {
+        series = series * r + 1.0 / factorial;
+    }
+    let scale = f64::from_bits((shifted.to_bits().wrapping_add(1023)) << 52);
+    (series * scale) as f32
 }
 
 #[cfg(test)]
@@ -74,17 +207,80 @@ mod tests {
     /// Three pixels of one colour and one of another, both at corners of the grid.
     const FOUR: [f32; 12] = [0.0, 0.0, 1.0, 0.0, 1.0, 1.0, -1.0, 1.0, 2.0, 2.0, 2.0, 2.0];
 
+    /// As the formula reads, in f64.
+    fn expected(picture: &[f32], equalization: f64) -> Vec<f64> {
+        let pixels = picture.len() / 3;
+        let corners = |pixel: usize| {
+            let places: Vec<(usize, f64)> = (0..3)
+                .map(|channel| {
+                    let at = f64::from(picture[channel * pixels + pixel] - LEAST).clamp(0.0, 5.0);
+                    let corner = (at as usize).min(CORNERS - 2);
+                    (corner, at - corner as f64)
+                })
+                .collect();
+            (0..8).map(move |i| {
+                let far = [i >> 2, i >> 1 & 1, i & 1];
+                let share = |k: usize| if far[k] == 1 { places[k].1 } else { 1.0 - places[k].1 };
+                let corner = (0..3).fold(0, |at, k| at * CORNERS + places[k].0 + far[k]);
+                (corner, share(0) * share(1) * share(2))
+            })
+        };
+        let mut grid = [0.0; GRID];
+        (0..pixels)
+            .flat_map(corners)
+            .for_each(|(corner, share)| grid[corner] += share);
+        let density = |pixel| corners(pixel).map(|(corner, share)| share * grid[corner]).sum::<f64>();
+        let weights: Vec<f64> = (0..pixels).map(|p| density(p).max(0.125).powf(-equalization)).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter().map(|w| w / sum).collect()
+    }
+
+    #[test]
+    fn weights_are_those_of_the_formula_and_the_same_on_every_instruction_set() {
+        let channels = [(0.013, 1.9, 0.2), (0.0071, 1.2, 0.4), (0.031, 2.4, -0.3)];
+        let value = |(rate, size, shift): (f32, f32, f32)| move |i: usize| shift + size * (i as f32 * rate).sin();
+        let picture: Vec<f32> = channels.into_iter().flat_map(|c| (0..1111).map(value(c))).collect();
+        for equalization in [0.2, 1.0] {
+            let wanted = expected(&picture, f64::from(equalization));
+            let sets: Vec<Vec<f32>> = Instructions::present()
+                .map(|set| weights(set, &picture, 1, equalization))
+                .collect();
+            for (found, wanted) in sets[0].iter().zip(&wanted) {
+                assert!((f64::from(*found) / wanted - 1.0).abs() < 1e-6, "{found} {wanted}");
+            }
+            assert!(sets.iter().all(|set| *set == sets[0]));
+        }
+    }
+
+    #[test]
+    fn powers_are_rounded_right() {
+        for i in 0..60_000 {
+            let x = 0.125 * 1.000_25_f32.powi(i);
+            for power in [-0.2_f32, -1.0, -0.013, 0.0, 0.7] {
+                let (found, exact) = (power_of(x, f64::from(power)), f64::from(x).powf(f64::from(power)));
+                let off = (f64::from(found) / exact - 1.0).abs();
+                assert!(off < 6.1e-8, "{x} to the power of {power}: {found}, not {exact}");
+            }
+        }
+    }
+
     #[test]
     fn rare_colours_weigh_more() {
         let close = |found: Vec<f32>, expected: [f32; 4]| {
             let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
             assert!(close, "{found:?} {expected:?}");
         };
-        close(weights(&FOUR, 1, 0.0), [0.25; 4]);
+        close(weights(Instructions::widest(), &FOUR, 1, 0.0), [0.25; 4]);
         // Each of the two colours half of all.
-        close(weights(&FOUR, 1, 1.0), [1.0 / 6.0, 1.0 / 6.0, 0.5, 1.0 / 6.0]);
+        close(
+            weights(Instructions::widest(), &FOUR, 1, 1.0),
+            [1.0 / 6.0, 1.0 / 6.0, 0.5, 1.0 / 6.0],
+        );
         let (common, sum) = (3.0_f32.powf(-0.5), 3.0_f32.sqrt() + 1.0);
-        close(weights(&FOUR, 1, 0.5), [common, common, 1.0, common].map(|w| w / sum));
+        close(
+            weights(Instructions::widest(), &FOUR, 1, 0.5),
+            [common, common, 1.0, common].map(|w| w / sum),
+        );
     }
 
     #[test]
@@ -94,7 +290,10 @@ mod tests {
                 .map(|i| (i as f32 * 0.37).sin() + change * (i as f32 * 1.7).cos())
                 .collect()
         };
-        let (before, after) = (weights(&picture(0.0), 1, 0.2), weights(&picture(0.05), 1, 0.2));
+        let (before, after) = (
+            weights(Instructions::widest(), &picture(0.0), 1, 0.2),
+            weights(Instructions::widest(), &picture(0.05), 1, 0.2),
+        );
         for (a, b) in before.iter().zip(&after) {
             assert!((a / b - 1.0).abs() < 0.03, "{a} {b}");
         }
@@ -116,9 +315,9 @@ mod tests {
             0.1,
             -0.1,
         ];
-        let found = weights(&odd, 1, 1.0);
+        let found = weights(Instructions::widest(), &odd, 1, 1.0);
         assert!(found.iter().all(|w| w.is_finite() && *w > 0.0), "{found:?}");
         assert!((found.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        assert!(weights(&[], 0, 1.0).is_empty());
+        assert!(weights(Instructions::widest(), &[], 0, 1.0).is_empty());
     }
 }

@@ -28,7 +28,12 @@ impl WeightedSines for Flex {
         }
         let (squares, views) = (squares(&pictures, side), pictures.shape()[0]);
         let pictures = pictures.to_contiguous();
-        let weights = density::weights(&squares.means(pictures.storage()), views, equalization);
+        let weights = density::weights(
+            Instructions::widest(),
+            &squares.means(pictures.storage()),
+            views,
+            equalization,
+        );
         let shape = Shape::new([views, squares.count()]);
         Some(FloatTensor::<Self>::from_data(TensorData::new(weights, shape)))
     }

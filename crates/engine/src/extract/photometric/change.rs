@@ -3,6 +3,7 @@ use std::fmt;
 
 use super::tone::{GREY, grey};
 use crate::picture::Picture;
+use crate::simd::{Instructions, Vectorised};
 
 /// Coordinates of a [`ToneChange`].
 pub(in crate::extract) const COORDINATES: usize = 6;
@@ -33,38 +34,22 @@ impl ToneChange {
         Self { logs }
     }
 
-    /// Values before this was done to them, not cut, of a picture with this mean grey before its contrast was changed;
-    /// what was cut when it was done stays cut.
-    fn before(&self, [red, green, blue]: [f32; 3], mean: f32) -> [f32; 3] {
-        let [gains @ .., gamma, saturation, contrast] = self.logs.map(f32::exp);
-        let mut pixel = [red, green, blue].map(|v| mean + (v - mean) / contrast);
-        let grey = grey(&pixel);
-        pixel = pixel.map(|v| grey + (v - grey) / saturation);
-        if self.logs[Self::GAMMA] != 0.0 {
-            pixel = pixel.map(|v| v.max(0.0).powf(1.0 / gamma));
-        }
-        std::array::from_fn(|c| pixel[c] / gains[c])
-    }
-
     /// The mean grey that a picture had before its contrast was changed, which did not move it. Where contrast grew,
     /// values at black and white had been there before: a ground, most of all.
     fn mean_before(&self, picture: &Picture) -> f32 {
         let contrast = self.logs[Self::CONTRAST].exp();
-        let pixels = picture.pixels.as_chunks::<3>().0;
-        let mean_of = |value: &dyn Fn(f32) -> f32| {
-            let sum: f64 = pixels.iter().map(|p| f64::from(grey(&p.map(value)))).sum();
-            (sum / pixels.len().max(1) as f64) as f32
+        let pixels = picture.pixels.as_chunks().0;
+        let instructions = Instructions::widest();
+        let mean = |centre: Option<f32>| {
+            instructions.run(MeanGrey {
+                pixels,
+                contrast,
+                centre,
+            })
         };
-        let mut mean = mean_of(&|v| v);
+        let first = mean(None);
         let rounds = if contrast > 1.0 { 3 } else { 0 };
-        for _ in 0..rounds {
-            let centre = mean;
-            mean = mean_of(&|v| match v <= CUT || v >= 1.0 - CUT {
-                true => v,
-                false => centre + (v - centre) / contrast,
-            });
-        }
-        mean
+        (0..rounds).fold(first, |centre, _| mean(Some(centre)))
     }
 
     /// The picture before this was done to it, values cut to [0, 1]; `None` where that can't be: what was done can only
@@ -75,15 +60,12 @@ impl ToneChange {
             0.0 => 0.0,
             _ => self.mean_before(whole),
         };
-        let mut outside = 0;
-        let mut pixels = Vec::with_capacity(picture.pixels.len());
-        for pixel in picture.pixels.as_chunks::<3>().0 {
-            for (was, now) in self.before(*pixel, mean).into_iter().zip(pixel) {
-                let seen = *now > CUT && *now < 1.0 - CUT;
-                outside += usize::from(seen && !(-BEYOND..=1.0 + BEYOND).contains(&was));
-                pixels.push(was.clamp(0.0, 1.0));
-            }
-        }
+        let mut pixels = vec![0.0; picture.pixels.len()];
+        let outside = Instructions::widest().run(Undo {
+            before: Before::new(self, mean),
+            pixels: picture.pixels.as_chunks().0,
+            out: pixels.as_chunks_mut().0,
+        });
         let possible = outside as f32 <= OUTSIDE * pixels.len() as f32;
         possible.then_some(Picture { pixels, ..*picture })
     }
@@ -92,11 +74,144 @@ impl ToneChange {
     pub fn with_white(&self, ground: [f32; 3], whole: &Picture) -> Self {
         let mut change = *self;
         change.logs[..3].fill(0.0);
-        let before = change.before(ground, change.mean_before(whole));
+        let before = Before::new(&change, change.mean_before(whole)).of(ground);
         for (log, value) in change.logs.iter_mut().zip(before) {
             *log = value.clamp(0.1, 2.0).ln();
         }
         change
+    }
+}
+
+/// The mean grey of pixels whose contrast about a centre is undone first, unless they are black or white; without a centre
+/// as they are.
+struct MeanGrey<'a> {
+    pixels: &'a [[f32; 3]],
+    contrast: f32,
+    centre: Option<f32>,
+}
+
+/// Pixels whose greys are added up side by side.
+const LANES: usize = 16;
+
+impl Vectorised for MeanGrey<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) -> f32 {
+        let sum = match self.centre {
+            None => self.sum(|v| v),
+            Some(centre) => self.sum(|v| match v <= CUT || v >= 1.0 - CUT {
+                true => v,
+                false => centre + (v - centre) / self.contrast,
+            }),
+        };
+        (sum / self.pixels.len().max(1) as f64) as f32
+    }
+}
+
+impl MeanGrey<'_> {
+    #[inline(always)]
+    fn sum(&self, value: impl Fn(f32) -> f32) -> f64 {
+        let mut lanes = [0.0_f64; LANES];
+        let (blocks, rest) = self.pixels.as_chunks::<LANES>();
+        for block in blocks {
+            for (lane, [red, green, blue]) in lanes.iter_mut().zip(block) {
+                *lane += f64::from(grey(&[value(*red), value(*green), value(*blue)]));
+            }
+        }
+        for (lane, [red, green, blue]) in lanes.iter_mut().zip(rest) {
+            *lane += f64::from(grey(&[value(*red), value(*green), value(*blue)]));
+        }
+        lanes.iter().sum()
+    }
+}
+
+/// What undoes a change, worked out once for all pixels.
+#[derive(Clone, Copy)]
+struct Before {
+    mean: f32,
+    contrast: f32,
+    saturation: f32,
+    /// One over gamma, where that was changed.
+    exponent: Option<f32>,
+    gains: [f32; 3],
+}
+
+impl Before {
+    /// Of a picture with this mean grey before its contrast was changed.
+    fn new(change: &ToneChange, mean: f32) -> Self {
+        let [gains @ .., gamma, saturation, contrast] = change.logs.map(f32::exp);
+        Self {
+            mean,
+            contrast,
+            saturation,
+            exponent: (change.logs[ToneChange::GAMMA] != 0.0).then_some(1.0 / gamma),
+            gains,
+        }
+    }
+
+    /// Values before the change was done to them, not cut; what was cut when it was done stays cut.
+    #[inline(always)]
+    fn of(&self, now: [f32; 3]) -> [f32; 3] {
+        let mut pixel = now;
+        for v in &mut pixel {
+            *v = self.mean + (*v - self.mean) / self.contrast;
+        }
+        let grey = grey(&pixel);
+        for v in &mut pixel {
+            *v = grey + (*v - grey) / self.saturation;
+        }
+        if let Some(exponent) = self.exponent {
+            for v in &mut pixel {
+                *v = v.max(0.0).powf(exponent);
+            }
+        }
+        for (v, gain) in pixel.iter_mut().zip(self.gains) {
+            *v /= gain;
+        }
+        pixel
+    }
+}
+
+/// Undoes a change, and counts values that it can't have been done to.
+struct Undo<'a> {
+    before: Before,
+    pixels: &'a [[f32; 3]],
+    out: &'a mut [[f32; 3]],
+}
+
+impl Vectorised for Undo<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) -> usize {
+        let before = self.before;
+        // Apart, so that the loop without powers has no calls.
+        let plain = Before {
+            exponent: None,
+            ..before
+        };
+        match before.exponent {
+            None => self.each(plain),
+            Some(_) => self.each(before),
+        }
+    }
+}
+
+impl Undo<'_> {
+    #[inline(always)]
+    fn each(self, before: Before) -> usize {
+        let mut outside = 0_u32;
+        for (out, now) in self.out.iter_mut().zip(self.pixels) {
+            let was = before.of(*now);
+            for c in 0..3 {
+                let seen = (now[c] > CUT) & (now[c] < 1.0 - CUT);
+                let possible = (was[c] >= -BEYOND) & (was[c] <= 1.0 + BEYOND);
+                outside += u32::from(seen & !possible);
+                out[c] = was[c].clamp(0.0, 1.0);
+            }
+        }
+        outside as usize
     }
 }
 

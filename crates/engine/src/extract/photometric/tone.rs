@@ -73,8 +73,9 @@ fn each(picture: &Picture, change: impl Fn(f32) -> f32) -> Vec<f32> {
 }
 
 /// The grey of a pixel.
-pub(super) fn grey(pixel: &[f32; 3]) -> f32 {
-    pixel.iter().zip(GREY).map(|(v, w)| v * w).sum()
+#[inline(always)]
+pub(super) fn grey([red, green, blue]: &[f32; 3]) -> f32 {
+    red * GREY[0] + green * GREY[1] + blue * GREY[2]
 }
 
 #[cfg(test)]

@@ -1,16 +1,34 @@
 //! What seconds are measured on, and how: two of them can only be compared where this is the same.
+use std::fmt;
 use std::time::{Instant, SystemTime};
 
 use guardsplat_evaluation::report::record::Timing;
+use serde::Serialize;
 use sysinfo::{CpuRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
 
 /// This machine, as a run of the program found it.
-pub(super) struct Machine {
+#[derive(Serialize)]
+pub struct Machine {
     processor: String,
     cores: u32,
     threads: u32,
+    /// When the run began.
+    #[serde(rename = "date")]
     run: String,
     load_before: Option<f64>,
+}
+
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            processor,
+            cores,
+            threads,
+            run,
+            ..
+        } = self;
+        write!(f, "{processor}, {cores} cores, {threads} threads, {run}")
+    }
 }
 
 impl Machine {
@@ -43,7 +61,7 @@ impl Machine {
 }
 
 /// Measures one embedding.
-pub(super) struct Stopwatch<'a> {
+pub struct Stopwatch<'a> {
     machine: &'a Machine,
     began: String,
     start: Instant,
