@@ -1,10 +1,10 @@
-//! What one table is made of: records of one engine version with one CLIP, and of each variant the newest settings.
+//! What one table is made of: records of one engine version, of each length one CLIP, and of each variant the newest settings.
 use super::record::{Claims, Detection, Id, Mark, ReadingRecord};
 use super::store::Records;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An engine version with a CLIP; tables never mix two.
+/// An engine version with a CLIP; tables never mix two for messages of one length.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Pair {
     /// Version of the engine.
@@ -25,17 +25,45 @@ impl Pair {
         }
     }
 
-    /// All pairs of some records; last the newest, which is that of the mark written last.
+    /// All pairs of some records; last the newest, which is that of the mark written last. Those whose marks are all told
+    /// with a newer one are none of their own: lengths may have CLIPs of their own.
     pub fn all(records: &Records) -> Vec<Pair> {
-        let mut pairs: Vec<Pair> = Vec::new();
+        let mut pairs: Vec<(Pair, ClipsByLength)> = Vec::new();
         for (_, mark) in records.marks().iter().rev() {
             let pair = Pair::of(mark);
-            if !pairs.contains(&pair) {
-                pairs.push(pair);
+            if !pairs
+                .iter()
+                .any(|(newer, clips)| *newer == pair || clips.have(&pair, mark))
+            {
+                let clips = ClipsByLength::of(records, &pair);
+                pairs.push((pair, clips));
             }
         }
         pairs.reverse();
-        pairs
+        pairs.into_iter().map(|(pair, _)| pair).collect()
+    }
+}
+
+/// Which CLIP messages of each length are told of, beside those of a pair: its own where it has marks of that length, else
+/// the one of the mark written last.
+struct ClipsByLength(BTreeMap<u32, Pair>);
+
+impl ClipsByLength {
+    fn of(records: &Records, pair: &Pair) -> Self {
+        let mut clips = BTreeMap::new();
+        for (_, mark) in records.marks() {
+            let other = Pair::of(mark);
+            let bits = mark.embedding.bits;
+            if other.engine_version == pair.engine_version && clips.get(&bits) != Some(pair) {
+                clips.insert(bits, other);
+            }
+        }
+        Self(clips)
+    }
+
+    /// Whether a mark of that pair is among them.
+    fn have(&self, pair: &Pair, mark: &Mark) -> bool {
+        self.0.get(&mark.embedding.bits) == Some(pair)
     }
 }
 
@@ -65,14 +93,26 @@ impl<'a> Selection<'a> {
         Some(Self::of(records, &pair))
     }
 
-    /// Records of one pair.
+    /// Records of one pair, and of lengths that it has no marks of.
     ///
     /// Where marks of the same bits and variant were made with different settings or sizes of views, those like the
     /// one written last are taken. Where a mark was read twice under one attack, the reading from most views counts,
     /// then that at the mark's own size, then that from views that no decision was taken on, then the one written last. [`Selection::notes`] says what was left out.
     pub fn of(records: &'a Records, pair: &Pair) -> Self {
         let mut notes: Vec<String> = records.notes().to_vec();
-        let of_pair = || records.marks().iter().filter(|(_, mark)| Pair::of(mark) == *pair);
+        let clips = ClipsByLength::of(records, pair);
+        let of_pair = || {
+            records
+                .marks()
+                .iter()
+                .filter(|(_, mark)| clips.have(&Pair::of(mark), mark))
+        };
+        for (bits, other) in clips.0.iter().filter(|(_, other)| *other != pair) {
+            notes.push(format!(
+                "{bits} bits are of the CLIP {} ({})",
+                other.clip, other.clip_hash
+            ));
+        }
         let mut newest = BTreeMap::new();
         for (_, mark) in of_pair() {
             newest.insert(group(mark), settings(mark));
@@ -236,6 +276,29 @@ mod tests {
         let chosen = Selection::of(&records, &pairs[0]);
         assert_eq!(chosen.runs(16, "standard", "none")[0].reading.accuracy(), 1.0);
         assert!(Selection::newest(&Records::default()).is_none());
+    }
+
+    #[test]
+    fn lengths_may_have_clips_of_their_own_and_one_length_has_one() {
+        let long = mark("lego", 32, "standard", 1);
+        let mut short = mark("lego", 16, "standard", 1);
+        short.embedding.clip_hash = "short".into();
+        let told_together = records([Record::Mark(short.clone()), Record::Mark(long.clone())]);
+        let pairs = Pair::all(&told_together);
+        assert_eq!(pairs, [Pair::of(&long)]);
+        let selection = Selection::of(&told_together, &pairs[0]);
+        assert_eq!(selection.marks.len(), 2);
+        assert!(
+            selection.notes()[0].contains("16 bits are of the CLIP"),
+            "{:?}",
+            selection.notes()
+        );
+
+        let again = mark("lego", 16, "standard", 2);
+        let told_apart = records([Record::Mark(short.clone()), Record::Mark(long), Record::Mark(again)]);
+        assert_eq!(Pair::all(&told_apart).len(), 2);
+        let newest = Selection::newest(&told_apart).unwrap();
+        assert!(newest.marks.iter().all(|(_, mark)| mark.embedding.clip_hash != "short"));
     }
 
     #[test]
