@@ -13,8 +13,8 @@ use crate::scene::{Format, Gaussians, Ignored, Scene};
 use crate::view::Camera;
 
 /// Times that a mark is made weaker where held-out views show it more than they may. Once is enough where the file keeps
-/// changes as they are; where it rounds them, what is left is not as much less as was asked for.
-const WEAKENED: usize = 2;
+/// changes as they are; where it rounds them, what is left is not as much less as was asked for (compressed PLY).
+const WEAKENED: usize = 4;
 
 /// What to embed, and how.
 pub(super) struct Work<'a> {
