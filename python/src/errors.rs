@@ -49,17 +49,22 @@ fn made(
     code: Option<i32>,
 ) -> PyResult<PyErr> {
     let arguments = PyDict::new(py);
-    // Options have the names that Python knows them by.
-    arguments.set_item(
-        "field",
-        field.map(|field| field.trim_start_matches("--").replace('-', "_")),
-    )?;
+    arguments.set_item("field", field.map(argument))?;
     arguments.set_item("path", path)?;
     if class == "FileError" {
         arguments.set_item("errno", code)?;
     }
     let class = py.import("guardsplat.errors")?.getattr(class)?;
     Ok(PyErr::from_value(class.call((text,), Some(&arguments))?))
+}
+
+/// What Python calls an option of the programs.
+fn argument(field: &str) -> String {
+    match field {
+        "OUT" => "path_out".into(),
+        "PATH" => "suspects".into(),
+        other => other.trim_start_matches("--").replace('-', "_"),
+    }
 }
 
 /// An error and its causes, leaving out those whose text is part of the one before.

@@ -57,8 +57,9 @@ def test_files_have_their_paths(scene: Path, key: guardsplat.Key, tmp_path: Path
     with pytest.raises(guardsplat.BadScene) as none:
         guardsplat.embed(text, tmp_path / "out.ply", key=key, message=MESSAGE)
     assert none.value.path == text
-    with pytest.raises(guardsplat.BadOption):
+    with pytest.raises(guardsplat.BadOption) as other_format:
         guardsplat.embed(scene, tmp_path / "out.spz", key=key, message=MESSAGE, preset="draft", device="cpu")
+    assert other_format.value.field == "path_out"
     with pytest.raises(guardsplat.DoesNotFit):
         guardsplat.embed(scene, tmp_path / "out.ply", key=key, message=MESSAGE, memory=1)
 
