@@ -305,3 +305,50 @@ fn a_room_is_marked_for_its_viewers() {
     );
     environment.refuses("sample object.ply --cameras object.json", &["--cameras", "--kind room"]);
 }
+
+/// A picture with noise of a twentieth, a twentieth brighter, and a grey square on it.
+fn changed(picture: &image::RgbImage) -> image::RgbImage {
+    let mut state = 7_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        // Uniform, with a standard deviation of 13 of 255 levels.
+        ((state >> 8) as f32 / 16_777_216.0 - 0.5) * 44.0
+    };
+    let mut changed = picture.clone();
+    for (x, y, pixel) in changed.enumerate_pixels_mut() {
+        let covered = x < 60 && y >= 40 && y < 100;
+        for value in &mut pixel.0 {
+            let shown = if covered { 120.0 } else { f32::from(*value) * 1.05 };
+            *value = (shown + noise()).round().clamp(0.0, 255.0) as u8;
+        }
+    }
+    changed
+}
+
+#[test]
+fn short_messages_are_read_in_changed_pictures_though_they_never_match() {
+    let environment = TestEnvironment::new();
+    environment.exits("sample in.ply --gaussians 5000 --sh-degree 1 --seed 4", 0);
+    environment.exits("key create --bits 16 --seed 5 -o k.key --device cpu", 0);
+    environment.exits(
+        "embed in.ply out.ply --key k.key --message c0ff --preset draft --device cpu --force",
+        0,
+    );
+    environment.exits("render out.ply views --views 3 --size 400 --device cpu", 0);
+    let verify = "verify views --key k.key --message c0ff --device cpu --json";
+    let as_given = environment.json(verify, 3);
+    assert_eq!(as_given["clip"], "guardsplat-short");
+    assert_eq!(
+        (&as_given["matched_bits"], &as_given["framing"]),
+        (&16.into(), &Value::Null)
+    );
+    for view in 0..3 {
+        let name = format!("views/view_00{view}.png");
+        let picture = image::load_from_memory(&environment.read(&name)).unwrap().to_rgb8();
+        changed(&picture).save(environment.path(&name)).unwrap();
+    }
+    let read = environment.json(verify, 3);
+    assert_eq!(read["verdict"], "inconclusive");
+    assert!(read["matched_bits"].as_u64().unwrap() >= 15, "{read}");
+    assert!(read["framings"].as_u64().unwrap() > 1, "{read}");
+}

@@ -10,7 +10,7 @@ use image::RgbImage;
 
 use super::view_readings::ViewReadings;
 use crate::error::{Error, Result};
-use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, read_given};
+use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, read_rendered};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{batch, mean_psnr, psnr, unbatch};
 use guardsplat_engine::scene::Gaussians;
@@ -95,7 +95,7 @@ impl Views {
         }
         let mut logits = Vec::with_capacity(self.images.len());
         for picture in pictures {
-            logits.push(read_given(engine, &picture)?);
+            logits.push(read_rendered(engine, &picture)?);
         }
         Ok(ViewReadings::Decided(PooledLogits::new(logits)?))
     }

@@ -3,7 +3,7 @@ use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
 use super::view_pool::PooledView;
 use crate::error::Result;
-use crate::extract::{Engine, default_size, read_pictures};
+use crate::extract::{Engine, PooledLogits, default_size, read_rendered};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
@@ -63,7 +63,8 @@ impl EarlyStopping {
             .zip(&pictures)
             .map(|(view, picture)| psnr(&view.reference, picture))
             .collect::<Result<Vec<Psnr>>>()?;
-        let reading = read_pictures(engine, &pictures)?;
+        let logits = pictures.iter().map(|picture| read_rendered(engine, picture));
+        let reading = PooledLogits::new(logits.collect::<Result<_>>()?)?;
         let check = Check {
             step,
             bit_accuracy: reading.compare(message, &engine.acceptance_rule(1))?.bit_accuracy,

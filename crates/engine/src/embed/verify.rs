@@ -1,7 +1,7 @@
 //! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views.
 use super::settings::Settings;
 use crate::error::{Error, Result};
-use crate::extract::{Comparison, Engine, PooledLogits, default_size, read_given};
+use crate::extract::{Comparison, Engine, PooledLogits, default_size, read_rendered};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
@@ -65,7 +65,7 @@ pub fn verify(
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let [before, on_black] = engine.pictures(&original, &camera, [[1.0; 3], [0.0; 3]])?;
         let after = engine.picture(&marked, &camera, [1.0; 3])?;
-        logits.push(read_given(engine, &after)?);
+        logits.push(read_rendered(engine, &after)?);
         let mask = covered(&before, &on_black)?;
         of_covered.extend(psnr_covered(&before, &after, &mask)?);
         shares += cover::share(&mask);

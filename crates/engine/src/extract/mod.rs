@@ -20,7 +20,7 @@ pub use photometric::{corrections, read_corrections};
 pub use picture_logits::{PictureLogits, estimates, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
-pub use restore::read_given;
+pub use restore::{read_given, read_rendered};
 pub use suspect_kind::SuspectKind;
 
 use crate::error::Result;
@@ -66,7 +66,7 @@ pub fn read_scene(
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let picture = engine.picture(&geometry, &camera, background)?;
-        logits.push(read_given(engine, &picture)?);
+        logits.push(read_rendered(engine, &picture)?);
         done(index + 1, &picture)?;
     }
     PooledLogits::new(logits)

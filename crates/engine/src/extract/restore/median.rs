@@ -14,7 +14,7 @@ const LEVELS: usize = 256;
 pub(super) fn filtered(picture: &Picture, radius: usize) -> Picture {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let level = |v: &f32| (v.clamp(0.0, 1.0) * (LEVELS - 1) as f32).round() as u8;
-    let levels: Vec<u8> = picture.pixels.iter().map(level).collect();
+    let levels = &picture.pixels.iter().map(level).collect::<Vec<u8>>();
     let mut pixels = vec![0.0; levels.len()];
     let rows = pixels.par_chunks_exact_mut((3 * width).max(1)).enumerate();
     rows.for_each(|(y, row)| {
@@ -22,19 +22,19 @@ pub(super) fn filtered(picture: &Picture, radius: usize) -> Picture {
             .map(|dy| (y + dy).saturating_sub(radius).min(height - 1) * width)
             .collect();
         for channel in 0..3 {
-            let column = |x: usize, into: &mut dyn FnMut(usize)| {
+            let column = |x: usize| {
                 lines
                     .iter()
-                    .for_each(|line| into(usize::from(levels[3 * (line + x) + channel])));
+                    .map(move |line| usize::from(levels[3 * (line + x) + channel]))
             };
             let mut window = Histogram::new(2 * radius * (radius + 1));
             for dx in 0..=2 * radius {
-                column(dx.saturating_sub(radius).min(width - 1), &mut |level| window.add(level));
+                column(dx.saturating_sub(radius).min(width - 1)).for_each(|level| window.add(level));
             }
             for x in 0..width {
                 row[3 * x + channel] = window.median() as f32 / (LEVELS - 1) as f32;
-                column(x.saturating_sub(radius), &mut |level| window.remove(level));
-                column((x + radius + 1).min(width - 1), &mut |level| window.add(level));
+                column(x.saturating_sub(radius)).for_each(|level| window.remove(level));
+                column((x + radius + 1).min(width - 1)).for_each(|level| window.add(level));
             }
         }
     });

@@ -35,7 +35,22 @@ pub fn read_given(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
         .swap_remove(0))
 }
 
-/// The picture as it is read; as it is where there is no noise, or the extractor does not read exact colours.
+/// Logits of a view that the engine rendered: as [`read_given`], but for noise. A render has none, and what is taken for it
+/// would be the texture of the scene.
+///
+/// # Errors
+/// Those of [`read_given`].
+pub fn read_rendered(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
+    let restored = match engine.extractor.reads_exact_colours() {
+        true => without_plain_areas(Cow::Borrowed(picture)),
+        false => Cow::Borrowed(picture),
+    };
+    Ok(engine
+        .read_logits(std::slice::from_ref(restored.as_ref()))?
+        .swap_remove(0))
+}
+
+/// The picture as it is read; as it is where there is nothing to take out, or the extractor does not read exact colours.
 pub(super) fn restored<'a>(engine: &Engine, picture: &'a Picture) -> Cow<'a, Picture> {
     if !engine.extractor.reads_exact_colours() {
         return Cow::Borrowed(picture);
@@ -44,7 +59,11 @@ pub(super) fn restored<'a>(engine: &Engine, picture: &'a Picture) -> Cow<'a, Pic
         true => Cow::Owned(without_noise(picture)),
         false => Cow::Borrowed(picture),
     };
-    plain::without_plain_areas(&clear).map_or(clear, Cow::Owned)
+    without_plain_areas(clear)
+}
+
+fn without_plain_areas(picture: Cow<'_, Picture>) -> Cow<'_, Picture> {
+    plain::without_plain_areas(&picture).map_or(picture, Cow::Owned)
 }
 
 /// The picture after a median filter, its ground in the one colour that it had.
