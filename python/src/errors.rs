@@ -1,8 +1,8 @@
 //! Errors of the engine as exceptions of `guardsplat.errors`, with what they name.
-use std::error::Error as _;
 use std::path::Path;
 
 use guardsplat_engine::Error;
+use guardsplat_operations::error_text::in_full;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -65,18 +65,4 @@ fn argument(field: &str) -> String {
         "PATH" => "suspects".into(),
         other => other.trim_start_matches("--").replace('-', "_"),
     }
-}
-
-/// An error and its causes, leaving out those whose text is part of the one before.
-fn in_full(error: &Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        let cause_text = cause.to_string();
-        if !text.contains(&cause_text) {
-            text = format!("{text}: {cause_text}");
-        }
-        source = cause.source();
-    }
-    text
 }

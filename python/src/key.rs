@@ -41,7 +41,7 @@ impl Key {
     /// Makes a key for messages of so many bits, 1 to 150.
     ///
     /// Without a seed it is random. With one it can be made again, and is no more secret than the seed.
-    /// `clip` names a CLIP that `guardsplat-worker models add` added, instead of the shipped one.
+    /// `clip` names a CLIP, shipped or added by `guardsplat-worker models add`, instead of the shipped one for messages of that length.
     #[staticmethod]
     #[pyo3(signature = (bits=32, seed=None, *, clip=None, device="auto", progress=None))]
     fn create(

@@ -8,10 +8,10 @@ use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::BadRows;
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::{Suspect, SuspectPicture};
-use guardsplat_operations::verification::{VerificationReport, Views, read_and_compare};
+use guardsplat_operations::verification::{Views, read_and_compare};
+use guardsplat_operations::verification_report::{VerificationReport, VerifyReport};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde::Serialize;
 
 use crate::cameras::Cameras;
 use crate::embed::json;
@@ -34,17 +34,6 @@ pub struct Options {
     device: String,
     memory: Option<u64>,
     logits: bool,
-}
-
-/// The verdict as the worker's JSON has it.
-#[derive(Serialize)]
-struct Report<'a> {
-    #[serde(flatten)]
-    findings: VerificationReport,
-    seconds: f64,
-    device: &'a str,
-    clip: &'a str,
-    logits: Option<&'a [Vec<f32>]>,
 }
 
 /// Reads files, then pictures, each `height, width` and `[height, width, 3]` numbers from 0 to 1; the verdict as JSON.
@@ -98,7 +87,7 @@ pub fn verify(
         let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
             context.at("reading", done, total);
         })?;
-        json(&Report {
+        json(&VerifyReport {
             findings: VerificationReport::of(&compared)?,
             seconds: start.elapsed().as_secs_f64(),
             device: &engine.compute.name,

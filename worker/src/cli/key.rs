@@ -43,7 +43,7 @@ pub struct Create {
     /// Steps of the convolutional decoder's training
     #[arg(long, hide_short_help = true)]
     steps: Option<usize>,
-    /// A CLIP that was added with `models add`, instead of the shipped one
+    /// A CLIP by its name, shipped or added with `models add`, instead of the shipped one for messages of that length
     #[arg(long)]
     clip: Option<String>,
     /// Where to compute: auto, wgpu or cpu

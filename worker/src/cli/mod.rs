@@ -19,6 +19,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use guardsplat_engine::view::SceneKind;
 use guardsplat_engine::{Error, Result};
+use guardsplat_operations::error_text::in_full;
 use tracing_subscriber::EnvFilter;
 
 /// What a command that could be carried out found; errors exit with 1.
@@ -199,20 +200,6 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Run(arguments) => run::run(arguments),
     })
-}
-
-/// An error and its causes, leaving out those whose text is part of the one before.
-fn in_full(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        let cause_text = cause.to_string();
-        if !text.contains(&cause_text) {
-            text = format!("{text}: {cause_text}");
-        }
-        source = cause.source();
-    }
-    text
 }
 
 /// Prints a value as JSON on standard output.

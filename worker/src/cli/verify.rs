@@ -9,13 +9,13 @@ use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::extract::{Comparison, DEFAULT_VIEWS, find_source};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::scene::{BadRows, Ignored};
-use serde::Serialize;
 
 use super::display::Display;
 use super::{Background, Budget, Exit, Kind, print_json, print_line};
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::Suspect;
-use guardsplat_operations::verification::{VerificationReport, Views, read_and_compare};
+use guardsplat_operations::verification::{Views, read_and_compare};
+use guardsplat_operations::verification_report::{VerificationReport, VerifyReport};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -66,17 +66,6 @@ pub struct Arguments {
     logits: bool,
 }
 
-#[derive(Serialize)]
-struct Report<'a> {
-    #[serde(flatten)]
-    findings: VerificationReport,
-    seconds: f64,
-    device: &'a str,
-    clip: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    logits: Option<&'a [Vec<f32>]>,
-}
-
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let start = Instant::now();
     let suspect: Suspect = find_source(&arguments.paths)?.into();
@@ -105,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         display.set(done, total, String::new);
     })?;
     drop(display);
-    let report = Report {
+    let report = VerifyReport {
         findings: VerificationReport::of(&compared)?,
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,

@@ -19,7 +19,8 @@ use guardsplat_proto::v1::{self as api};
 
 use super::error::{Error, Result};
 use guardsplat_operations::embed_settings::chosen;
-use guardsplat_operations::verification::{VerificationReport, Views};
+use guardsplat_operations::verification::Views;
+use guardsplat_operations::verification_report::VerificationReport;
 
 /// What is behind scenes, and behind pictures with transparent pixels.
 const WHITE: [f32; 3] = [1.0; 3];

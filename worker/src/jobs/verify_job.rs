@@ -13,7 +13,8 @@ use super::error::{Error, Result};
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::Suspect;
 use guardsplat_operations::thumbnails::Thumbnails;
-use guardsplat_operations::verification::{VerificationReport, read_and_compare, read_hypotheses};
+use guardsplat_operations::verification::{read_and_compare, read_hypotheses};
+use guardsplat_operations::verification_report::VerificationReport;
 
 /// A reading that was compared, or is for the server to decide on.
 struct Verified {
