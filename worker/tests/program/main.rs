@@ -1,13 +1,15 @@
 //! The binary: commands, exit codes, JSON and messages.
+mod bench;
 mod formats;
+mod inspect;
+mod refusals;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use guardsplat_engine::clip::Precision;
 use serde_json::Value;
 
-use guardsplat_engine::testing::tiny::{self, cpu, model};
+use guardsplat_engine::testing::tiny;
 
 fn files(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
@@ -183,84 +185,6 @@ fn a_convolutional_decoder_takes_the_place_of_a_clip() {
     assert!(!bench.path("a.key").exists());
 }
 
-#[test]
-fn bad_input_is_told_clearly_and_leaves_nothing() {
-    let bench = Bench::new();
-    bench.exits("sample in.ply --gaussians 50 --sh-degree 0", 0);
-    bench.exits("key create --bits 8 --seed 7 -o k.key --device cpu", 0);
-    write(&bench.path("text.ply"), "this is no scene\n");
-    let before = files(bench.0.path());
-    for (line, needle) in [
-        (
-            "embed text.ply out.ply --key k.key --message 5c --device cpu",
-            "text.ply",
-        ),
-        (
-            "embed none.ply out.ply --key k.key --message 5c --device cpu",
-            "none.ply",
-        ),
-        (
-            "embed in.ply no/out.ply --key k.key --message 5c --device cpu",
-            "no/out.ply",
-        ),
-        (
-            "embed in.ply in.ply --key k.key --message 5c --device cpu",
-            "is the input",
-        ),
-        (
-            "embed in.ply out.ply --key k.key --message 5c5c --device cpu",
-            "longer than the key's 8 bits",
-        ),
-        ("embed in.ply out.ply --key k.key --message 5g --device cpu", "'g'"),
-        (
-            "embed in.ply out.ply --key text.ply --message 5c --device cpu",
-            "key text.ply",
-        ),
-        (
-            "embed in.ply out.ply --key k.key --message 5c --device cuda",
-            "auto, wgpu or cpu",
-        ),
-        (
-            "embed in.ply out.ply --key k.key --message 5c --preset fast",
-            "draft, standard, robust, thorough or paper",
-        ),
-        (
-            "embed in.ply out.ply --key k.key --message 5c --device cpu --size 4",
-            "size: 4 is outside 16",
-        ),
-        (
-            "embed in.ply out.ply --key k.key --message 5c --device cpu --clip other",
-            "model other",
-        ),
-        ("key create --bits 0 -o new.key --device cpu", "0 is outside 1 to 150"),
-        (
-            "key create --bits 151 -o new.key --device cpu",
-            "151 is outside 1 to 150",
-        ),
-        ("verify none.png --key k.key --device cpu", "none.png"),
-        ("verify in.ply --key k.key --message 5c5c --device cpu", "longer"),
-        ("render text.ply views --views 1 --device cpu", "text.ply"),
-        ("render in.ply views --cameras text.ply --device cpu", "text.ply"),
-        ("sample new.ply --gaussians 0", "--gaussians"),
-        ("sample new.ply --sh-degree 5", "--sh-degree"),
-        ("models verify other", "models add"),
-        ("mark in.ply", "unrecognized subcommand"),
-    ] {
-        let told = bench.fails(line);
-        assert!(told.contains(needle), "{line}: {told}");
-        assert_eq!(files(bench.0.path()), before, "{line}");
-    }
-    // Another CLIP under the same name.
-    std::fs::remove_file(bench.path("clip/model.safetensors")).unwrap();
-    let (config, _) = model(&cpu());
-    use guardsplat_engine::clip::{ClipModel, Parts};
-    ClipModel::init(&config, Parts::Both, &cpu().device, 6)
-        .save(&bench.path("clip/model.safetensors"), Precision::F32)
-        .unwrap();
-    let told = bench.fails("verify in.ply --key k.key --message 5c --device cpu");
-    assert!(told.contains("key k.key: it belongs to the CLIP"), "{told}");
-}
-
 /// A scene that can't fit is refused by its first bytes: the rest of it is not even on the disk.
 #[test]
 fn a_budget_of_memory_is_kept() {
@@ -313,91 +237,6 @@ fn eight_bits_can_never_be_conclusive_and_models_are_listed() {
 }
 
 #[test]
-fn a_scene_can_be_inspected() {
-    let bench = Bench::new();
-    bench.exits("sample in.ply --gaussians 500 --sh-degree 1 --seed 2", 0);
-    let found = bench.json("inspect in.ply --json", 0);
-    assert_eq!(
-        (&found["kind"]["found"], &found["kind"]["used"]),
-        (&"object".into(), &"object".into())
-    );
-    for share in [
-        "covered",
-        "lightness",
-        "chroma_spread",
-        "saturation",
-        "at_ends",
-        "texture",
-        "thinness",
-    ] {
-        let value = found["difficulty"][share].as_f64().unwrap();
-        assert!((0.0..=1.0).contains(&value), "{share} {value}");
-    }
-    let said = bench.json("inspect in.ply --kind terrain --json", 0);
-    assert_eq!(
-        (&said["kind"]["found"], &said["kind"]["used"]),
-        (&"object".into(), &"terrain".into())
-    );
-    let file = std::fs::metadata(bench.path("in.ply")).unwrap().len();
-    for (field, value) in [
-        ("file_bytes", file),
-        ("gaussians", 500),
-        ("ignored_rows", 0),
-        ("sh_degree_stored", 1),
-        ("sh_degree_used", 1),
-        ("sh_degree_learned", 1),
-    ] {
-        assert_eq!(found[field], value, "{field}");
-    }
-    assert_eq!(
-        (&found["format"], &found["colours_rounded"]),
-        (&"PLY".into(), &false.into())
-    );
-    assert!(found["extent"]["radius"].as_f64().unwrap() > 0.0, "{found}");
-    assert!(found["seen_gaussians"].is_null());
-    for command in ["render", "embed"] {
-        let need = &found[command];
-        let parts: u64 = need["parts"]
-            .as_object()
-            .unwrap()
-            .values()
-            .map(|v| v.as_u64().unwrap())
-            .sum();
-        assert_eq!((need["bytes"].as_u64(), &need["fits"]), (Some(parts), &true.into()));
-    }
-    let seen = bench.json("inspect in.ply --views 8 --json", 0);
-    assert!(
-        (100..=500).contains(&seen["seen_gaussians"].as_u64().unwrap()),
-        "{seen}"
-    );
-
-    // What is predicted for an embedding is what an embedding says, but for what the key adds.
-    bench.exits("key create --bits 32 --seed 7 -o k.key --device cpu", 0);
-    let line = "embed in.ply out.ply --key k.key --message 0123abcd --force --device cpu --json";
-    write(&bench.path("one.json"), r#"{"steps": 1, "early_stop": null}"#);
-    let report = bench.json(&format!("{line} --settings one.json"), 3);
-    let [said, predicted] = [&report["predicted_memory"], &found["embed"]["parts"]];
-    for part in ["program", "scene", "optimiser"] {
-        assert_eq!(said[part], predicted[part], "{part}");
-    }
-
-    // With less memory, and with NaN.
-    let small = bench.json("inspect in.ply --memory 60 --json", 0);
-    assert_eq!(
-        (&small["render"]["fits"], &small["embed"]["fits"]),
-        (&true.into(), &false.into())
-    );
-    let text = bench.exits("inspect in.ply --memory 60", 0);
-    assert!(text.contains("500") && text.contains("does not fit"), "{text}");
-    let mut bytes = std::fs::read(bench.path("in.ply")).unwrap();
-    let last = bytes.len() - 4;
-    bytes[last..].copy_from_slice(&f32::NAN.to_le_bytes());
-    std::fs::write(bench.path("nan.ply"), bytes).unwrap();
-    let found = bench.json("inspect nan.ply --ignore-bad-rows --json", 0);
-    assert_eq!((&found["gaussians"], &found["ignored_rows"]), (&499.into(), &1.into()));
-}
-
-#[test]
 fn old_names_of_settings_are_heeded_and_warned_about() {
     let bench = Bench::new();
     bench.exits("sample in.ply --gaussians 200 --sh-degree 0 --seed 2", 0);
@@ -427,51 +266,4 @@ fn old_names_of_settings_are_heeded_and_warned_about() {
     let [old, new] = ["old.ply", "new.ply"].map(|name| std::fs::read(bench.path(name)).unwrap());
     assert_eq!(old, new);
     assert_ne!(old, std::fs::read(bench.path("in.ply")).unwrap());
-}
-
-#[test]
-fn the_machine_is_measured() {
-    let bench = Bench::new();
-    write(
-        &bench.path("few.json"),
-        r#"{"steps": 2, "views_per_step": 2, "fresh_per_step": 1, "early_stop": null,
-            "verify": {"views": 1, "message_views": 1}}"#,
-    );
-    let line = "bench --gaussians 60,200 --presets draft --repetitions 2 --settings few.json --device cpu";
-    let told = bench.json(&format!("{line} --json"), 0);
-    assert_eq!((&told["device"], &told["repetitions"]), (&"cpu".into(), &2.into()));
-    for field in ["version", "processor", "date"] {
-        assert!(told[field].as_str().is_some_and(|text| !text.is_empty()), "{field}");
-    }
-    let scenes = told["scenes"].as_array().unwrap();
-    assert_eq!(scenes.len(), 2);
-    for scene in scenes {
-        let jobs: Vec<&Value> = scene["jobs"].as_array().unwrap().iter().collect();
-        let names: Vec<&str> = jobs.iter().map(|job| job["name"].as_str().unwrap()).collect();
-        assert_eq!(names, ["embed draft", "verify scene", "verify picture"]);
-        for job in &jobs {
-            let [median, low, high] = ["median", "p10", "p90"].map(|field| job["seconds"][field].as_f64().unwrap());
-            assert!(0.0 < low && low <= median && median <= high, "{job}");
-            assert_eq!(job["seconds"]["count"], 2);
-        }
-        // The picture is of no marked scene, so whatever may have been done to it is undone.
-        assert!(jobs[2]["framings"].as_u64().unwrap() > 1, "{}", jobs[2]);
-        let steps = &scene["steps"][0];
-        assert_eq!(
-            (&steps["preset"], &steps["milliseconds"]["count"]),
-            (&"draft".into(), &4.into())
-        );
-        let stages = steps["stages"].as_array().unwrap();
-        let sum: f64 = stages.iter().map(|stage| stage[1]["median"].as_f64().unwrap()).sum();
-        assert!(stages.len() == 7 && sum > 0.0, "{steps}");
-    }
-    let text = bench.exits(
-        &line.replace("60,200", "60").replace("repetitions 2", "repetitions 1"),
-        0,
-    );
-    assert!(
-        text.contains("60 Gaussians") && text.contains("loss and gradient: "),
-        "{text}"
-    );
-    assert!(bench.fails("bench --gaussians 60 --key none.key").contains("none.key"));
 }

@@ -2,6 +2,7 @@
 //! legal are in `tests/numerics`.
 use super::compare::Agreement;
 use super::{CpuRasterizer, Learnable, PreparedView, Rasterizer, WeightCache, prepare, sh};
+use crate::picture::Picture;
 use crate::scene::{Gaussians, Scene, Sh};
 use crate::testing::scene_path;
 use crate::view::Camera;
@@ -125,27 +126,30 @@ fn the_cpu_agrees_with_the_reference() {
     conforms(&CpuRasterizer, WeightCache::None);
 }
 
+/// A view, its picture, and the gradient of half the picture's squares to the coefficients.
+fn drawn_and_back(g: &Gaussians, camera: &Camera, cache: WeightCache) -> (PreparedView, Picture, Vec<f32>) {
+    let view = prepare(g, camera, cache).unwrap();
+    let colours = sh::colours(&g.sh, None, &view);
+    let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
+    let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
+    let mut all = vec![0.0f32; g.sh.coefficients.len()];
+    sh::backward(
+        &Learnable::all(g),
+        sh::ColourGradient {
+            view: &view,
+            colours: &colours,
+            gradient: &gradient,
+        },
+        &mut all,
+    );
+    (view, picture, all)
+}
+
 #[test]
 fn cached_and_fresh_weights_give_the_same_bytes() {
     let g = scene(2000, 1);
     let camera = camera(75);
-    let run = |cache| {
-        let view = prepare(&g, &camera, cache).unwrap();
-        let colours = sh::colours(&g.sh, None, &view);
-        let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
-        let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
-        let mut all = vec![0.0f32; g.sh.coefficients.len()];
-        sh::backward(
-            &Learnable::all(&g),
-            sh::ColourGradient {
-                view: &view,
-                colours: &colours,
-                gradient: &gradient,
-            },
-            &mut all,
-        );
-        (view, picture, all)
-    };
+    let run = |cache| drawn_and_back(&g, &camera, cache);
     let (plain, kept) = (run(WeightCache::None), run(WeightCache::Weights));
     assert_eq!(plain.1, kept.1);
     assert_eq!(plain.2, kept.2);
@@ -197,23 +201,7 @@ fn the_number_of_threads_changes_nothing() {
     let g = scene(9000, 2);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            let view = prepare(&g, &camera(90), WeightCache::Weights).unwrap();
-            let colours = sh::colours(&g.sh, None, &view);
-            let picture = CpuRasterizer.render(&view, &colours, BACKGROUND).unwrap();
-            let gradient = CpuRasterizer.backward(&view, &picture.pixels).unwrap();
-            let mut all = vec![0.0f32; g.sh.coefficients.len()];
-            sh::backward(
-                &Learnable::all(&g),
-                sh::ColourGradient {
-                    view: &view,
-                    colours: &colours,
-                    gradient: &gradient,
-                },
-                &mut all,
-            );
-            (view, picture, all)
-        })
+        pool.install(|| drawn_and_back(&g, &camera(90), WeightCache::Weights))
     };
     let (one, two) = (run(1), run(2));
     assert_eq!(one.0, two.0);
