@@ -316,7 +316,7 @@ fn changed(picture: &image::RgbImage) -> image::RgbImage {
     };
     let mut changed = picture.clone();
     for (x, y, pixel) in changed.enumerate_pixels_mut() {
-        let covered = x < 60 && y >= 40 && y < 100;
+        let covered = x < 60 && (40..100).contains(&y);
         for value in &mut pixel.0 {
             let shown = if covered { 120.0 } else { f32::from(*value) * 1.05 };
             *value = (shown + noise()).round().clamp(0.0, 255.0) as u8;
