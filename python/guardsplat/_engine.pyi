@@ -36,6 +36,12 @@ class EmbedOptions(TypedDict):
     ignore_bad_rows: bool
     memory: int | None
 
+class ForecastOptions(TypedDict):
+    key: Key | None
+    bits: int
+    preset: str
+    device: str
+
 class VerifyOptions(TypedDict):
     views: int
     size: int | None
@@ -123,6 +129,7 @@ def inspect(
     kind: str | None,
     ignore_bad_rows: bool,
     memory: int | None,
+    forecast: ForecastOptions | None,
 ) -> str: ...
 def render(path: str, options: RenderOptions, progress: ProgressTo) -> list[tuple[bytearray, CameraNumbers]]: ...
 def render_gaussians(

@@ -181,3 +181,6 @@ class Inspection:
     """What rendering takes: ``bytes``, ``parts``, and whether it ``fits``."""
     embed: dict[str, Any] | None
     """The same of embedding with preset ``standard`` on the CPU."""
+    forecast: dict[str, Any] | None
+    """What to expect of a mark: ``bit_accuracy``, ``psnr_db``, ``psnr_covered_db``, ``seconds``, whether it
+    ``meets_target``; and the same of a ``shorter`` message where it does not."""

@@ -6,6 +6,7 @@ use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::stop::Stop;
 use guardsplat_engine::view::{Camera, SceneKind};
 use guardsplat_engine::{Error, Result};
+use guardsplat_operations::forecast::Wish;
 use guardsplat_operations::inspect::{self as inspection, Asked};
 use guardsplat_operations::render::{self as rendering, Rendering};
 use guardsplat_operations::sample::{self as samples, Sample};
@@ -17,10 +18,11 @@ use crate::embed::json;
 use crate::errors::{bad_option, exception};
 use crate::gaussians::Arrays;
 use crate::job::{Context, run};
+use crate::key::Key;
 
 /// What a scene file holds, as JSON.
 #[pyfunction]
-#[pyo3(signature = (path, views, cameras, kind, ignore_bad_rows, memory))]
+#[pyo3(signature = (path, views, cameras, kind, ignore_bad_rows, memory, forecast))]
 pub fn inspect(
     py: Python<'_>,
     path: PathBuf,
@@ -29,18 +31,51 @@ pub fn inspect(
     kind: Option<&str>,
     ignore_bad_rows: bool,
     memory: Option<u64>,
+    forecast: Option<ForecastOptions>,
 ) -> PyResult<String> {
     let kind = kind_of(py, kind)?;
-    run(py, None, |_| {
+    let forecast = forecast.map(|options| options.wish(py)).transpose()?;
+    run(py, None, |context| {
+        let forecast = forecast.map(|wish| Wish {
+            stop: context.stop.clone(),
+            ..wish
+        });
         let asked = Asked {
             views,
             cameras: Cameras::of(cameras)?,
             kind,
             bad_rows: BadRows::ignored_if(ignore_bad_rows),
             memory,
+            forecast,
         };
         json(&inspection::inspect(&path, &asked)?)
     })
+}
+
+/// What is to be forecast, as `guardsplat._scenes` has gathered it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct ForecastOptions {
+    key: Option<Py<Key>>,
+    bits: usize,
+    preset: String,
+    device: String,
+}
+
+impl ForecastOptions {
+    fn wish(self, py: Python<'_>) -> PyResult<Wish> {
+        let wrong = |error: Error| exception(py, &error);
+        Ok(Wish {
+            key: self.key.map(|key| {
+                let key = key.get();
+                (key.path.clone(), key.inner.clone())
+            }),
+            bits: self.bits,
+            preset: self.preset.parse().map_err(wrong)?,
+            device: self.device.parse().map_err(wrong)?,
+            stop: Stop::default(),
+        })
+    }
 }
 
 /// What is to be rendered, as `guardsplat._scenes` has gathered it.

@@ -84,8 +84,19 @@ def test_what_a_scene_holds(scene: Path, folder: Path) -> None:
     assert (found.format, found.gaussians, found.sh_degree_used) == ("PLY", 8000, 3)
     assert found.kind is not None and found.kind["found"] == "object"
     assert found.embed is not None and found.embed["fits"] is True and found.seen_gaussians
+    assert found.forecast is None
     guardsplat.sample(folder / "room.spz", kind="room", gaussians=2000, cameras=folder / "cameras.json")
     assert guardsplat.inspect(folder / "room.spz", cameras=folder / "cameras.json").cameras is not None
+
+
+def test_what_a_mark_would_come_to(scene: Path, key: guardsplat.Key) -> None:
+    told = guardsplat.inspect(scene, forecast="draft", key=key, device="cpu").forecast
+    assert told is not None and told["bits"] == key.bits and told["preset"] == "draft"
+    assert 0.6 < told["bit_accuracy"] <= 1 and told["seconds"] > 0
+    with pytest.raises(guardsplat.BadOption, match="paper"):
+        guardsplat.inspect(scene, forecast="paper", key=key, device="cpu")
+    with pytest.raises(guardsplat.BadOption, match="forecast"):
+        guardsplat.inspect(scene, key=key)
 
 
 def test_cameras(scene: Path, folder: Path) -> None:

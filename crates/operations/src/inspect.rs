@@ -15,6 +15,8 @@ use guardsplat_engine::splat::{Geometry, WeightCache, sh};
 use guardsplat_engine::view::{Camera, Extent, Openness, SceneKind, Split, ViewSampler};
 use serde::Serialize;
 
+use crate::forecast::{Told, Wish, tell};
+
 /// Side of the views that are looked at: what a preset trains on would find no more Gaussians, only later.
 const SIDE: u32 = 160;
 /// Held-out views that tell how hard a scene is.
@@ -35,6 +37,8 @@ pub struct Asked {
     pub bad_rows: BadRows,
     /// Bytes of memory that may be used, if not all of the machine's.
     pub memory: Option<u64>,
+    /// Marks are forecast by a short trial.
+    pub forecast: Option<Wish>,
 }
 
 /// What there is to say of a scene.
@@ -77,6 +81,8 @@ pub struct Inspection {
     pub render: Need,
     /// What embedding will need: preset standard, the shipped CLIP, on the CPU.
     pub embed: Option<Need>,
+    /// What can be expected of a mark, where that was asked.
+    pub forecast: Option<Told>,
 }
 
 /// Where a scene is.
@@ -187,6 +193,10 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
             clearance: Some(given.clearance()).filter(|distance| distance.is_finite()),
         });
     }
+    let forecast = match &asked.forecast {
+        Some(wish) if !gaussians.is_empty() => Some(tell(&scene, wish, cameras, asked.kind, asked.memory)?),
+        _ => None,
+    };
     Ok(Inspection {
         format: scene.format().name(),
         file_bytes: size.file,
@@ -211,6 +221,7 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
         memory_limit_bytes: limits.memory,
         render: Need::new(render, &limits),
         embed: embed.map(|parts| Need::new(parts, &limits)),
+        forecast,
     })
 }
 

@@ -5,6 +5,7 @@ pub mod create_key;
 pub mod embed_report;
 pub mod embed_settings;
 pub mod error_text;
+pub mod forecast;
 pub mod inspect;
 pub mod load;
 pub mod render;

@@ -1,11 +1,17 @@
 //! `inspect`.
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
-use guardsplat_engine::Result;
+use guardsplat_engine::device::DeviceChoice;
+use guardsplat_engine::embed::Preset;
 use guardsplat_engine::memory::Bytes;
+use guardsplat_engine::message::Key;
 use guardsplat_engine::scene::BadRows;
+use guardsplat_engine::stop::Stop;
 use guardsplat_engine::view::Openness;
+use guardsplat_engine::{Error, Result};
+use guardsplat_operations::forecast::{Told, Wish};
 use guardsplat_operations::inspect::{Asked, Found, Inspection, inspect};
 use guardsplat_operations::load;
 
@@ -28,6 +34,21 @@ pub struct Arguments {
     /// Leaves out rows with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
+    /// Forecasts what marking would come to, by a short trial of an eighth of its steps
+    #[arg(long)]
+    forecast: bool,
+    /// The key that the forecast is for; one is made for it unless given
+    #[arg(long, requires = "forecast")]
+    key: Option<PathBuf>,
+    /// Bits of the message that the forecast is for
+    #[arg(long, requires = "forecast", conflicts_with = "key", default_value_t = 32)]
+    bits: usize,
+    /// The preset that the forecast is for: draft, standard, robust or thorough
+    #[arg(long, requires = "forecast", default_value = "standard")]
+    preset: Preset,
+    /// Where the forecast is computed: auto, wgpu or cpu
+    #[arg(long, requires = "forecast", default_value = "auto")]
+    device: DeviceChoice,
     #[command(flatten)]
     budget: Budget,
     /// Prints JSON on standard output
@@ -36,12 +57,21 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let read = |path: &PathBuf| Ok::<_, Error>((path.clone(), Arc::new(Key::read(path)?)));
+    let wish = Wish {
+        key: arguments.key.as_ref().map(read).transpose()?,
+        bits: arguments.bits,
+        preset: arguments.preset,
+        device: arguments.device,
+        stop: Stop::default(),
+    };
     let asked = Asked {
         views: arguments.views,
         cameras: load::cameras(arguments.cameras.as_deref())?,
         kind: arguments.kind.map(Kind::scene),
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
         memory: arguments.budget.bytes(),
+        forecast: arguments.forecast.then_some(wish),
     };
     let report = inspect(&arguments.scene, &asked)?;
     if arguments.json {
@@ -79,6 +109,26 @@ fn kind_text(kind: &Found) -> String {
         percent(hidden_from_behind),
         percent(seen_from_above),
         flatness
+    )
+}
+
+/// What to expect of a mark, in words.
+fn forecast_text(told: &Told) -> String {
+    let of = &told.forecast;
+    let psnr = match (of.psnr_db, of.psnr_covered_db) {
+        (Some(whole), Some(covered)) => format!(", {whole:.1} dB ({covered:.1} over what the scene covers)"),
+        _ => String::new(),
+    };
+    let verdict = match told.meets_target {
+        true => "will be written",
+        false => "would miss its target and not be written",
+    };
+    format!(
+        "{} bits, preset {}: {:.0} % of the bits of a view{psnr}, {:.0} s; {verdict}",
+        told.bits,
+        told.preset,
+        100.0 * of.bit_accuracy,
+        of.seconds
     )
 }
 
@@ -154,5 +204,11 @@ fn tell(report: &Inspection) {
     line("  render", report.render.line());
     if let Some(embed) = &report.embed {
         line("  embed", format!("{} (preset standard, on the CPU)", embed.line()));
+    }
+    if let Some(told) = &report.forecast {
+        line("forecast", forecast_text(told));
+        if let Some(shorter) = &told.shorter {
+            line("  instead", forecast_text(shorter));
+        }
     }
 }

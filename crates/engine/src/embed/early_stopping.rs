@@ -3,7 +3,7 @@ use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
 use super::view_pool::PooledView;
 use crate::error::Result;
-use crate::extract::{Engine, PooledLogits, default_size, read_rendered};
+use crate::extract::{Engine, PooledLogits, default_size, read_rendered, stands_for};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
@@ -33,7 +33,14 @@ impl EarlyStopping {
         let indices: Vec<u64> = (first..first + stop.views as u64).collect();
         let views = engine.each(&indices, |&index| {
             let camera = sampler.camera(Split::HeldOut, index, size);
-            let mut view = PooledView::new(engine, geometry, &camera, 1.0, settings.half_weights, [1.0; 3])?;
+            let mut view = PooledView::new(
+                engine,
+                geometry,
+                &camera,
+                stands_for(size),
+                settings.half_weights,
+                [1.0; 3],
+            )?;
             view.reference = view.reference.to_8_bit();
             Ok(view)
         })?;

@@ -74,14 +74,23 @@ impl LearnedOffsets {
 
     /// The scene's colours with the changes on them, as the optimiser has them: what [`Scene::write`] is to be given.
     pub fn colours(&self, original: &Sh) -> Sh {
+        self.with(original, &self.values)
+    }
+
+    fn with(&self, original: &Sh, values: &[f32]) -> Sh {
         let mut colours = original.clone();
         let (columns, stride) = (self.learnable.columns(), original.per_gaussian());
-        for (values, &row) in self.values.chunks_exact(columns).zip(self.learnable.rows()) {
+        for (values, &row) in values.chunks_exact(columns).zip(self.learnable.rows()) {
             let at = row as usize * stride;
             let changed = &mut colours.coefficients[at..at + columns];
             changed.iter_mut().zip(values).for_each(|(c, v)| *c += v);
         }
         colours
+    }
+
+    /// The scene's colours as the written file will show them.
+    pub fn kept_colours(&self, original: &Sh) -> Sh {
+        self.with(original, self.changes().values)
     }
 
     /// Gaussians that the written file shows in other colours than before. A change that is lost in the rounding of a

@@ -11,6 +11,9 @@
 //! A second factor, on SSIM within reconstruction, holds an SSIM in the same way, between 0 and 1: a weight that scenes full of
 //! texture do not feel would leave a scene of few smooth surfaces hardly any place for a mark.
 //!
+//! A scene that covers little of its pictures would be changed the more for it, to no use: a change of several turns of what
+//! reads it is no stronger mark. So a PSNR is also held over the pixels that are covered.
+//!
 //! Where bits stay wrong, both targets give way a little, and no further than the scene needs ([`TargetRelaxation`]): a scene of few
 //! smooth surfaces holds 64 bits at 38 dB that it does not hold at 40, and one full of texture gains nothing.
 use serde::{Deserialize, Serialize};
@@ -24,6 +27,9 @@ use crate::error::Result;
 pub struct LossWeightControl {
     /// PSNR to hold on training views, dB.
     pub target_psnr_db: f64,
+    /// PSNR to hold over covered pixels, dB, however far the other one gives way; `None` for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covered_psnr_db: Option<f64>,
     /// Training bit accuracy from which on the factor is not lowered any more.
     pub bit_accuracy: f64,
     /// Of the logarithm of the factor, for each dB below the target.
@@ -71,6 +77,7 @@ impl Default for LossWeightControl {
     fn default() -> Self {
         Self {
             target_psnr_db: 36.0,
+            covered_psnr_db: None,
             bit_accuracy: 0.999,
             proportional: 2.0,
             integral: 0.05,
@@ -85,6 +92,12 @@ impl Default for LossWeightControl {
 impl LossWeightControl {
     pub(super) fn check(&self) -> Result<()> {
         within("balance.target_psnr_db", self.target_psnr_db, 0.0, 200.0)?;
+        within(
+            "balance.covered_psnr_db",
+            self.covered_psnr_db.unwrap_or(0.0),
+            0.0,
+            200.0,
+        )?;
         within("balance.proportional", self.proportional, 0.0, 100.0)?;
         within("balance.integral", self.integral, 0.0, 100.0)?;
         within("balance.limit", self.limit, 1.0, 1e6)?;
@@ -102,6 +115,8 @@ impl LossWeightControl {
 #[derive(Clone, Debug)]
 pub struct LossWeightController {
     balance: Option<LossWeightControl>,
+    /// PSNR of whole pictures that is held in any case: where covered pixels have theirs, and the others do not change.
+    least_db: f64,
     running: Option<[f64; 3]>,
     /// `integral * sum of e`.
     sum: f64,
@@ -123,10 +138,14 @@ pub struct LossWeightFactors {
 }
 
 impl LossWeightController {
-    /// Starts at 1, and stays there without a `balance`.
-    pub fn new(balance: Option<LossWeightControl>) -> Self {
+    /// Starts at 1, and stays there without a `balance`. `covered` is the share of a view that the scene covers.
+    pub fn new(balance: Option<LossWeightControl>, covered: f64) -> Self {
+        let over_covered = balance.and_then(|balance| balance.covered_psnr_db);
+        // Of a scene that covers nothing there is nothing to hold.
+        let over_covered = over_covered.filter(|_| covered > 0.0);
         Self {
             balance,
+            least_db: over_covered.map_or(f64::NEG_INFINITY, |db| db - 10.0 * covered.log10()),
             running: None,
             sum: 0.0,
             factor: 1.0,
@@ -148,7 +167,8 @@ impl LossWeightController {
     pub fn update(&mut self, psnr_db: f64, bit_accuracy: f64, ssim: f64) {
         let Some(b) = self.balance else { return };
         // The first steps have nearly identical pictures; a cap keeps them from ruling the mean.
-        let now = [psnr_db.min(b.target_psnr_db + 10.0), bit_accuracy, ssim];
+        let most = b.target_psnr_db.max(self.least_db) + 10.0;
+        let now = [psnr_db.min(most), bit_accuracy, ssim];
         let before = self.running.unwrap_or(now);
         let running: [f64; 3] = std::array::from_fn(|k| b.memory * before[k] + (1.0 - b.memory) * now[k]);
         self.running = Some(running);
@@ -160,7 +180,7 @@ impl LossWeightController {
             }
             given = [yielding.psnr_db, yielding.ssim].map(|most| most * self.given);
         }
-        let mut below = b.target_psnr_db - given[0] - running[0];
+        let mut below = (b.target_psnr_db - given[0]).max(self.least_db) - running[0];
         if running[1] >= b.bit_accuracy {
             below = below.max(0.0);
         }
@@ -181,13 +201,16 @@ mod tests {
     use super::*;
 
     fn controller(proportional: f64, integral: f64) -> LossWeightController {
-        LossWeightController::new(Some(LossWeightControl {
-            proportional,
-            integral,
-            limit: 8.0,
-            memory: 0.0,
-            ..LossWeightControl::default()
-        }))
+        LossWeightController::new(
+            Some(LossWeightControl {
+                proportional,
+                integral,
+                limit: 8.0,
+                memory: 0.0,
+                ..LossWeightControl::default()
+            }),
+            1.0,
+        )
     }
 
     fn factors(mut b: LossWeightController, psnr_and_bits: &[(f64, f64)]) -> Vec<f64> {
@@ -228,14 +251,14 @@ mod tests {
 
     #[test]
     fn without_a_target_nothing_changes_and_means_run() {
-        let mut none = LossWeightController::new(None);
+        let mut none = LossWeightController::new(None, 1.0);
         none.update(10.0, 0.5, 0.5);
         let untouched = LossWeightFactors {
             reconstruction: 1.0,
             ssim: 1.0,
         };
         assert_eq!(none.factors(), untouched);
-        let mut slow = LossWeightController::new(Some(LossWeightControl::default()));
+        let mut slow = LossWeightController::new(Some(LossWeightControl::default()), 1.0);
         slow.update(40.0, 0.5, 0.5);
         slow.update(30.0, 0.5, 0.5); // the mean is 38
         assert!(slow.factors().reconstruction < 1.0 && slow.factors().ssim == 1.0);
@@ -248,15 +271,18 @@ mod tests {
             psnr_db: 2.0,
             ssim: 0.004,
         };
-        let mut b = LossWeightController::new(Some(LossWeightControl {
-            target_psnr_db: 40.0,
-            target_ssim: Some(0.994),
-            proportional: 1.0,
-            integral: 0.0,
-            memory: 0.0,
-            yielding: Some(yielding),
-            ..LossWeightControl::default()
-        }));
+        let mut b = LossWeightController::new(
+            Some(LossWeightControl {
+                target_psnr_db: 40.0,
+                target_ssim: Some(0.994),
+                proportional: 1.0,
+                integral: 0.0,
+                memory: 0.0,
+                yielding: Some(yielding),
+                ..LossWeightControl::default()
+            }),
+            1.0,
+        );
         let mut after = |steps: usize, bits: f64| {
             for _ in 0..steps {
                 b.update(40.0, bits, 0.992);
@@ -272,13 +298,52 @@ mod tests {
         assert_eq!(after(100, 1.0), (0.0, 1.0));
     }
 
+    /// A tenth of the picture: 33 dB there are 43 of the whole, which targets that give way do not touch.
+    #[test]
+    fn covered_pixels_keep_their_psnr_where_the_whole_gives_way() {
+        let held = |covered: f64, bits: f64| {
+            let balance = LossWeightControl {
+                target_psnr_db: 40.0,
+                covered_psnr_db: Some(33.0),
+                proportional: 1.0,
+                integral: 0.0,
+                memory: 0.0,
+                yielding: Some(TargetRelaxation {
+                    below: 0.9,
+                    psnr_db: 2.0,
+                    ssim: 0.0,
+                }),
+                ..LossWeightControl::default()
+            };
+            let mut b = LossWeightController::new(Some(balance), covered);
+            for _ in 0..=RELAXES_AFTER + 100 {
+                b.update(40.0, bits, 1.0);
+            }
+            40.0 + f64::from(b.factors().reconstruction).ln()
+        };
+        for (covered, bits, wanted) in [
+            (0.1, 0.8, 43.0),
+            (0.1, 1.0, 43.0),
+            (1.0, 1.0, 40.0),
+            (1.0, 0.8, 38.0),
+            (0.25, 0.8, 33.0 - 10.0 * 0.25_f64.log10()),
+            (0.0, 0.8, 38.0),
+        ] {
+            let found = held(covered, bits);
+            assert!((found - wanted).abs() < 1e-6, "{covered} {bits}: {found}");
+        }
+    }
+
     #[test]
     fn ssim_weighs_less_where_there_is_room_and_all_where_there_is_none() {
-        let mut b = LossWeightController::new(Some(LossWeightControl {
-            target_ssim: Some(0.994),
-            memory: 0.0,
-            ..LossWeightControl::default()
-        }));
+        let mut b = LossWeightController::new(
+            Some(LossWeightControl {
+                target_ssim: Some(0.994),
+                memory: 0.0,
+                ..LossWeightControl::default()
+            }),
+            1.0,
+        );
         let mut after = |ssim: f64| {
             b.update(36.0, 0.9, ssim);
             f64::from(b.factors().ssim)

@@ -67,6 +67,7 @@ pub fn optimise(
     if let Some(ring) = settings.ring {
         sampler.train_on_ring(ring.elevation.to_radians())?;
     }
+    let settings = &settings.for_views(sampler.shows_parts());
     let mut held_out = settings
         .early_stop
         .map(|stop| EarlyStopping::new(engine, &geometry, &sampler, settings, stop))
@@ -161,7 +162,7 @@ impl<'a> Run<'a> {
             loss: Loss::new(engine, settings, message),
             pool,
             optimiser,
-            controller: LossWeightController::new(settings.balance),
+            controller: LossWeightController::new(settings.balance, coverage.covered),
             augmentation,
             gradient: vec![0.0; learnable.len()],
             learned: LearnedOffsets::new(scene, learnable),

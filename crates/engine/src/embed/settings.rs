@@ -87,6 +87,10 @@ pub struct Settings {
     pub seed: u64,
     /// Most optimiser steps.
     pub steps: usize,
+    /// What steps and their length are multiplied by where every view shows another part of the scene, as inside a room: a
+    /// Gaussian is in fewer views then, and each of them has its own colours to bring to the message.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub times_of_parts: u32,
     /// Views a step.
     pub views_per_step: usize,
     /// How many of them were never used before; the others are drawn from the pool. With 0 the first step's views are
@@ -175,6 +179,18 @@ impl Settings {
         Ok(settings)
     }
 
+    /// The settings for a scene of which every view shows another part, or each the whole.
+    pub(super) fn for_views(&self, of_parts: bool) -> Self {
+        let mut settings = *self;
+        if of_parts {
+            settings.steps *= self.times_of_parts as usize;
+            if let Optimizer::PreconditionedSgd(sgd) = &mut settings.optimizer {
+                sgd.length *= self.times_of_parts as f32;
+            }
+        }
+        settings
+    }
+
     /// Where views are taken from, with these cameras, if there are any.
     pub fn viewpoints<'a>(&self, cameras: &'a [Camera]) -> Viewpoints<'a> {
         Viewpoints {
@@ -198,6 +214,7 @@ impl Settings {
     pub fn check(&self) -> Result<()> {
         let count = |field, value: usize, most: usize| within(field, value as f64, 1.0, most as f64);
         count("steps", self.steps, 10_000_000)?;
+        within("times_of_parts", f64::from(self.times_of_parts), 1.0, 100.0)?;
         count("views_per_step", self.views_per_step, 1024)?;
         within(
             "fresh_per_step",
@@ -254,6 +271,15 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+/// Settings from before this one was there have the hash that they had.
+fn once() -> u32 {
+    1
+}
+
+fn is_once(times: &u32) -> bool {
+    *times == 1
 }
 
 /// Fails unless `low <= value <= high`.
@@ -315,5 +341,21 @@ mod tests {
         assert!(reason(r#"{"size": 4}"#).contains("outside 16"));
         assert!(reason(r#"{"ring": {"elevation": 90}}"#).contains("90 is outside -80 to 80"));
         assert!(!serde_json::to_string(&standard).unwrap().contains("ring"));
+    }
+
+    #[test]
+    fn views_of_parts_take_more_and_longer_steps() {
+        let standard = Preset::Standard.settings();
+        assert_eq!(standard.for_views(false), standard);
+        let parts = standard.for_views(true);
+        assert_eq!(parts.steps, 2 * standard.steps);
+        let length = |settings: &Settings| match settings.optimizer {
+            Optimizer::PreconditionedSgd(sgd) => sgd.length,
+            Optimizer::Adam(_) => f32::NAN,
+        };
+        assert_eq!(length(&parts), 2.0 * length(&standard));
+        let paper = Preset::Paper.settings();
+        assert_eq!(paper.for_views(true), paper);
+        assert!(standard.overridden(r#"{"times_of_parts": 0}"#).is_err());
     }
 }

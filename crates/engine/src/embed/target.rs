@@ -13,7 +13,7 @@ use super::verify::Verification;
 const SHORT: usize = 32;
 
 /// A mark that is this much too strong at most is made weaker, dB.
-const WEAKENED_DB: f64 = 1.0;
+const WEAKENED_DB: f64 = 2.5;
 /// And by so much more than is missing: 8-bit pictures do not follow a factor exactly.
 const SPARE_DB: f64 = 0.03;
 
@@ -25,14 +25,17 @@ pub struct Target {
     pub bit_accuracy: f64,
     /// Mean PSNR on held-out views, dB.
     pub psnr_db: f64,
+    /// Mean PSNR over the pixels that the scene covers, dB; `None` for whatever it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub psnr_covered_db: Option<f64>,
     /// Whether the message must be read: up to 32 bits all of it, from [`Verify::message_views`](super::Verify::message_views)
     /// views; beyond, as much as a claim about a picture needs, from all views.
     pub message: bool,
 }
 
 impl Target {
-    /// What is wanted of a message of so many bits.
-    fn accuracy(&self, bits: usize, rule: &AcceptanceRule) -> f64 {
+    /// The mean bit accuracy that is wanted of a message of so many bits.
+    pub fn wanted(&self, bits: usize, rule: &AcceptanceRule) -> f64 {
         let enough = needed(bits, rule) as f64 / bits.max(1) as f64;
         match bits {
             ..=SHORT => self.bit_accuracy,
@@ -44,9 +47,15 @@ impl Target {
     /// views than those whose PSNR was held, and a scene is to be handed out that is a hundredth of a dB short. `None` where
     /// they show it as little as they may, or so much more that what is left would hardly be read.
     pub fn weaken(&self, found: &Verification) -> Option<f32> {
-        let short = self.psnr_db - found.quality.psnr.psnr_db?;
+        let whole = self.psnr_db - found.quality.psnr.psnr_db?;
+        let short = self.short_over_covered(found).map_or(whole, |short| whole.max(short));
         // A difference that is smaller by a factor has a PSNR that is higher by twenty times its logarithm.
         (short > 0.0 && short <= WEAKENED_DB).then(|| 10_f64.powf(-(short + SPARE_DB) / 20.0) as f32)
+    }
+
+    /// dB that are missing over covered pixels; negative where there are more than are wanted.
+    fn short_over_covered(&self, found: &Verification) -> Option<f64> {
+        Some(self.psnr_covered_db? - found.psnr_covered_db?)
     }
 
     /// What a verification misses, in words; nothing when all is reached. A message of more than 32 bits must be read well
@@ -54,7 +63,7 @@ impl Target {
     pub fn missed(&self, found: &Verification, rule: &AcceptanceRule) -> Vec<String> {
         let mut missed = Vec::new();
         let bits = found.message.len();
-        let (accuracy, wanted) = (found.comparison.bit_accuracy, self.accuracy(bits, rule));
+        let (accuracy, wanted) = (found.comparison.bit_accuracy, self.wanted(bits, rule));
         if accuracy < wanted {
             missed.push(format!("bit accuracy {accuracy:.4} is below {wanted:.3}"));
         }
@@ -62,6 +71,14 @@ impl Target {
             && psnr < self.psnr_db
         {
             missed.push(format!("PSNR {psnr:.2} dB is below {} dB", self.psnr_db));
+        }
+        if let (Some(wanted), Some(short)) = (self.psnr_covered_db, self.short_over_covered(found))
+            && short > 0.0
+        {
+            let psnr = wanted - short;
+            missed.push(format!(
+                "PSNR over what the scene covers, {psnr:.2} dB, is below {wanted} dB"
+            ));
         }
         let allowed = bits - needed(bits, rule);
         let wrong = if bits <= SHORT {
@@ -107,9 +124,10 @@ mod tests {
         let target = Target {
             bit_accuracy: 0.95,
             psnr_db: 37.5,
+            psnr_covered_db: None,
             message: true,
         };
-        let wanted = |bits| (target.accuracy(bits, &RULE), needed(bits, &RULE));
+        let wanted = |bits| (target.wanted(bits, &RULE), needed(bits, &RULE));
         assert_eq!(wanted(32), (0.95, 32));
         assert_eq!(wanted(8), (0.95, 8));
         // 55 of 64 is what a claim about a picture needs (docs/verify.md).
@@ -120,7 +138,7 @@ mod tests {
             bit_accuracy: 0.6,
             ..target
         };
-        assert_eq!(low.accuracy(64, &RULE), 0.6);
+        assert_eq!(low.wanted(64, &RULE), 0.6);
         // A stricter rate asks for more.
         let strict = AcceptanceRule {
             false_positive_rate: 1e-12,

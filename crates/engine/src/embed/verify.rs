@@ -1,7 +1,7 @@
 //! Verifies a marked scene as a stranger would see it: 8-bit pictures from held-out views.
 use super::settings::Settings;
 use crate::error::{Error, Result};
-use crate::extract::{Comparison, Engine, PooledLogits, default_size, read_rendered};
+use crate::extract::{Comparison, Engine, PooledLogits, default_size, read_rendered, stands_for};
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
@@ -41,7 +41,8 @@ pub struct Verification {
     pub pairs: Vec<(Picture, Picture)>,
 }
 
-/// Renders held-out views of both scenes over white, those of `cameras` if there are any, compares and reads them.
+/// Renders held-out views of both scenes over white, those of `cameras` if there are any, compares them as they are, and
+/// reads them as [`read_scene`](crate::extract::read_scene) does.
 ///
 /// # Errors
 /// An empty scene, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
@@ -65,7 +66,8 @@ pub fn verify(
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
         let [before, on_black] = engine.pictures(&original, &camera, [[1.0; 3], [0.0; 3]])?;
         let after = engine.picture(&marked, &camera, [1.0; 3])?;
-        logits.push(read_rendered(engine, &after)?);
+        let read = engine.averaged_picture(&marked, &camera, stands_for(size), [1.0; 3])?;
+        logits.push(read_rendered(engine, &read)?);
         let mask = covered(&before, &on_black)?;
         of_covered.extend(psnr_covered(&before, &after, &mask)?);
         shares += cover::share(&mask);

@@ -15,6 +15,7 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::picture::Picture;
+use crate::quality::cover::{COVERED, share};
 use crate::scene::Sh;
 use crate::splat::{Changes, Geometry, PreparedView, sh};
 use crate::view::{Camera, Split, ViewSampler};
@@ -102,12 +103,14 @@ impl PooledView {
         engine.rasterizer()?.backward(&self.view, &gradient.pixels)
     }
 
-    /// Of each visible Gaussian three times the sum over pixels of its weight times the cover of the pixel.
-    fn energies(&self, engine: &Engine) -> Result<Vec<f32>> {
+    /// Of each visible Gaussian three times the sum over pixels of its weight times the cover of the pixel; and the share
+    /// of pixels that are covered.
+    fn energies(&self, engine: &Engine) -> Result<(Vec<f32>, f64)> {
         let rasterizer = engine.rasterizer()?;
         let ones = vec![1.0; 3 * self.view.visible.len()];
         let cover = rasterizer.render(&self.view, &ones, [0.0; 3])?;
-        rasterizer.backward(&self.view, &cover.pixels)
+        let mask: Vec<bool> = cover.pixels.chunks_exact(3).map(|p| p[0] >= COVERED).collect();
+        Ok((rasterizer.backward(&self.view, &cover.pixels)?, share(&mask)))
     }
 
     fn bytes(&self) -> usize {
@@ -142,6 +145,8 @@ pub struct Coverage {
     /// Mean over them of the sum over pixels of a Gaussian's weight times the cover of the pixel: what a change of its
     /// colour, together with that of its neighbours, costs in squares.
     pub energies: Vec<f32>,
+    /// Mean share of a view that the scene covers, 0 to 1.
+    pub covered: f64,
 }
 
 impl Coverage {
@@ -168,7 +173,7 @@ impl ViewPool {
     pub fn cover(&mut self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Coverage> {
         let mut seen = vec![false; geometry.len()];
         let mut energies = vec![0.0; geometry.len()];
-        let (mut views, mut count) = (0, 0);
+        let (mut views, mut count, mut covered) = (0, 0, 0.0);
         loop {
             let made = self.make(engine, geometry, self.settings.views_per_step)?;
             views += made.len();
@@ -179,7 +184,8 @@ impl ViewPool {
                 *seen = true;
             }
             count += new;
-            for (view, energy) in made.iter().zip(engine.each(&made, |view| view.energies(engine))?) {
+            for (view, (energy, share)) in made.iter().zip(engine.each(&made, |view| view.energies(engine))?) {
+                covered += share;
                 for (row, energy) in view.view.visible.iter().zip(energy.chunks_exact(3)) {
                     energies[*row as usize] += energy[0];
                 }
@@ -187,7 +193,13 @@ impl ViewPool {
             self.keep(made);
             if new as f64 <= NEWLY_SEEN * count as f64 || views >= MOST_COVERING {
                 energies.iter_mut().for_each(|e| *e /= views as f32);
-                return Ok(Coverage { views, seen, energies });
+                covered /= views as f64;
+                return Ok(Coverage {
+                    views,
+                    seen,
+                    energies,
+                    covered,
+                });
             }
         }
     }

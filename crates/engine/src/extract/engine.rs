@@ -236,6 +236,23 @@ impl Engine {
         Ok(picture)
     }
 
+    /// The 8-bit picture of a view that stands for one `times` as large, averaged down.
+    ///
+    /// # Errors
+    /// Those of [`Engine::picture`].
+    pub fn averaged_picture(
+        &self,
+        geometry: &Geometry<'_>,
+        camera: &Camera,
+        times: f32,
+        background: [f32; 3],
+    ) -> Result<Picture> {
+        self.stop.check()?;
+        let view = geometry.prepare_averaged(camera, times, WeightCache::None)?;
+        let colours = sh::colours(geometry.sh(), None, &view);
+        Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
+    }
+
     /// [`Engine::picture`] of one view over each of some backgrounds.
     ///
     /// # Errors

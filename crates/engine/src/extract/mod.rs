@@ -38,6 +38,15 @@ pub fn default_size(engine: &Engine) -> u32 {
     engine.extractor.side().clamp(128, 512) as u32
 }
 
+/// Side in pixels of pictures as people make them of scenes. They are averaged down before they are read, and show finer
+/// detail then than a picture that was drawn as small.
+const PEOPLES_SIDE: f32 = 800.0;
+
+/// How much larger than a view of so many pixels the picture is that it stands for where it is read.
+pub(crate) fn stands_for(side: u32) -> f32 {
+    (PEOPLES_SIDE / side.max(1) as f32).max(1.0)
+}
+
 /// Reads pictures that somebody gave, whatever their sizes.
 ///
 /// # Errors
@@ -47,8 +56,9 @@ pub fn read_pictures(engine: &Engine, pictures: &[Picture]) -> Result<PooledLogi
     PooledLogits::new(logits.collect::<Result<_>>()?)
 }
 
-/// Renders `views` held-out 8-bit views of a scene as `sampler` has them, `size` by `size` pixels, and reads them. `done`
-/// hears of every view, and is shown it.
+/// Renders `views` held-out 8-bit views of a scene as `sampler` has them, `size` by `size` pixels, and reads them. Each
+/// stands for a picture of 800 px averaged down, where it is smaller, at its own cost. `done` hears of every view, and is
+/// shown it.
 ///
 /// # Errors
 /// A size out of range, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
@@ -65,7 +75,7 @@ pub fn read_scene(
     let mut logits = Vec::with_capacity(views);
     for index in 0..views {
         let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let picture = engine.picture(&geometry, &camera, background)?;
+        let picture = engine.averaged_picture(&geometry, &camera, stands_for(size), background)?;
         logits.push(read_rendered(engine, &picture)?);
         done(index + 1, &picture)?;
     }

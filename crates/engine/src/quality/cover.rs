@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::picture::Picture;
 
 /// A pixel that hides at least so much of the background is covered.
-const COVERED: f32 = 0.5;
+pub(crate) const COVERED: f32 = 0.5;
 
 /// For each pixel, row by row, whether the scene covers it: by one view over white and the same over black, between which
 /// only what shows through differs.
