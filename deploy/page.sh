@@ -17,7 +17,10 @@ unchecked() {
 for program in npm python3 chromium; do
     type -P "$program" >/dev/null || unchecked "$program was not found"
 done
-bash tools/page/vendor.sh --check || exit 1
+status=0
+bash tools/page/vendor.sh --check || status=$?
+[ "$status" -ne 3 ] || unchecked "what the page is made with could not be fetched from the npm registry"
+[ "$status" -eq 0 ] || exit "$status"
 # Written last: what was installed.
 if ! cmp -s "$requirements" "$tools/installed.txt"; then
     { python3 -m venv --clear "$tools" &&

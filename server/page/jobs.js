@@ -109,6 +109,8 @@ export async function run(spec, displayName, panel) {
     panel.show("Asking for the job");
     const made = await patiently(() => jobs.createJob(request, { timeoutMs: SOON }), panel.options);
     panel.job = made.name;
+    // It was stopped while nobody knew yet what it is called.
+    if (panel.stopping.signal.aborted) await jobs.cancelJob({ name: made.name }, { timeoutMs: SOON });
     const job = await follow(made, (now) => {
         const { done = 0n, total = 0n, bitAccuracy, psnrDb } = now.progress ?? {};
         const share = now.state === State.RUNNING && total > 0n ? Number(done) / Number(total) : undefined;

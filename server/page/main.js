@@ -4,7 +4,7 @@ import { alertIn, announce, by } from "./elements.js";
 import { explain, isSignedOut } from "./errors.js";
 import * as mark from "./mark.js";
 import * as operate from "./operate.js";
-import { forget, keep, token } from "./session.js";
+import { forget, found, keep, leave, token } from "./session.js";
 import * as verify from "./verify.js";
 
 const PARTS = { mark, verify, jobs: operate };
@@ -34,14 +34,11 @@ async function go(name, { focus = true } = {}) {
     }
 }
 
+/** Forgets the token, and loads the page anew, so that nothing of the project stays on it. */
 function signOut(told) {
     forget();
-    // Nothing of the project stays on the page.
-    for (const id of ["mark-result", "verify-result", "jobs-list"]) by(id).replaceChildren();
-    history.replaceState(null, "", location.pathname);
-    go("sign-in");
-    alertIn(by("sign-in-form").querySelector(".alert"), told ?? null);
-    if (!told) announce("You are signed out.");
+    leave(told);
+    location.replace(location.pathname);
 }
 
 async function signIn(event) {
@@ -71,3 +68,4 @@ verify.connect();
 operate.connect();
 addEventListener("hashchange", () => go(location.hash.slice(1)));
 go(location.hash.slice(1), { focus: false });
+alertIn(by("sign-in-form").querySelector(".alert"), found());

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
 from service import Service, program
 
 CHROMIUM = os.environ.get("GUARDSPLAT_CHROMIUM", "/usr/bin/chromium")
@@ -79,8 +79,7 @@ def sign_in(page: Page, url: str, token: str) -> None:
     page.get_by_role("heading", name="Mark a scene").wait_for()
 
 
-def keep(page: Page, name: str) -> None:
+def keep(part: Locator, name: str) -> None:
     """Takes a picture for the documentation, where a folder is named for it."""
     if folder := os.environ.get("GUARDSPLAT_SCREENSHOTS"):
-        page.evaluate("() => scrollTo(0, 0)")
-        page.screenshot(path=f"{folder}/{name}.png", full_page=True)
+        part.screenshot(path=f"{folder}/{name}.png")

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import threading
 import time
+import uuid
 from pathlib import Path
 
 PROGRAMS = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")).resolve() / "release"
@@ -66,6 +67,10 @@ class Service:
         given = [word for scope in scopes or SCOPES for word in ("--scope", scope)]
         return program("guardsplat-server", "--data-dir", self.folder, "token", "create", "--project", "studio", *given)
 
+    def revoke(self, token: str) -> None:
+        name = f"tokens/{uuid.UUID(token.split('_')[1])}"
+        program("guardsplat-server", "--data-dir", self.folder, "token", "revoke", name)
+
     def client(self, token: str, *arguments: object) -> str:
         return program("guardsplat", "--server", f"http://127.0.0.1:{self.api}", *arguments, token=token)
 
@@ -76,8 +81,10 @@ class Way:
     def __init__(self, to: int) -> None:
         self.to = to
         self.sent = 0
-        # All connections end once so many bytes went there, and for a while there is no other.
+        self.received = 0
+        # All connections end once so many bytes went there, or came back, and for a while there is no other.
         self.break_after: int | None = None
+        self.break_back_after: int | None = None
         self.broken = 0
         self.closed_until = 0.0
         self.lock = threading.Lock()
@@ -108,20 +115,26 @@ class Way:
                     for ready, _ in both.select(0.5):
                         try:
                             some = ready.fileobj.recv(1 << 16)
-                            if not some or self._breaks(len(some) if ready.fileobj is browser else 0):
+                            if not some or self._breaks(len(some), ready.fileobj is browser):
                                 return
                             ready.data.sendall(some)
                         except OSError:
                             return
 
-    def _breaks(self, count: int) -> bool:
+    def _breaks(self, count: int, there: bool) -> bool:
         with self.lock:
-            self.sent += count
+            if there:
+                self.sent += count
+            else:
+                self.received += count
             if time.monotonic() < self.closed_until:
                 return True
             if self.break_after is not None and self.sent >= self.break_after:
                 self.break_after = None
-                self.broken += 1
-                self.closed_until = time.monotonic() + 1.5
-                return True
-            return False
+            elif self.break_back_after is not None and self.received >= self.break_back_after:
+                self.break_back_after = None
+            else:
+                return False
+            self.broken += 1
+            self.closed_until = time.monotonic() + 1.5
+            return True

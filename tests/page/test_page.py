@@ -47,6 +47,13 @@ def test_only_with_a_token(service: Service, token: str, tab: Page) -> None:
     tab.get_by_role("button", name="Sign out").click()
     expect(tab.get_by_role("heading", name="Sign in")).to_be_visible()
     assert tab.evaluate("() => sessionStorage.length") == 0
+    # One that is taken back meanwhile.
+    other = service.token()
+    sign_in(tab, url, other)
+    service.revoke(other)
+    tab.get_by_role("link", name="Jobs").click()
+    expect(tab.get_by_role("alert")).to_contain_text("The token is revoked.")
+    assert tab.evaluate("() => sessionStorage.length") == 0
 
 
 def test_a_scene_is_marked_and_a_picture_of_it_verified(
@@ -67,6 +74,9 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     assert way.broken == 1
     # It went on where it was: what was on its way went there twice, and nothing else.
     assert way.sent - before < size + (2 << 20), f"{way.sent - before} bytes for a file of {size}"
+    # So it does while the marked scene comes back.
+    came = way.received
+    way.break_back_after = came + (2 << 20)
 
     result = tab.locator("#mark-result")
     expect(result.get_by_role("heading", name="The marked scene")).to_be_focused(timeout=LONG)
@@ -76,6 +86,8 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     marked = folder / "marked.ply"
     download.value.save_as(marked)
     assert marked.stat().st_size == size
+    assert way.broken == 2
+    assert way.received - came < size + (4 << 20), f"{way.received - came} bytes for a file of {size}"
     assert marked.read_bytes() != scene.read_bytes()
 
     result.get_by_role("button", name="Turn it here").click()
@@ -86,7 +98,7 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
         tab.keyboard.press(pressed)
     result.get_by_role("button", name="Take a picture").click()
     result.get_by_role("button", name="Check it").wait_for(timeout=LONG)
-    keep(tab, "marked")
+    keep(result, "marked")
     result.get_by_role("button", name="Check it").click(timeout=LONG)
     expect(tab.get_by_role("heading", name="Verify")).to_be_focused()
     expect(tab.locator("#verify-list")).to_contain_text("marked-1.png")
@@ -143,7 +155,7 @@ def test_an_owner_is_registered_and_found(service: Service, token: str, scene: P
     tab.get_by_role("button", name="Verify").click()
     expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(timeout=LONG)
     expect(found).to_contain_text("sample.ply (number 1), of Studio Nord")
-    keep(tab, "verdict")
+    keep(found, "verdict")
     for name in ("evidence.html", "evidence.json"):
         with tab.expect_download() as download:
             found.get_by_role("button", name=f"Download {name}").click()

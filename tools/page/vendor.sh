@@ -3,7 +3,7 @@
 # What it makes is in the repository, so nobody needs this but who changes a version or the API.
 #
 #     tools/page/vendor.sh           makes it anew
-#     tools/page/vendor.sh --check   says whether it is what this makes
+#     tools/page/vendor.sh --check   says whether it is what this makes; 3 where packages can't be fetched
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 kept=../../server/page/vendor
@@ -13,7 +13,7 @@ if [ "${1:-}" = --check ]; then
 fi
 
 # No package runs anything of its own.
-npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || exit 3
 tools=$PWD/node_modules/.bin
 mkdir -p node_modules/.generated
 ln -sfn node_modules/.generated generated
