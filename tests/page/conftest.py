@@ -54,6 +54,13 @@ def scene(folder: Path) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def small(folder: Path) -> Path:
+    path = folder / "small.ply"
+    program("guardsplat-worker", "sample", path, "--gaussians", 8000, "--seed", 1)
+    return path
+
+
 @pytest.fixture
 def tab(browser: Browser) -> Iterator[Page]:
     """A tab that nothing may go wrong in unseen, and that may ask nobody but the server."""

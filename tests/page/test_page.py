@@ -122,11 +122,11 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     expect(marking).to_contain_text(re.compile(r"Attempt 1, .*, worker .*: succeeded"))
 
 
-def test_an_owner_is_registered_and_found(service: Service, token: str, scene: Path, tab: Page, folder: Path) -> None:
+def test_an_owner_is_registered_and_found(service: Service, token: str, small: Path, tab: Page, folder: Path) -> None:
     # Always the same one, which marks the scene well.
     service.client(token, "key", "create", "--bits", 64, "--display-name", "originals", "--seed", 3)
     sign_in(tab, address(service), token)
-    tab.locator("#mark-file").set_input_files(scene)
+    tab.locator("#mark-file").set_input_files(small)
     tab.get_by_label("A mark of its owner, which is registered now").check()
     expect(tab.locator("#mark-key option")).to_have_text(["originals (64 bits)"])
     mark = tab.get_by_role("button", name="Mark the scene")
@@ -135,7 +135,7 @@ def test_an_owner_is_registered_and_found(service: Service, token: str, scene: P
 
     # A claim on what is not registered says so.
     tab.get_by_role("link", name="Verify").click()
-    tab.locator("#verify-files").set_input_files(scene)
+    tab.locator("#verify-files").set_input_files(small)
     tab.locator("#verify-key").select_option("originals (64 bits)")
     tab.get_by_label("It is any registered original of this key").check()
     tab.get_by_role("button", name="Verify").click()
@@ -154,7 +154,7 @@ def test_an_owner_is_registered_and_found(service: Service, token: str, scene: P
     tab.locator("#verify-files").set_input_files(copy)
     tab.get_by_role("button", name="Verify").click()
     expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(timeout=LONG)
-    expect(found).to_contain_text("sample.ply (number 1), of Studio Nord")
+    expect(found).to_contain_text("small.ply (number 1), of Studio Nord")
     keep(found, "verdict")
     for name in ("evidence.html", "evidence.json"):
         with tab.expect_download() as download:
