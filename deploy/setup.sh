@@ -53,7 +53,7 @@ setup_tests() {
     command -v npm >/dev/null || missing+=(npm)
     command -v c++ >/dev/null || missing+=(g++)
     type -P kill >/dev/null || missing+=(procps)
-    # Pages of evidence are looked at in a browser.
+    # Pages of evidence are looked at in a browser, and the page of the server is used in one.
     type -P chromium >/dev/null || missing+=(chromium)
     # AVIF, one of the codecs that pictures go through.
     command -v avifenc >/dev/null || missing+=(libavif-bin)

@@ -11,6 +11,7 @@ pub mod marks;
 pub mod metrics;
 pub mod notary;
 pub mod offline;
+pub mod page;
 pub mod run;
 pub mod secrets;
 pub mod service;

@@ -24,7 +24,7 @@ use crate::artifacts::ArtifactStore;
 use crate::embedded::{Backoff, EmbeddedWorker, WorkerProcess};
 use crate::error::{Error, Result};
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{self, ConnectionLimits, ListenerOptions};
+use crate::grpc::listener::{self, ConnectionLimits, ListenerOptions, Protocol};
 use crate::hooks::{Poster, Rules};
 use crate::ledger::Ledger;
 use crate::metrics::{self, Page};
@@ -72,6 +72,8 @@ pub struct Server {
     door: ListenerOptions,
     /// Where the own worker comes in while the door for all others speaks TLS.
     side: Option<(TcpListener, Guard)>,
+    /// Where browsers come in.
+    page: Option<(TcpListener, ListenerOptions)>,
     /// Where metrics are to be had.
     metrics: Option<TcpListener>,
     ledger: Arc<dyn Ledger>,
@@ -131,10 +133,15 @@ impl Server {
         let door = ListenerOptions {
             guard,
             tls,
+            protocol: Protocol::Grpc,
             connections: files::connections(&settings, files),
             handshake: listener::HANDSHAKE,
             idle: settings.connection_idle(),
             measured: api.measured(),
+        };
+        let page = match settings.page_listen {
+            Some(wanted) => Some(listen_for_browsers(wanted, &door).await?),
+            None => None,
         };
         let metrics = match settings.metrics_listen {
             Some(wanted) => Some(listen_for_metrics(wanted).await?),
@@ -148,6 +155,7 @@ impl Server {
             worker,
             door,
             side,
+            page,
             metrics,
             ledger,
             store,
@@ -173,7 +181,7 @@ impl Server {
         };
         let (mut health, health_service) = Health::start(watched, health::EVERY).await;
         // To the end: who looks after the server wants to see it stop.
-        let page = self.metrics.map(|listener| {
+        let measured = self.metrics.map(|listener| {
             let page = Page {
                 metrics: self.api.metrics(),
                 ledger: self.ledger.clone(),
@@ -189,6 +197,7 @@ impl Server {
             let door = ListenerOptions {
                 guard,
                 tls: None,
+                protocol: Protocol::Grpc,
                 connections: SIDE,
                 handshake: listener::HANDSHAKE,
                 idle: None,
@@ -196,6 +205,9 @@ impl Server {
             };
             tokio::spawn(listener::serve(routes.clone(), door, listener, drained.clone()))
         });
+        let browsers = self
+            .page
+            .map(|(listener, door)| tokio::spawn(listener::serve(routes.clone(), door, listener, drained.clone())));
         let mut calls = tokio::spawn(listener::serve(routes, self.door, self.listener, drained));
         let housekeeping = tokio::spawn(housekeeping::housekeeping(self.api.clone()));
         let deliveries = tokio::spawn(deliveries::deliveries(self.api.clone(), self.poster));
@@ -226,11 +238,14 @@ impl Server {
                     // Its one caller has ended before.
                     drain_until(side, limit).await;
                 }
+                if let Some(browsers) = browsers {
+                    drain_until(browsers, limit).await;
+                }
                 drain_until(calls, limit).await
             }
         };
-        if let Some(page) = page {
-            page.abort();
+        if let Some(measured) = measured {
+            measured.abort();
         }
         self.api.traces().close().await;
         if timeout(LEAST_DRAIN, housekeeping).await.is_err() {
@@ -248,6 +263,25 @@ impl Server {
             None => Ok(()),
         }
     }
+}
+
+/// Listens for browsers, and says where. They come in by the guard, and in the numbers, of all others.
+async fn listen_for_browsers(wanted: SocketAddr, door: &ListenerOptions) -> Result<(TcpListener, ListenerOptions)> {
+    let failed = |error| Error::Startup(format!("listening for browsers on {wanted}: {error}"));
+    let listener = TcpListener::bind(wanted).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let scheme = if door.tls.is_some() { "https" } else { "http" };
+    tracing::info!(%address, "the page is at {scheme}://{address}/");
+    let door = ListenerOptions {
+        guard: door.guard.clone(),
+        tls: door.tls.as_deref().map(tls::for_page),
+        protocol: Protocol::Page,
+        connections: door.connections,
+        handshake: door.handshake,
+        idle: door.idle,
+        measured: door.measured.clone(),
+    };
+    Ok((listener, door))
 }
 
 /// Listens where metrics are asked for, and says where, as any port may have been wanted.

@@ -11,8 +11,9 @@ use rustls::{RootCertStore, ServerConfig};
 use crate::error::{Error, Result};
 use crate::settings::Settings;
 
-/// What HTTP/2 is called when a protocol is agreed on.
+/// What HTTP/2 and HTTP/1.1 are called when a protocol is agreed on.
 const HTTP2: &[u8] = b"h2";
+const HTTP1: &[u8] = b"http/1.1";
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -35,6 +36,13 @@ pub fn load(settings: &Settings) -> Result<Option<Arc<ServerConfig>>> {
         ))
     })?;
     Ok(Some(Arc::new(config)))
+}
+
+/// The same for browsers, who are told that HTTP/1.1 is spoken.
+pub fn for_page(config: &ServerConfig) -> Arc<ServerConfig> {
+    let mut config = config.clone();
+    config.alpn_protocols = vec![HTTP1.to_vec()];
+    Arc::new(config)
 }
 
 fn config(certificates: &[u8], private: &[u8], clients: Option<&[u8]>) -> Result<ServerConfig, Failure> {

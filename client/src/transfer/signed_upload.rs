@@ -47,6 +47,7 @@ async fn begin(context: &Context, source: &Source) -> Option<StartUploadResponse
     let mut client = ArtifactServiceClient::new(context.server.channel().await.ok()?);
     let request = StartUploadRequest {
         metadata: Some(source.metadata()),
+        in_parts: false,
     };
     let answer = context.in_time(client.start_upload(context.request(request))).await;
     let begun = answer.ok()?.into_inner();

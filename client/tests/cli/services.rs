@@ -7,11 +7,11 @@ use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::key_service_server::KeyService;
 use guardsplat_proto::v1::registry_service_server::RegistryService;
 use guardsplat_proto::v1::{
-    Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest, CreateJobRequest, CreateOwnerRequest,
-    DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, ExportCommitmentRequest,
-    ExportCommitmentResponse, FinishUploadRequest, GetArtifactRequest, GetAssetRequest, GetCommitmentRequest,
-    GetDownloadUrlRequest, GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest, GetOwnerRequest,
-    GetPublicKeyRequest, HttpHeader, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
+    AppendUploadRequest, AppendUploadResponse, Artifact, Asset, CancelJobRequest, Commitment, CreateAssetRequest,
+    CreateJobRequest, CreateOwnerRequest, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse,
+    ExportCommitmentRequest, ExportCommitmentResponse, FinishUploadRequest, GetArtifactRequest, GetAssetRequest,
+    GetCommitmentRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest,
+    GetOwnerRequest, GetPublicKeyRequest, HttpHeader, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
     ListCommitmentsRequest, ListCommitmentsResponse, ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest,
     ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
     RequeueJobRequest, RevealCommitmentRequest, RevealCommitmentResponse, StartUploadRequest, StartUploadResponse,
@@ -107,6 +107,10 @@ impl ArtifactService for Fake {
             headers: vec![header],
             expire_time: None,
         }))
+    }
+
+    async fn append_upload(&self, _: Request<AppendUploadRequest>) -> Result<Response<AppendUploadResponse>, Status> {
+        Err(Status::unimplemented("for browsers"))
     }
 
     async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {

@@ -26,7 +26,7 @@ from google.protobuf import empty_pb2 as google_dot_protobuf_dot_empty__pb2
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$guardsplat/v1/artifact_service.proto\x12\rguardsplat.v1\x1a\x1bgoogle/protobuf/empty.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x01\n\x08\x41rtifact\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0c\x64isplay_name\x18\x02 \x01(\t\x12\x12\n\nsize_bytes\x18\x03 \x01(\x03\x12\x0e\n\x06sha256\x18\x04 \x01(\t\x12/\n\x0b\x63reate_time\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03job\x18\x06 \x01(\t\"f\n\x15UploadArtifactRequest\x12\x31\n\x08metadata\x18\x01 \x01(\x0b\x32\x1d.guardsplat.v1.UploadMetadataH\x00\x12\x0f\n\x05\x63hunk\x18\x02 \x01(\x0cH\x00\x42\t\n\x07payload\"J\n\x0eUploadMetadata\x12\x14\n\x0c\x64isplay_name\x18\x01 \x01(\t\x12\x12\n\nsize_bytes\x18\x02 \x01(\x03\x12\x0e\n\x06sha256\x18\x03 \x01(\t\"E\n\x12StartUploadRequest\x12/\n\x08metadata\x18\x01 \x01(\x0b\x32\x1d.guardsplat.v1.UploadMetadata\"\x8f\x01\n\x13StartUploadResponse\x12\x0e\n\x06upload\x18\x01 \x01(\t\x12\x0b\n\x03url\x18\x02 \x01(\t\x12*\n\x07headers\x18\x03 \x03(\x0b\x32\x19.guardsplat.v1.HttpHeader\x12/\n\x0b\x65xpire_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\")\n\nHttpHeader\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\t\"%\n\x13\x46inishUploadRequest\x12\x0e\n\x06upload\x18\x01 \x01(\t\"7\n\x17\x44ownloadArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0e\n\x06offset\x18\x02 \x01(\x03\"c\n\x18\x44ownloadArtifactResponse\x12+\n\x08\x61rtifact\x18\x01 \x01(\x0b\x32\x17.guardsplat.v1.ArtifactH\x00\x12\x0f\n\x05\x63hunk\x18\x02 \x01(\x0cH\x00\x42\t\n\x07payload\"%\n\x15GetDownloadUrlRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x81\x01\n\x16GetDownloadUrlResponse\x12)\n\x08\x61rtifact\x18\x01 \x01(\x0b\x32\x17.guardsplat.v1.Artifact\x12\x0b\n\x03url\x18\x02 \x01(\t\x12/\n\x0b\x65xpire_time\x18\x03 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\"\"\n\x12GetArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"%\n\x15\x44\x65leteArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t2\xe8\x04\n\x0f\x41rtifactService\x12Q\n\x0eUploadArtifact\x12$.guardsplat.v1.UploadArtifactRequest\x1a\x17.guardsplat.v1.Artifact(\x01\x12T\n\x0bStartUpload\x12!.guardsplat.v1.StartUploadRequest\x1a\".guardsplat.v1.StartUploadResponse\x12K\n\x0c\x46inishUpload\x12\".guardsplat.v1.FinishUploadRequest\x1a\x17.guardsplat.v1.Artifact\x12\x65\n\x10\x44ownloadArtifact\x12&.guardsplat.v1.DownloadArtifactRequest\x1a\'.guardsplat.v1.DownloadArtifactResponse0\x01\x12]\n\x0eGetDownloadUrl\x12$.guardsplat.v1.GetDownloadUrlRequest\x1a%.guardsplat.v1.GetDownloadUrlResponse\x12I\n\x0bGetArtifact\x12!.guardsplat.v1.GetArtifactRequest\x1a\x17.guardsplat.v1.Artifact\x12N\n\x0e\x44\x65leteArtifact\x12$.guardsplat.v1.DeleteArtifactRequest\x1a\x16.google.protobuf.Emptyb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$guardsplat/v1/artifact_service.proto\x12\rguardsplat.v1\x1a\x1bgoogle/protobuf/empty.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x01\n\x08\x41rtifact\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0c\x64isplay_name\x18\x02 \x01(\t\x12\x12\n\nsize_bytes\x18\x03 \x01(\x03\x12\x0e\n\x06sha256\x18\x04 \x01(\t\x12/\n\x0b\x63reate_time\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03job\x18\x06 \x01(\t\"f\n\x15UploadArtifactRequest\x12\x31\n\x08metadata\x18\x01 \x01(\x0b\x32\x1d.guardsplat.v1.UploadMetadataH\x00\x12\x0f\n\x05\x63hunk\x18\x02 \x01(\x0cH\x00\x42\t\n\x07payload\"J\n\x0eUploadMetadata\x12\x14\n\x0c\x64isplay_name\x18\x01 \x01(\t\x12\x12\n\nsize_bytes\x18\x02 \x01(\x03\x12\x0e\n\x06sha256\x18\x03 \x01(\t\"W\n\x12StartUploadRequest\x12/\n\x08metadata\x18\x01 \x01(\x0b\x32\x1d.guardsplat.v1.UploadMetadata\x12\x10\n\x08in_parts\x18\x02 \x01(\x08\"\x8f\x01\n\x13StartUploadResponse\x12\x0e\n\x06upload\x18\x01 \x01(\t\x12\x0b\n\x03url\x18\x02 \x01(\t\x12*\n\x07headers\x18\x03 \x03(\x0b\x32\x19.guardsplat.v1.HttpHeader\x12/\n\x0b\x65xpire_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\")\n\nHttpHeader\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\t\"D\n\x13\x41ppendUploadRequest\x12\x0e\n\x06upload\x18\x01 \x01(\t\x12\x0e\n\x06offset\x18\x02 \x01(\x03\x12\r\n\x05\x63hunk\x18\x03 \x01(\x0c\".\n\x14\x41ppendUploadResponse\x12\x16\n\x0ereceived_bytes\x18\x01 \x01(\x03\"%\n\x13\x46inishUploadRequest\x12\x0e\n\x06upload\x18\x01 \x01(\t\"7\n\x17\x44ownloadArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0e\n\x06offset\x18\x02 \x01(\x03\"c\n\x18\x44ownloadArtifactResponse\x12+\n\x08\x61rtifact\x18\x01 \x01(\x0b\x32\x17.guardsplat.v1.ArtifactH\x00\x12\x0f\n\x05\x63hunk\x18\x02 \x01(\x0cH\x00\x42\t\n\x07payload\"%\n\x15GetDownloadUrlRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x81\x01\n\x16GetDownloadUrlResponse\x12)\n\x08\x61rtifact\x18\x01 \x01(\x0b\x32\x17.guardsplat.v1.Artifact\x12\x0b\n\x03url\x18\x02 \x01(\t\x12/\n\x0b\x65xpire_time\x18\x03 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\"\"\n\x12GetArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"%\n\x15\x44\x65leteArtifactRequest\x12\x0c\n\x04name\x18\x01 \x01(\t2\xc1\x05\n\x0f\x41rtifactService\x12Q\n\x0eUploadArtifact\x12$.guardsplat.v1.UploadArtifactRequest\x1a\x17.guardsplat.v1.Artifact(\x01\x12T\n\x0bStartUpload\x12!.guardsplat.v1.StartUploadRequest\x1a\".guardsplat.v1.StartUploadResponse\x12W\n\x0c\x41ppendUpload\x12\".guardsplat.v1.AppendUploadRequest\x1a#.guardsplat.v1.AppendUploadResponse\x12K\n\x0c\x46inishUpload\x12\".guardsplat.v1.FinishUploadRequest\x1a\x17.guardsplat.v1.Artifact\x12\x65\n\x10\x44ownloadArtifact\x12&.guardsplat.v1.DownloadArtifactRequest\x1a\'.guardsplat.v1.DownloadArtifactResponse0\x01\x12]\n\x0eGetDownloadUrl\x12$.guardsplat.v1.GetDownloadUrlRequest\x1a%.guardsplat.v1.GetDownloadUrlResponse\x12I\n\x0bGetArtifact\x12!.guardsplat.v1.GetArtifactRequest\x1a\x17.guardsplat.v1.Artifact\x12N\n\x0e\x44\x65leteArtifact\x12$.guardsplat.v1.DeleteArtifactRequest\x1a\x16.google.protobuf.Emptyb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -40,25 +40,29 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_UPLOADMETADATA']._serialized_start=368
   _globals['_UPLOADMETADATA']._serialized_end=442
   _globals['_STARTUPLOADREQUEST']._serialized_start=444
-  _globals['_STARTUPLOADREQUEST']._serialized_end=513
-  _globals['_STARTUPLOADRESPONSE']._serialized_start=516
-  _globals['_STARTUPLOADRESPONSE']._serialized_end=659
-  _globals['_HTTPHEADER']._serialized_start=661
-  _globals['_HTTPHEADER']._serialized_end=702
-  _globals['_FINISHUPLOADREQUEST']._serialized_start=704
-  _globals['_FINISHUPLOADREQUEST']._serialized_end=741
-  _globals['_DOWNLOADARTIFACTREQUEST']._serialized_start=743
-  _globals['_DOWNLOADARTIFACTREQUEST']._serialized_end=798
-  _globals['_DOWNLOADARTIFACTRESPONSE']._serialized_start=800
-  _globals['_DOWNLOADARTIFACTRESPONSE']._serialized_end=899
-  _globals['_GETDOWNLOADURLREQUEST']._serialized_start=901
-  _globals['_GETDOWNLOADURLREQUEST']._serialized_end=938
-  _globals['_GETDOWNLOADURLRESPONSE']._serialized_start=941
-  _globals['_GETDOWNLOADURLRESPONSE']._serialized_end=1070
-  _globals['_GETARTIFACTREQUEST']._serialized_start=1072
-  _globals['_GETARTIFACTREQUEST']._serialized_end=1106
-  _globals['_DELETEARTIFACTREQUEST']._serialized_start=1108
-  _globals['_DELETEARTIFACTREQUEST']._serialized_end=1145
-  _globals['_ARTIFACTSERVICE']._serialized_start=1148
-  _globals['_ARTIFACTSERVICE']._serialized_end=1764
+  _globals['_STARTUPLOADREQUEST']._serialized_end=531
+  _globals['_STARTUPLOADRESPONSE']._serialized_start=534
+  _globals['_STARTUPLOADRESPONSE']._serialized_end=677
+  _globals['_HTTPHEADER']._serialized_start=679
+  _globals['_HTTPHEADER']._serialized_end=720
+  _globals['_APPENDUPLOADREQUEST']._serialized_start=722
+  _globals['_APPENDUPLOADREQUEST']._serialized_end=790
+  _globals['_APPENDUPLOADRESPONSE']._serialized_start=792
+  _globals['_APPENDUPLOADRESPONSE']._serialized_end=838
+  _globals['_FINISHUPLOADREQUEST']._serialized_start=840
+  _globals['_FINISHUPLOADREQUEST']._serialized_end=877
+  _globals['_DOWNLOADARTIFACTREQUEST']._serialized_start=879
+  _globals['_DOWNLOADARTIFACTREQUEST']._serialized_end=934
+  _globals['_DOWNLOADARTIFACTRESPONSE']._serialized_start=936
+  _globals['_DOWNLOADARTIFACTRESPONSE']._serialized_end=1035
+  _globals['_GETDOWNLOADURLREQUEST']._serialized_start=1037
+  _globals['_GETDOWNLOADURLREQUEST']._serialized_end=1074
+  _globals['_GETDOWNLOADURLRESPONSE']._serialized_start=1077
+  _globals['_GETDOWNLOADURLRESPONSE']._serialized_end=1206
+  _globals['_GETARTIFACTREQUEST']._serialized_start=1208
+  _globals['_GETARTIFACTREQUEST']._serialized_end=1242
+  _globals['_DELETEARTIFACTREQUEST']._serialized_start=1244
+  _globals['_DELETEARTIFACTREQUEST']._serialized_end=1281
+  _globals['_ARTIFACTSERVICE']._serialized_start=1284
+  _globals['_ARTIFACTSERVICE']._serialized_end=1989
 # @@protoc_insertion_point(module_scope)

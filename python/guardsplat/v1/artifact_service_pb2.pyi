@@ -45,10 +45,12 @@ class UploadMetadata(_message.Message):
     def __init__(self, display_name: _Optional[str] = ..., size_bytes: _Optional[int] = ..., sha256: _Optional[str] = ...) -> None: ...
 
 class StartUploadRequest(_message.Message):
-    __slots__ = ("metadata",)
+    __slots__ = ("metadata", "in_parts")
     METADATA_FIELD_NUMBER: _ClassVar[int]
+    IN_PARTS_FIELD_NUMBER: _ClassVar[int]
     metadata: UploadMetadata
-    def __init__(self, metadata: _Optional[_Union[UploadMetadata, _Mapping]] = ...) -> None: ...
+    in_parts: bool
+    def __init__(self, metadata: _Optional[_Union[UploadMetadata, _Mapping]] = ..., in_parts: bool = ...) -> None: ...
 
 class StartUploadResponse(_message.Message):
     __slots__ = ("upload", "url", "headers", "expire_time")
@@ -69,6 +71,22 @@ class HttpHeader(_message.Message):
     name: str
     value: str
     def __init__(self, name: _Optional[str] = ..., value: _Optional[str] = ...) -> None: ...
+
+class AppendUploadRequest(_message.Message):
+    __slots__ = ("upload", "offset", "chunk")
+    UPLOAD_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    CHUNK_FIELD_NUMBER: _ClassVar[int]
+    upload: str
+    offset: int
+    chunk: bytes
+    def __init__(self, upload: _Optional[str] = ..., offset: _Optional[int] = ..., chunk: _Optional[bytes] = ...) -> None: ...
+
+class AppendUploadResponse(_message.Message):
+    __slots__ = ("received_bytes",)
+    RECEIVED_BYTES_FIELD_NUMBER: _ClassVar[int]
+    received_bytes: int
+    def __init__(self, received_bytes: _Optional[int] = ...) -> None: ...
 
 class FinishUploadRequest(_message.Message):
     __slots__ = ("upload",)

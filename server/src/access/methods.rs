@@ -37,6 +37,7 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.JobService/ListJobAttempts", LOOK),
     ("/guardsplat.v1.ArtifactService/UploadArtifact", WORK),
     ("/guardsplat.v1.ArtifactService/StartUpload", WORK),
+    ("/guardsplat.v1.ArtifactService/AppendUpload", WORK),
     ("/guardsplat.v1.ArtifactService/FinishUpload", WORK),
     ("/guardsplat.v1.ArtifactService/DownloadArtifact", READ),
     ("/guardsplat.v1.ArtifactService/GetDownloadUrl", READ),

@@ -2,9 +2,9 @@
 use futures::stream::{BoxStream, StreamExt};
 use guardsplat_proto::v1::artifact_service_server::ArtifactService;
 use guardsplat_proto::v1::{
-    Artifact, DeleteArtifactRequest, DownloadArtifactRequest, DownloadArtifactResponse, FinishUploadRequest,
-    GetArtifactRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, StartUploadRequest, StartUploadResponse,
-    UploadArtifactRequest,
+    AppendUploadRequest, AppendUploadResponse, Artifact, DeleteArtifactRequest, DownloadArtifactRequest,
+    DownloadArtifactResponse, FinishUploadRequest, GetArtifactRequest, GetDownloadUrlRequest, GetDownloadUrlResponse,
+    StartUploadRequest, StartUploadResponse, UploadArtifactRequest,
 };
 use tonic::{Request, Response, Status, Streaming};
 use uuid::Uuid;
@@ -41,15 +41,28 @@ impl ArtifactService for Service {
         request: Request<StartUploadRequest>,
     ) -> Result<Response<StartUploadResponse>, Status> {
         let project = caller(&request)?.project;
-        let metadata = request.into_inner().metadata;
-        Ok(Response::new(self.start(&project, metadata).await?))
+        let StartUploadRequest { metadata, in_parts } = request.into_inner();
+        Ok(Response::new(self.start(&project, metadata, in_parts).await?))
+    }
+
+    async fn append_upload(
+        &self,
+        request: Request<AppendUploadRequest>,
+    ) -> Result<Response<AppendUploadResponse>, Status> {
+        let caller = caller(&request)?;
+        let AppendUploadRequest { upload, offset, chunk } = request.into_inner();
+        let offset = u64::try_from(offset).map_err(|_| Error::invalid("offset", "is negative"))?;
+        let permit = || self.transfer(&caller);
+        let received = self.append(&caller.project, &upload, offset, chunk, permit).await?;
+        // No artifact is longer than a terabyte.
+        let received_bytes = i64::try_from(received).unwrap_or(i64::MAX);
+        Ok(Response::new(AppendUploadResponse { received_bytes }))
     }
 
     async fn finish_upload(&self, request: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
         let caller = caller(&request)?;
-        let _permit = self.transfer(&caller)?;
-        let project = caller.project;
-        let finished = async { Ok(self.finish(&project, &request.get_ref().upload).await?) };
+        let permit = || self.transfer(&caller);
+        let finished = async { Ok(self.finish(&caller.project, &request.get_ref().upload, permit).await?) };
         let (row, new) = self.within_upload_time(finished).await?;
         if new {
             self.metrics().uploaded(false, row.size);

@@ -1,4 +1,5 @@
 //! The listener: takes connections, and calls that come by them, until somebody says stop.
+use std::convert::Infallible;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,12 +9,15 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep};
+use tonic::body::Body;
+use tonic::codegen::http::{Request, Response};
 use tonic::service::Routes;
-use tower::Layer;
 use tower::limit::ConcurrencyLimit;
+use tower::{Layer, Service};
 
 use crate::error::Result;
 use crate::grpc::around::Around;
+pub use crate::grpc::connection::Protocol;
 use crate::grpc::connection::{self, CALLS_AT_ONCE, Manner};
 pub use crate::grpc::connections::ConnectionLimits;
 use crate::grpc::connections::Connections;
@@ -21,6 +25,7 @@ use crate::grpc::deadline::Deadlines;
 use crate::grpc::guard::Guard;
 use crate::grpc::metrics_layer::MetricsLayer;
 use crate::grpc::transport_errors::ErrorDetailsLayer;
+use crate::page::PageLayer;
 
 /// TLS and the preface of HTTP/2 may take so long, unless something else is asked for.
 pub const HANDSHAKE: Duration = Duration::from_secs(10);
@@ -35,6 +40,8 @@ pub struct ListenerOptions {
     pub guard: Guard,
     /// TLS, if that is spoken; then nothing else is.
     pub tls: Option<Arc<ServerConfig>>,
+    /// What is spoken.
+    pub protocol: Protocol,
     /// How many connections there may be.
     pub connections: ConnectionLimits,
     /// How long TLS and the preface of HTTP/2 may take.
@@ -57,7 +64,26 @@ pub async fn serve(
     let service = door.guard.layer(routes.prepare());
     let service = Around(ErrorDetailsLayer).layer(Around(Deadlines).layer(service));
     let service = door.measured.layer(service);
+    match door.protocol {
+        Protocol::Grpc => accept(connections, service, door, listener, shutdown).await,
+        Protocol::Page => accept(connections, PageLayer::new().layer(service), door, listener, shutdown).await,
+    }
+    Ok(())
+}
+
+/// Takes connections until `shutdown`, then waits for those that have begun.
+async fn accept<S>(
+    connections: Arc<Connections>,
+    service: S,
+    door: ListenerOptions,
+    listener: TcpListener,
+    shutdown: impl Future<Output = ()>,
+) where
+    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible> + Clone + Send + 'static,
+    S::Future: Send,
+{
     let manner = Manner {
+        protocol: door.protocol,
         tls: door.tls,
         handshake: door.handshake,
         idle: door.idle,
@@ -99,7 +125,6 @@ pub async fn serve(
     drop(listener);
     let _ = stop.send(());
     while held.join_next().await.is_some() {}
-    Ok(())
 }
 
 /// The next connection, and where it comes from.

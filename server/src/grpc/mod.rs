@@ -33,7 +33,7 @@ mod registry;
 mod slow_consumer;
 mod status;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod token_memory;
 mod tokens;
 mod transport_errors;

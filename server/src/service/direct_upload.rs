@@ -1,4 +1,5 @@
-//! `StartUpload` and `FinishUpload`: uploads whose bytes go to the store without the server.
+//! `StartUpload` and `FinishUpload`: uploads whose bytes go to the store without the server. Those that come in parts begin
+//! and end here too (`upload_parts`).
 //!
 //! All that is known of one before it is finished is sealed in its name. Where a project may have so many bytes only, those
 //! that were announced are reserved until there is an artifact, or nothing more can come of it. The bytes lie where the
@@ -17,6 +18,7 @@ use uuid::Uuid;
 use crate::artifacts::{Announced, ArtifactPath, Check, StoreError};
 use crate::error::{Error, Result, chain};
 use crate::ledger::{ArtifactRow, NewArtifact, Origin, UploadReservation};
+use crate::service::concurrency_limit::Permit;
 use crate::service::{Service, clock, upload};
 
 /// What names of uploads begin with.
@@ -33,18 +35,36 @@ pub(crate) struct PendingUpload {
     #[prost(bytes = "vec", tag = "1")]
     id: Vec<u8>,
     #[prost(int64, tag = "2")]
-    start_time: i64,
+    pub(super) start_time: i64,
     #[prost(message, required, tag = "3")]
-    metadata: UploadMetadata,
+    pub(super) metadata: UploadMetadata,
+    /// Whether the bytes come through the server, by `AppendUpload`.
+    #[prost(bool, tag = "4")]
+    pub(super) in_parts: bool,
+}
+
+impl PendingUpload {
+    /// Bytes that were announced.
+    pub(super) fn size(&self) -> u64 {
+        u64::try_from(self.metadata.size_bytes).unwrap_or_default()
+    }
 }
 
 impl Service {
     /// An address to send to, where the server is to give any and the store has some.
-    pub(crate) async fn start(&self, project: &str, metadata: Option<UploadMetadata>) -> Result<StartUploadResponse> {
+    pub(crate) async fn start(
+        &self,
+        project: &str,
+        metadata: Option<UploadMetadata>,
+        in_parts: bool,
+    ) -> Result<StartUploadResponse> {
         let metadata = metadata.ok_or_else(|| Error::invalid("metadata", "is missing"))?;
         let announced = upload::announced("metadata", &metadata)?;
         Check::new(announced, self.store().max_bytes())?;
         self.room_for_bytes(project, announced.size).await?;
+        if in_parts {
+            return self.start_in_parts(project, metadata).await;
+        }
         let Some(lifetime) = self.limits().signed_url else {
             return Ok(StartUploadResponse::default());
         };
@@ -63,7 +83,7 @@ impl Service {
             project: project.to_owned(),
             size: metadata.size_bytes,
             address_end: now.saturating_add(clock::micros(lifetime)),
-            end_time: now.saturating_add(clock::micros(self.limits().abandoned_after + LAST_COPY)),
+            end_time: self.end_of_reservation(now),
         })
         .await?;
         let headers = address.headers.iter().map(|&(name, value)| HttpHeader {
@@ -71,24 +91,31 @@ impl Service {
             value: value.to_owned(),
         });
         Ok(StartUploadResponse {
-            upload: self.name_of_upload(project, id, now, metadata)?,
+            upload: self.name_of_upload(project, id, now, metadata, false)?,
             url: address.url,
             headers: headers.collect(),
             expire_time: Some(clock::timestamp(now.saturating_add(clock::micros(lifetime)))),
         })
     }
 
-    /// The artifact that was sent to an address, and whether it is new.
-    pub(crate) async fn finish(&self, project: &str, name: &str) -> Result<(ArtifactRow, bool)> {
+    /// The artifact that was sent to an address or in parts, and whether it is new. `permit` is asked for where bytes have
+    /// to be moved; an upload in parts has one already.
+    pub(crate) async fn finish(
+        &self,
+        project: &str,
+        name: &str,
+        permit: impl FnOnce() -> Result<Option<Permit>>,
+    ) -> Result<(ArtifactRow, bool)> {
         let (id, begun) = self.begun_upload(project, name)?;
+        if begun.in_parts {
+            return self.finish_in_parts(project, id, begun).await;
+        }
+        let _permit = permit()?;
         if let Some(row) = self.finished(id).await? {
             self.remove_staged(id).await;
             return Ok((row, false));
         }
-        let longest = self.limits().abandoned_after;
-        if clock::now() >= begun.start_time.saturating_add(clock::micros(longest)) {
-            return Err(Error::UploadTooSlow(longest));
-        }
+        self.in_time(&begun)?;
         match self.take(project, id, begun.metadata).await {
             Ok(row) => {
                 self.remove_staged(id).await;
@@ -111,12 +138,26 @@ impl Service {
     }
 
     /// The artifact, if there is a row of it.
-    async fn finished(&self, id: Uuid) -> Result<Option<ArtifactRow>> {
+    pub(super) async fn finished(&self, id: Uuid) -> Result<Option<ArtifactRow>> {
         match self.ledger().get_any_artifact(id).await? {
             // As good as published, whatever kept whoever made it from saying so. One that was deleted does not exist.
             Some(_) => Ok(Some(self.ledger().artifact_ready(id, None, clock::now()).await?)),
             None => Ok(None),
         }
+    }
+
+    /// Refuses an upload that was begun too long ago.
+    pub(super) fn in_time(&self, begun: &PendingUpload) -> Result<()> {
+        let longest = self.limits().abandoned_after;
+        match clock::now() >= begun.start_time.saturating_add(clock::micros(longest)) {
+            true => Err(Error::UploadTooSlow(longest)),
+            false => Ok(()),
+        }
+    }
+
+    /// When bytes that were reserved `now` are given back, if there is no artifact.
+    pub(super) fn end_of_reservation(&self, now: i64) -> i64 {
+        now.saturating_add(clock::micros(self.limits().abandoned_after + LAST_COPY))
     }
 
     async fn take(&self, project: &str, id: Uuid, metadata: UploadMetadata) -> Result<ArtifactRow> {
@@ -130,6 +171,19 @@ impl Service {
             .take(&ArtifactPath::staged(id), path.clone(), announced)
             .await;
         let taken = taken.map_err(|error| told(error, announced))?;
+        // From here on a row may point at it, whatever becomes of this call; if none does it is collected as an orphan.
+        taken.keep();
+        self.publish(project, id, metadata, path).await
+    }
+
+    /// Makes the artifact of bytes that lie at `path` and are right.
+    pub(super) async fn publish(
+        &self,
+        project: &str,
+        id: Uuid,
+        metadata: UploadMetadata,
+        path: ArtifactPath,
+    ) -> Result<ArtifactRow> {
         let new = NewArtifact {
             id,
             display_name: metadata.display_name,
@@ -142,8 +196,6 @@ impl Service {
             evidence: false,
             path: path.to_string(),
         };
-        // From here on a row may point at it, whatever becomes of this call; if none does it is collected as an orphan.
-        taken.keep();
         if let Err(error) = self.ledger().create_artifact(new, clock::now()).await {
             // Its answer may have been lost, and the same call may have come first.
             let Some(row) = self.ledger().get_any_artifact(id).await? else {
@@ -174,18 +226,20 @@ impl Service {
         id: Uuid,
         start_time: i64,
         metadata: UploadMetadata,
+        in_parts: bool,
     ) -> Result<String> {
         let begun = PendingUpload {
             id: id.as_bytes().to_vec(),
             start_time,
             metadata,
+            in_parts,
         };
         let sealed = self.master().seal(&context(project), &begun.encode_to_vec());
         let sealed = sealed.map_err(|error| Error::internal("naming an upload", error))?;
         Ok(format!("{COLLECTION}{}", URL_SAFE_NO_PAD.encode(sealed)))
     }
 
-    fn begun_upload(&self, project: &str, name: &str) -> Result<(Uuid, PendingUpload)> {
+    pub(super) fn begun_upload(&self, project: &str, name: &str) -> Result<(Uuid, PendingUpload)> {
         let sealed = name.strip_prefix(COLLECTION).filter(|_| name.len() <= MAX_NAME_BYTES);
         let sealed = sealed.ok_or_else(|| Error::invalid("upload", "must be a name that StartUpload gave"))?;
         let open = || {

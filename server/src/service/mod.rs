@@ -48,6 +48,7 @@ pub(crate) mod submission;
 pub mod text;
 pub(crate) mod to_proto;
 pub(crate) mod upload;
+pub(crate) mod upload_parts;
 pub(crate) mod violations;
 pub mod worker_presence;
 
@@ -156,6 +157,7 @@ struct Shared {
     summaries: scene_summaries::SceneSummaries,
     watches: Arc<concurrency_limit::ConcurrencyLimit>,
     transfers: Arc<concurrency_limit::ConcurrencyLimit>,
+    arriving: upload_parts::ArrivingUploads,
 }
 
 impl Service {
@@ -187,6 +189,7 @@ impl Service {
             summaries: scene_summaries::SceneSummaries::default(),
             watches: Arc::default(),
             transfers: Arc::default(),
+            arriving: upload_parts::ArrivingUploads::default(),
         };
         Self {
             shared: Arc::new(shared),
@@ -269,6 +272,10 @@ impl Service {
 
     pub(crate) fn watch_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {
         &self.shared.watches
+    }
+
+    pub(crate) fn arriving(&self) -> &upload_parts::ArrivingUploads {
+        &self.shared.arriving
     }
 
     pub(crate) fn transfer_limit(&self) -> &Arc<concurrency_limit::ConcurrencyLimit> {

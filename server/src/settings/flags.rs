@@ -36,6 +36,9 @@ pub struct Flags {
     /// Address and port of /metrics, /livez and /readyz, over plain HTTP [default: none]
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics_listen: Option<SocketAddr>,
+    /// Address and port of the page for browsers, which needs --access tokens [default: none]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub page_listen: Option<SocketAddr>,
     /// Who may call: anybody, or whoever shows a token [default: open]
     #[arg(long, value_name = "WHO")]
     pub access: Option<Access>,
@@ -193,6 +196,7 @@ impl Flags {
             config: _,
             listen,
             metrics_listen,
+            page_listen,
             access,
             allow_open_network,
             allow_raw_verification,
@@ -244,6 +248,7 @@ impl Flags {
         } = self;
         set(&mut settings.listen, listen);
         set(&mut settings.metrics_listen, metrics_listen.map(Some));
+        set(&mut settings.page_listen, page_listen.map(Some));
         set(&mut settings.access, access);
         set(&mut settings.allow_open_network, allow_open_network);
         set(&mut settings.allow_raw_verification, allow_raw_verification);

@@ -101,6 +101,7 @@ impl Settings {
             });
         }
         self.check_reach()?;
+        self.check_page()?;
         self.check_tls()?;
         not_empty("data_dir", &self.data_dir)?;
         for (field, path) in [
@@ -162,6 +163,18 @@ impl Settings {
                 self.listen
             ),
         })
+    }
+
+    /// Refuses a page that asks for no token: browsers carry out what any web page has them do, also to addresses of the
+    /// machine they run on.
+    fn check_page(&self) -> Result<(), SettingsError> {
+        match (self.page_listen, self.access) {
+            (Some(_), Access::Open) => Err(SettingsError::Invalid {
+                field: "page_listen",
+                reason: "the page is for callers with tokens; set access = \"tokens\"".into(),
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Refuses half of what TLS needs.

@@ -27,6 +27,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// Where metrics and readiness are told, over plain HTTP; nowhere where none is named.
     pub metrics_listen: Option<SocketAddr>,
+    /// Where the page is for browsers; nowhere where none is named.
+    pub page_listen: Option<SocketAddr>,
     /// Who may call.
     pub access: Access,
     /// Whether other machines may reach a server that asks nobody for a token.
@@ -177,6 +179,7 @@ impl Default for Settings {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)),
             metrics_listen: None,
+            page_listen: None,
             access: Access::Open,
             allow_open_network: false,
             allow_raw_verification: false,

@@ -65,6 +65,7 @@ fn every_setting_can_be_set_everywhere() {
     let values = [
         ("listen", "[::1]:7000"),
         ("metrics_listen", "127.0.0.1:9464"),
+        ("page_listen", "127.0.0.1:8080"),
         ("access", "tokens"),
         ("allow_open_network", "true"),
         ("allow_raw_verification", "true"),
@@ -131,8 +132,9 @@ fn every_setting_can_be_set_everywhere() {
     for (name, value) in values {
         let variable = format!("GUARDSPLAT_{}", name.to_uppercase());
         let flag = format!("--{}", name.replace('_', "-"));
-        // Those of TLS go together.
+        // Those of TLS go together, and the page goes with tokens.
         let besides = match name {
+            "page_listen" => "access = \"tokens\"\n",
             "tls_certificate" => "tls_key = \"/k.pem\"\n",
             "tls_key" => "tls_certificate = \"/c.pem\"\n",
             "tls_client_ca" => "tls_key = \"/k.pem\"\ntls_certificate = \"/c.pem\"\n",
@@ -175,7 +177,9 @@ fn the_documented_file_equals_the_defaults() {
         .filter_map(|line| line.strip_prefix("# "))
         .filter(|line| line.contains(" = "))
         .fold(String::new(), |all, line| all + line + "\n");
-    layers(&examples, &[], &[]).unwrap();
+    // The page is for callers with tokens.
+    assert!(error(&examples, &[], &[]).starts_with("setting page_listen: "));
+    layers(&examples, &[], &["--access", "tokens"]).unwrap();
     assert_eq!(as_json(&parse(&text).unwrap()), defaults);
     assert!(parse("lease_seconds = 0").is_err());
 }

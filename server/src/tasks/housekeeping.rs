@@ -91,6 +91,7 @@ async fn delete(api: &Service) {
     let mut searched = Instant::now();
     loop {
         ticks.tick().await;
+        api.end_paused_uploads();
         if expired.is_none_or(|at| at.elapsed() >= expire_every) {
             expired = Some(Instant::now());
             if let Err(error) = api.expire().await {

@@ -1,11 +1,19 @@
 //! TLS and certificates of clients, against a real server, through what clients and workers connect with.
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use guardsplat_proto::connect::{Target, Token};
 use guardsplat_proto::v1::ListJobsRequest;
 use guardsplat_proto::v1::job_service_client::JobServiceClient;
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use rustls::crypto::ring;
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, ServerName};
+use rustls::{ClientConfig, RootCertStore};
 use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio_rustls::TlsConnector;
 use tonic::{Code, Status};
 
 use super::support::{Bench, until};
@@ -178,4 +186,42 @@ async fn the_own_worker_has_a_door_of_its_own() {
         assert_eq!(list(&target(stranger)).await.unwrap_err().code(), Code::Unauthenticated);
     }
     assert_eq!(server.stop().await.code(), Some(0));
+}
+
+#[tokio::test]
+async fn browsers_are_shown_the_same_certificate() {
+    let ours = Authority::new();
+    let mut bench = Bench::new();
+    serve_tls(&mut bench, &ours, None);
+    bench.variable("GUARDSPLAT_ACCESS", "tokens");
+    // Nothing listens for them by itself.
+    let server = bench.start().await;
+    assert!(!bench.server_log().contains("the page is at"));
+    drop(server);
+    bench.variable("GUARDSPLAT_PAGE_LISTEN", "127.0.0.1:0");
+    let _server = bench.start().await;
+    let log = bench.server_log();
+    let (_, rest) = log.split_once("the page is at https://").expect("the log says where");
+    let stream = TcpStream::connect(rest.split('/').next().unwrap()).await.unwrap();
+
+    let mut roots = RootCertStore::empty();
+    roots.add(CertificateDer::from_pem_file(ours.ca()).unwrap()).unwrap();
+    let config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .unwrap();
+    let mut config = config.with_root_certificates(roots).with_no_client_auth();
+    config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
+    let name = ServerName::try_from("localhost").unwrap();
+    let connected = TlsConnector::from(Arc::new(config)).connect(name, stream).await;
+    let mut stream = connected.unwrap();
+    assert_eq!(stream.get_ref().1.alpn_protocol(), Some(&b"http/1.1"[..]));
+    let request = "GET / HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
+    stream.write_all(request.as_bytes()).await.unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
+    assert!(
+        answer.contains("content-security-policy: default-src 'none';"),
+        "{answer}"
+    );
 }

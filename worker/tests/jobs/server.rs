@@ -243,6 +243,10 @@ impl ArtifactService for Service {
         Err(Status::unimplemented("not for workers"))
     }
 
+    async fn append_upload(&self, _: Request<AppendUploadRequest>) -> Result<Response<AppendUploadResponse>, Status> {
+        Err(Status::unimplemented("not for workers"))
+    }
+
     async fn finish_upload(&self, _: Request<FinishUploadRequest>) -> Result<Response<Artifact>, Status> {
         Err(Status::unimplemented("not for workers"))
     }

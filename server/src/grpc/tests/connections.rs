@@ -11,7 +11,7 @@ use tonic::transport::Channel;
 
 use super::harness::{Server, key_spec};
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{ConnectionLimits, ListenerOptions, serve};
+use crate::grpc::listener::{ConnectionLimits, ListenerOptions, Protocol, serve};
 
 const SHORT: Duration = Duration::from_millis(200);
 const LONG: Duration = Duration::from_secs(3600);
@@ -27,6 +27,7 @@ async fn door(server: &Server, total: usize, handshake: Duration, idle: Option<D
     let options = ListenerOptions {
         guard: Guard::open(server.api.meter()),
         tls: None,
+        protocol: Protocol::Grpc,
         connections: ConnectionLimits {
             total,
             of_one_address: total,

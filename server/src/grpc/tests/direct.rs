@@ -32,6 +32,7 @@ fn limits() -> Limits {
 async fn start(server: &Server, metadata: UploadMetadata) -> Result<StartUploadResponse, Status> {
     let request = StartUploadRequest {
         metadata: Some(metadata),
+        in_parts: false,
     };
     Ok(server.artifacts.clone().start_upload(request).await?.into_inner())
 }
@@ -257,7 +258,7 @@ async fn what_nobody_finishes_is_collected() {
         let time = clock::now() - clock::micros(before);
         let name = server
             .api
-            .name_of_upload(DEFAULT_PROJECT, id, time, metadata("a.ply", b"left"));
+            .name_of_upload(DEFAULT_PROJECT, id, time, metadata("a.ply", b"left"), false);
         let path = object(ArtifactPath::staged(id));
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, b"left").unwrap();

@@ -29,7 +29,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use crate::access::{self, Scope};
 use crate::artifacts::ArtifactStore;
 use crate::grpc::guard::Guard;
-use crate::grpc::listener::{ConnectionLimits, HANDSHAKE, ListenerOptions, serve};
+use crate::grpc::listener::{ConnectionLimits, HANDSHAKE, ListenerOptions, Protocol, serve};
 use crate::ledger::{Ledger, NewToken, SqliteLedger};
 use crate::notary::Notary;
 use crate::secrets::{self, KeySource};
@@ -133,6 +133,7 @@ impl Server {
         let door = ListenerOptions {
             guard,
             tls: None,
+            protocol: Protocol::Grpc,
             connections: ConnectionLimits::default(),
             handshake: HANDSHAKE,
             idle: None,

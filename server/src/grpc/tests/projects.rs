@@ -97,7 +97,7 @@ impl Project {
         let id: uuid::Uuid = token.split('_').nth(1).unwrap().parse().unwrap();
         let begun = server
             .api
-            .name_of_upload(name, id, clock::now(), metadata("a.ply", SCENE));
+            .name_of_upload(name, id, clock::now(), metadata("a.ply", SCENE), false);
         Self {
             upload: begun.unwrap(),
             artifact,
@@ -238,6 +238,13 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
         "ListJobs" => Own(Vec::new(), own.job.clone()),
+        "AppendUpload" => {
+            let request = AppendUploadRequest {
+                upload: other.upload.clone(),
+                ..AppendUploadRequest::default()
+            };
+            one(request.encode_to_vec(), &other.upload)
+        }
         "FinishUpload" => {
             let request = FinishUploadRequest {
                 upload: other.upload.clone(),

@@ -1,0 +1,104 @@
+// Jobs of the project: the queue, which workers have what, and what failed and why.
+import { Outcome, State } from "./vendor/api.js";
+import { jobs, patiently, SOON } from "./calls.js";
+import { alertIn, announce, by, element, moment } from "./elements.js";
+import { explain } from "./errors.js";
+import { isOver, standing } from "./jobs.js";
+
+const STATES = { open: [State.QUEUED, State.RUNNING], failed: [State.FAILED], all: [] };
+const KINDS = { embed: "Marking", verify: "Verifying", createKey: "Making a key" };
+const PAGE = 25;
+
+let next = "";
+
+function act(text, does) {
+    const button = element("button", { type: "button", className: "second" }, text);
+    button.addEventListener("click", async () => {
+        button.disabled = true;
+        alertIn(by("jobs-alert"), null);
+        try {
+            await does();
+        } catch (error) {
+            alertIn(by("jobs-alert"), explain(error));
+        }
+        button.disabled = false;
+    });
+    return button;
+}
+
+/** Who had a job, and how that ended. */
+async function attempts(job, box) {
+    const answer = await patiently(() => jobs.listJobAttempts({ name: job.name }, { timeoutMs: SOON }));
+    const ends = {
+        [Outcome.SUCCEEDED]: "succeeded",
+        [Outcome.CANCELLED]: "was cancelled",
+        [Outcome.RELEASED]: "was handed back",
+    };
+    const texts = answer.attempts.map(({ number, worker, startTime, outcome, failure }) => {
+        const end = outcome === Outcome.FAILED ? `failed: ${failure?.message ?? ""}` : (ends[outcome] ?? "has it now");
+        return `Attempt ${number}, ${moment(startTime)}, worker ${worker}: ${end}`;
+    });
+    if (texts.length === 0) texts.push("No worker was given it yet.");
+    box.replaceChildren(...texts.map((text) => element("li", {}, text)));
+}
+
+function item(job) {
+    const kind = KINDS[job.spec.case] ?? "Job";
+    const list = element("ul");
+    const row = element("div", { className: "row" }, act("Attempts", () => attempts(job, list)));
+    if (!isOver(job)) {
+        row.append(act("Cancel", async () => {
+            await jobs.cancelJob({ name: job.name }, { timeoutMs: SOON });
+            await open();
+        }));
+    }
+    if (job.state === State.FAILED) {
+        row.append(act("Queue it once more", async () => {
+            await jobs.requeueJob({ name: job.name }, { timeoutMs: SOON });
+            await open();
+        }));
+    }
+    return element(
+        "li",
+        {},
+        element("p", {}, element("strong", {}, kind), job.displayName ? `: ${job.displayName}` : ""),
+        element("p", {}, standing(job)),
+        job.failure && isOver(job) ? element("p", {}, job.failure.message) : null,
+        element("p", { className: "hint" }, `${job.name.replace("jobs/", "")}, asked for ${moment(job.createTime)}`),
+        row,
+        list,
+    );
+}
+
+async function page() {
+    const states = STATES[by("jobs-state").value];
+    const answer = await patiently(() => jobs.listJobs({ pageSize: PAGE, pageToken: next, states }, { timeoutMs: SOON }));
+    next = answer.nextPageToken;
+    by("jobs-list").append(...answer.jobs.map(item));
+    by("jobs-more").hidden = !next;
+    const there = by("jobs-list").children.length;
+    by("jobs-summary").textContent = there === 0 ? "There are none." : `${there}${next ? " and more" : ""}.`;
+}
+
+/** Looks anew. */
+export async function open() {
+    next = "";
+    by("jobs-list").replaceChildren();
+    await page();
+    announce(by("jobs-summary").textContent);
+}
+
+/** Connects the buttons, once. */
+export function connect() {
+    const looking = (does) => async () => {
+        alertIn(by("jobs-alert"), null);
+        try {
+            await does();
+        } catch (error) {
+            alertIn(by("jobs-alert"), explain(error));
+        }
+    };
+    by("jobs-state").addEventListener("change", looking(open));
+    by("jobs-refresh").addEventListener("click", looking(open));
+    by("jobs-more").addEventListener("click", looking(page));
+}

@@ -1,0 +1,4 @@
+// What the viewer draws with: bundled into server/page/vendor/splats.js.
+export { Box3, Color, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+export { OrbitControls } from "three/addons/controls/OrbitControls.js";
+export { SparkRenderer, SplatMesh } from "@sparkjsdev/spark";
