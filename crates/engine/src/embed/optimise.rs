@@ -67,7 +67,7 @@ pub fn optimise(
     if let Some(ring) = settings.ring {
         sampler.train_on_ring(ring.elevation.to_radians())?;
     }
-    let settings = &settings.for_views(sampler.shows_parts());
+    let settings = &settings.for_views(sampler.shows_parts(), sampler.given().is_some());
     let mut held_out = settings
         .early_stop
         .map(|stop| EarlyStopping::new(engine, &geometry, &sampler, settings, stop))

@@ -87,8 +87,9 @@ pub struct Settings {
     pub seed: u64,
     /// Most optimiser steps.
     pub steps: usize,
-    /// What steps and their length are multiplied by where every view shows another part of the scene, as inside a room: a
-    /// Gaussian is in fewer views then, and each of them has its own colours to bring to the message.
+    /// What steps are multiplied by where every view shows another part of the scene, as inside a room: a Gaussian is in
+    /// fewer views then, and each of them has its own colours to bring to the message. So is their length where views are
+    /// found, and not where cameras were given: what few of these show would be changed too much.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub times_of_parts: u32,
     /// Views a step.
@@ -179,14 +180,18 @@ impl Settings {
         Ok(settings)
     }
 
-    /// The settings for a scene of which every view shows another part, or each the whole.
-    pub(super) fn for_views(&self, of_parts: bool) -> Self {
+    /// The settings for a scene of which every view shows another part, or each the whole; `given` says whether views are
+    /// among cameras that were given.
+    pub(super) fn for_views(&self, of_parts: bool, given: bool) -> Self {
         let mut settings = *self;
         if of_parts {
             settings.steps *= self.times_of_parts as usize;
-            if let Optimizer::PreconditionedSgd(sgd) = &mut settings.optimizer {
-                sgd.length *= self.times_of_parts as f32;
-            }
+        }
+        if let Optimizer::PreconditionedSgd(sgd) = &mut settings.optimizer
+            && of_parts
+            && !given
+        {
+            sgd.length *= self.times_of_parts as f32;
         }
         settings
     }
@@ -346,16 +351,17 @@ mod tests {
     #[test]
     fn views_of_parts_take_more_and_longer_steps() {
         let standard = Preset::Standard.settings();
-        assert_eq!(standard.for_views(false), standard);
-        let parts = standard.for_views(true);
-        assert_eq!(parts.steps, 2 * standard.steps);
+        assert_eq!(standard.for_views(false, false), standard);
+        let [parts, given] = [false, true].map(|given| standard.for_views(true, given));
+        assert_eq!((parts.steps, given.steps), (2 * standard.steps, 2 * standard.steps));
         let length = |settings: &Settings| match settings.optimizer {
             Optimizer::PreconditionedSgd(sgd) => sgd.length,
             Optimizer::Adam(_) => f32::NAN,
         };
         assert_eq!(length(&parts), 2.0 * length(&standard));
+        assert_eq!(length(&given), length(&standard));
         let paper = Preset::Paper.settings();
-        assert_eq!(paper.for_views(true), paper);
+        assert_eq!(paper.for_views(true, false), paper);
         assert!(standard.overridden(r#"{"times_of_parts": 0}"#).is_err());
     }
 }
