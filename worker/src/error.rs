@@ -15,6 +15,9 @@ pub enum Error {
     /// Judging marks failed.
     #[error(transparent)]
     Evaluation(#[from] guardsplat_evaluation::Error),
+    /// Man pages can't be written.
+    #[error("{source}")]
+    Packaging { source: std::io::Error },
 }
 
 impl Error {

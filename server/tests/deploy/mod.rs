@@ -287,8 +287,8 @@ fn units_are_sound() {
         assert!(text.contains("\nUser=guardsplat\n"), "{name}");
         // The programs are not installed here.
         let text = text
-            .replace("/usr/local/bin/guardsplat-server", "/bin/true")
-            .replace("/usr/local/bin/guardsplat-worker", "/bin/true");
+            .replace("ExecStart=guardsplat-server", "ExecStart=/bin/true")
+            .replace("ExecStart=guardsplat-worker", "ExecStart=/bin/true");
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
         paths.push(path);

@@ -16,7 +16,7 @@ mod verify;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use guardsplat_engine::view::SceneKind;
 use guardsplat_engine::{Error, Result};
 use guardsplat_operations::error_text::in_full;
@@ -84,6 +84,9 @@ enum Command {
     Bench(bench::Arguments),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
+    // A doc comment would not be allowed here: each of them has its own.
+    #[command(flatten)]
+    Packaging(guardsplat_packaging::Command),
 }
 
 /// How much memory a command may take.
@@ -199,6 +202,12 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Models(command) => models::run(command)?,
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Run(arguments) => run::run(arguments),
+        Command::Packaging(command) => {
+            command
+                .run(Arguments::command())
+                .map_err(|source| crate::error::Error::Packaging { source })?;
+            Exit::Done
+        }
     })
 }
 
@@ -250,6 +259,8 @@ mod tests {
             "bench --gaussians 1000,20000 --presets draft,standard --repetitions 3 --device cpu --key K --json",
             "models list",
             "models verify",
+            "completions zsh",
+            "manual DIR",
         ] {
             let words = std::iter::once("guardsplat-worker").chain(line.split(' '));
             assert!(Arguments::try_parse_from(words).is_ok(), "{line}");
