@@ -10,7 +10,7 @@ VERSION=3.8.0
 # Where the manifests say that what goes into packages is.
 target=$PWD/target
 tools=$target/cargo-deb-$VERSION
-programs=(guardsplat guardsplat-server guardsplat-worker)
+programs=(guardsplat guardsplat-server guardsplat-worker guardsplat-credentials)
 crates=(guardsplat-client guardsplat-server guardsplat-worker)
 
 setup
@@ -20,6 +20,7 @@ command -v dpkg-shlibdeps >/dev/null || install_packages dpkg-dev
     cargo install --quiet --locked --root "$tools" --target-dir "$tools/build" "cargo-deb@$VERSION"
 # All of the workspace: with fewer packages burn would be built a second time.
 cargo build --release --workspace --locked --target-dir "$target"
+CARGO_TARGET_DIR=$target bash deploy/credentials.sh build
 
 rm -rf "$target/package" "$target/debian"
 mkdir -p "$target/package/completions"

@@ -59,6 +59,7 @@ stage lints cargo clippy --release --workspace --all-targets --locked -- -D warn
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests
 TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
+stage credentials bash deploy/credentials.sh
 # Longer runs are for people: docs/fuzzing.md.
 stage fuzz bash deploy/fuzz.sh 5
 echo "== all: $SECONDS s"

@@ -2,6 +2,7 @@
 mod bench;
 mod cameras;
 mod convert;
+mod credentials;
 mod display;
 mod embed;
 mod evaluate;
@@ -65,6 +66,9 @@ enum Command {
     Embed(embed::Arguments),
     /// Reads the message of a scene, or of pictures of one
     Verify(verify::Arguments),
+    /// Content credentials (C2PA) of marked scenes: checked, and found again by the mark of a copy
+    #[command(subcommand)]
+    Credentials(credentials::Command),
     /// Renders views of a scene
     Render(render::Arguments),
     /// Tells what a scene file holds, and whether marking it fits in memory
@@ -193,6 +197,7 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Key(command) => key::run(command)?,
         Command::Embed(arguments) => embed::run(&arguments)?,
         Command::Verify(arguments) => verify::run(&arguments)?,
+        Command::Credentials(command) => credentials::run(&command)?,
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Inspect(arguments) => inspect::run(&arguments)?,
         Command::Evaluate(arguments) => evaluate::run(&arguments)?,
@@ -251,6 +256,9 @@ mod tests {
             "inspect SCENE --json --cameras F --memory 7 --views 16 --ignore-bad-rows",
             "embed IN OUT --key K --message 0 --kind room",
             "verify A --key K --kind forward",
+            "embed IN OUT --key K --message 0 --credentials C --certificate F --private-key P --algorithm es384",
+            "credentials check SCENE SIDECAR --trust T --json",
+            "credentials find A B --key K --store S --json",
             "render IN DIR --views 5 --kind terrain",
             "inspect SCENE --kind object",
             "cameras colmap/sparse/0 cameras.json",
