@@ -22,6 +22,9 @@ pub enum Error {
     /// Certificate and key don't sign.
     #[error("signing with {with}: {source}")]
     Signing { with: String, source: c2pa::Error },
+    /// Nobody can be answered.
+    #[error("{0}")]
+    Serve(String),
     /// Man pages can't be written.
     #[error("{0}")]
     Packaging(std::io::Error),

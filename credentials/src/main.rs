@@ -1,11 +1,14 @@
 //! `guardsplat-credentials`: content credentials (C2PA) of marked scenes, as sidecars. Nothing is fetched from anywhere.
+mod api;
 mod check;
 mod error;
 mod marks;
 mod scene_file;
+mod serve;
 mod sidecar;
 mod sign;
 mod signer;
+mod store;
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -38,6 +41,8 @@ enum Command {
         #[arg(value_name = "SIDECAR", required = true)]
         sidecars: Vec<PathBuf>,
     },
+    /// Answers the C2PA's Soft Binding Resolution API from a folder of credentials
+    Serve(serve::Arguments),
     // A doc comment would not be allowed here: each of them has its own.
     #[command(flatten)]
     Packaging(guardsplat_packaging::Command),
@@ -67,6 +72,7 @@ fn run(command: Command) -> Result<u8> {
         Command::Sign(arguments) => sign::run(&arguments).map(|()| 0),
         Command::Check(arguments) => check::run(&arguments).map(check::Verdict::code),
         Command::Marks { sidecars } => marks::run(&sidecars).map(|()| 0),
+        Command::Serve(arguments) => serve::run(&arguments).map(|()| 0),
         Command::Packaging(command) => command.run(Arguments::command()).map(|()| 0).map_err(Error::Packaging),
     }
 }

@@ -5,46 +5,52 @@ use c2pa::validation_status::{ASSERTION_DATAHASH_MISMATCH, SIGNING_CREDENTIAL_UN
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::{print_json, sidecar};
+use crate::{print_json, scene_file, sidecar};
 
 /// A sidecar and the marks that it names.
 #[derive(Serialize)]
-struct Named {
-    path: PathBuf,
+pub struct Named {
+    /// The file.
+    pub path: PathBuf,
     /// The active manifest's identifier; null where the file is none that can be read.
-    manifest: Option<String>,
+    pub manifest: Option<String>,
     /// Whether the manifest is as it was signed. Whether its scene is says `check`.
-    intact: bool,
+    pub intact: bool,
     /// Values of soft bindings, base64.
-    marks: Vec<String>,
+    pub marks: Vec<String>,
+    /// Manifests in it: those that the active one builds on, and itself.
+    pub manifests: usize,
     /// Why nothing was read.
-    reason: Option<String>,
+    pub reason: Option<String>,
 }
 
 /// Prints all of them; a file that is no sidecar is told and does not stop the others.
 pub fn run(paths: &[PathBuf]) -> Result<()> {
-    let named: Vec<Named> = paths
-        .iter()
-        .map(|path| {
-            read(path).unwrap_or_else(|error| Named {
-                path: path.clone(),
-                manifest: None,
-                intact: false,
-                marks: Vec::new(),
-                reason: Some(error.to_string()),
-            })
-        })
-        .collect();
-    print_json(&named)
+    print_json(&paths.iter().map(|path| read_or_reason(path)).collect::<Vec<_>>())
 }
 
-fn read(path: &Path) -> Result<Named> {
-    let bytes = sidecar::read(path)?;
-    let not_one = |error: c2pa::Error| Error::file(path, format!("not content credentials: {error}"));
+/// What a sidecar names, or why it names nothing.
+pub fn read_or_reason(path: &Path) -> Named {
+    read(path).unwrap_or_else(|error| Named {
+        path: path.into(),
+        manifest: None,
+        intact: false,
+        marks: Vec::new(),
+        manifests: 0,
+        reason: Some(error),
+    })
+}
+
+fn read(path: &Path) -> Result<Named, String> {
+    let bytes = sidecar::read(path).map_err(|error| match error {
+        Error::Io { source, .. } => source.to_string(),
+        Error::File { reason, .. } => reason,
+        other => other.to_string(),
+    })?;
     // Without a scene: that the hash of none is another is no news.
     let reader = sidecar::reader(None)
-        .and_then(|reader| reader.with_manifest_data_and_stream(&bytes, "application/octet-stream", std::io::empty()))
-        .map_err(not_one)?;
+        .and_then(|reader| reader.with_manifest_data_and_stream(&bytes, scene_file::MEDIA_TYPE, std::io::empty()))
+        .map_err(|error| format!("not content credentials: {error}"))?;
     let expected = [ASSERTION_DATAHASH_MISMATCH, SIGNING_CREDENTIAL_UNTRUSTED];
     let manifest = reader.active_manifest();
     Ok(Named {
@@ -61,6 +67,7 @@ fn read(path: &Path) -> Result<Named> {
             .iter()
             .map(|value| value.text())
             .collect(),
+        manifests: reader.manifests().len(),
         reason: None,
     })
 }

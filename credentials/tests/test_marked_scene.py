@@ -57,11 +57,17 @@ def marked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def active(marked: Path) -> dict:
+    """The active manifest, as the second reader tells it."""
+    told = second_reader(marked / "marked.ply", marked / "store/marked.c2pa")
+    return told["manifests"][told["active_manifest"]]
+
+
 def test_a_second_reader_validates_it(marked: Path) -> None:
     told = second_reader(marked / "marked.ply", marked / "store/marked.c2pa")
     # Valid: hashes and signature are right; nobody trusts a test certificate.
     assert told["state"] == "Valid", told.get("validation_status")
-    manifest = told["manifests"][told["active_manifest"]]
+    manifest = active(marked)
     assert manifest["claim_generator_info"][0]["name"] == "GuardSplat"
     assertions = {assertion["label"]: assertion["data"] for assertion in manifest["assertions"]}
     binding = assertions["c2pa.soft-binding"]
@@ -100,6 +106,11 @@ def test_a_stripped_copy_is_found_by_its_mark_alone(marked: Path) -> None:
     assert told["verdict"] == "match"
     assert told["credentials"].endswith("marked.c2pa")
     assert told["compared"] == 1
+    # As a service that resolves soft bindings is asked.
+    key = ["--key", marked / "my.key", "--device", "cpu"]
+    asked = json.loads(worker("credentials", "value", copy, *key, "--json"))
+    (binding,) = [a["data"] for a in active(marked)["assertions"] if a["label"] == "c2pa.soft-binding"]
+    assert asked == {"alg": binding["alg"], "value": binding["blocks"][0]["value"]}
     worker("render", copy, marked / "views", "--views", 8, "--size", 400)
     told = json.loads(worker(*find, marked / "views", "--json"))
     assert told["verdict"] == "match"

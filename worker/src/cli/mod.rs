@@ -259,6 +259,7 @@ mod tests {
             "embed IN OUT --key K --message 0 --credentials C --certificate F --private-key P --algorithm es384",
             "credentials check SCENE SIDECAR --trust T --json",
             "credentials find A B --key K --store S --json",
+            "credentials value A --key K --kind room",
             "render IN DIR --views 5 --kind terrain",
             "inspect SCENE --kind object",
             "cameras colmap/sparse/0 cameras.json",

@@ -3,51 +3,25 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use guardsplat_codeword::{Message, Verdict};
-use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::extract::{DEFAULT_VIEWS, find_source};
 use guardsplat_engine::message::Key;
-use guardsplat_engine::scene::BadRows;
-use guardsplat_operations::load;
 use guardsplat_operations::search::{Nearest, read_and_search};
 use guardsplat_operations::suspect::Suspect;
-use guardsplat_operations::verification::Views;
 use guardsplat_soft_binding::Value;
 use serde::{Deserialize, Serialize};
 
 use super::program::run_with_output;
-use super::{Exit, binding_key};
+use super::{Exit, binding_key, copy};
 use crate::cli::display::Display;
-use crate::cli::{Budget, Kind, print_json, print_line};
+use crate::cli::{print_json, print_line};
 use crate::error::{Error, Result};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene or pictures of one, all of one suspect
-    #[arg(value_name = "PATH", required = true)]
-    paths: Vec<PathBuf>,
-    /// The key file
-    #[arg(long)]
-    key: PathBuf,
+    #[command(flatten)]
+    copy: copy::Arguments,
     /// The folder with credentials (.c2pa)
     #[arg(long, value_name = "FOLDER")]
     store: PathBuf,
-    /// Where a scene's viewers are, as `embed` was told
-    #[arg(long, value_name = "FILE")]
-    cameras: Option<PathBuf>,
-    /// The kind of scene, which says where its viewers are; found from the scene unless given
-    #[arg(long, value_enum, conflicts_with = "cameras")]
-    kind: Option<Kind>,
-    /// Where to compute: auto, wgpu or cpu
-    #[arg(long, default_value = "auto")]
-    device: DeviceChoice,
-    #[command(flatten)]
-    budget: Budget,
-    /// A CLIP that was added with `models add`, instead of the one that the key names
-    #[arg(long)]
-    clip: Option<String>,
-    /// Prints JSON on standard output
-    #[arg(long)]
-    json: bool,
 }
 
 /// What `guardsplat-credentials marks` tells of a sidecar.
@@ -83,14 +57,14 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let suspect: Suspect = find_source(&arguments.paths)?.into();
-    let key = Key::read(&arguments.key)?;
+    let suspect = arguments.copy.suspect()?;
+    let key = arguments.copy.key()?;
     let candidates = candidates(&arguments.store, &key)?;
     let messages: Vec<Message> = candidates.iter().map(|candidate| candidate.message).collect();
     let nearest = if messages.is_empty() {
         None
     } else {
-        search(arguments, &key, &suspect, &messages)?
+        search(&arguments.copy, &key, &suspect, &messages)?
     };
     let decision = nearest.as_ref().map(|nearest| &nearest.comparison.decision);
     let verdict = decision.map_or(Verdict::NoMatch, |decision| decision.verdict);
@@ -108,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         bits: key.bits(),
         compared: candidates.len(),
     };
-    if arguments.json {
+    if arguments.copy.json {
         print_json(&report)?;
     } else {
         tell(&report);
@@ -150,8 +124,8 @@ fn candidates(store: &Path, key: &Key) -> Result<Vec<Candidate>> {
     } in named
     {
         if !intact {
-            let changed = || format!("{}: changed since it was signed", path.display());
-            eprintln!("left out: {}", reason.unwrap_or_else(changed));
+            let reason = reason.unwrap_or_else(|| "changed since it was signed".into());
+            eprintln!("left out: {}: {reason}", path.display());
             continue;
         }
         let values = marks.iter().filter_map(|text| Value::parse(text).ok());
@@ -168,29 +142,18 @@ fn candidates(store: &Path, key: &Key) -> Result<Vec<Candidate>> {
     Ok(candidates)
 }
 
-fn search(arguments: &Arguments, key: &Key, suspect: &Suspect, messages: &[Message]) -> Result<Option<Nearest>> {
-    let engine = load::engine(
-        &arguments.key,
-        key,
-        arguments.clip.as_deref(),
-        open(arguments.device)?,
-        false,
-        arguments.budget.bytes(),
-    )?;
-    let views = Views {
-        count: DEFAULT_VIEWS,
-        size: None,
-        background: [1.0; 3],
-        seed: 0,
-        cameras: load::cameras(arguments.cameras.as_deref())?,
-        kind: arguments.kind.map(Kind::scene),
-        bad_rows: BadRows::ignored_if(true),
-        with_files: true,
-    };
+fn search(copy: &copy::Arguments, key: &Key, suspect: &Suspect, messages: &[Message]) -> Result<Option<Nearest>> {
+    let engine = copy.engine(key)?;
     let mut display = Display::new("reading");
-    Ok(read_and_search(&engine, suspect, &views, messages, |done, total| {
-        display.set(done, total, String::new);
-    })?)
+    Ok(read_and_search(
+        &engine,
+        suspect,
+        &copy.views()?,
+        messages,
+        |done, total| {
+            display.set(done, total, String::new);
+        },
+    )?)
 }
 
 fn tell(report: &Report<'_>) {

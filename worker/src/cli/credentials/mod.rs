@@ -1,7 +1,9 @@
 //! `credentials`, and the credentials that `embed` writes. Manifests are the business of a program of their own,
 //! `guardsplat-credentials`: the C2PA's library would have burn built with other features, and read strangers' files here.
+mod copy;
 mod find;
 mod program;
+mod value;
 
 use std::path::{Path, PathBuf};
 
@@ -36,6 +38,8 @@ pub enum Command {
     ///
     /// Exits with 0 if they are found, 2 if they are not, and 3 if the key's messages are too short to tell.
     Find(find::Arguments),
+    /// Prints what a service that resolves soft bindings is asked for: the value of the mark that a copy reads as
+    Value(copy::Arguments),
 }
 
 pub fn run(command: &Command) -> Result<Exit> {
@@ -52,6 +56,7 @@ pub fn run(command: &Command) -> Result<Exit> {
             run_to_end(&arguments)
         }
         Command::Find(arguments) => find::run(arguments),
+        Command::Value(arguments) => value::run(arguments),
     }
 }
 
