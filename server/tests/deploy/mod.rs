@@ -303,3 +303,19 @@ fn units_are_sound() {
     let ours: Vec<&str> = text.lines().filter(|line| line.contains("guardsplat")).collect();
     assert!(output.status.success() && ours.is_empty(), "{text}");
 }
+
+/// What packages take from the repository is there; the rest is built by deploy/package.sh.
+#[test]
+fn what_goes_into_packages_is_there() {
+    for (folder, fewest) in [("client", 2), ("server", 5), ("worker", 4)] {
+        let text = read(&format!("{folder}/Cargo.toml"));
+        let sources = text
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("[\"../")?.split('"').next());
+        let kept: Vec<&str> = sources.filter(|source| !source.starts_with("target/")).collect();
+        assert!(kept.len() >= fewest, "{folder}: {kept:?}");
+        for source in kept {
+            assert!(root().join(source).is_file(), "{folder}: {source}");
+        }
+    }
+}
