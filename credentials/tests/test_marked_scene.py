@@ -43,7 +43,7 @@ def marked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     worker("key", "create", "--bits", 32, "--seed", 7, "-o", folder / "my.key", "--device", "cpu")
     store = folder / "store"
     store.mkdir()
-    embed = ["embed", folder / "scene.ply", folder / "marked.ply", "--key", folder / "my.key", "--preset", "draft"]
+    embed = ["embed", folder / "scene.ply", folder / "marked.ply", "--key", folder / "my.key", "--preset", "standard"]
     embed += ["--device", "cpu", "--force"]
     sidecar = store / "marked.c2pa"
     ran = subprocess.run(

@@ -89,7 +89,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
     let start = Instant::now();
-    arguments.signing.check(&arguments.output)?;
+    arguments.signing.check([&arguments.input, &arguments.output])?;
     let settings = choices(arguments)?.settings()?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;

@@ -80,21 +80,23 @@ pub struct Signing {
 impl Signing {
     /// Fails before any work is done where credentials are wanted that can't be written: without the program, for a scene
     /// in several files, without the certificate's files.
-    pub fn check(&self, scene: &Path) -> Result<()> {
+    pub fn check(&self, scenes: [&Path; 2]) -> Result<()> {
         if self.credentials.is_none() {
             return Ok(());
         }
-        let several = scene
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("gltf"));
-        if several || scene.is_dir() {
-            return Err(Error::bad_option(
-                "--credentials",
-                format!(
-                    "they are of one file, and {} may be several; convert the scene to .glb or .sog",
-                    scene.display()
-                ),
-            ));
+        for scene in scenes {
+            let several = scene
+                .extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case("gltf"));
+            if several || scene.is_dir() {
+                return Err(Error::bad_option(
+                    "--credentials",
+                    format!(
+                        "they are of one file, and {} may be several; convert the scene to .glb or .sog",
+                        scene.display()
+                    ),
+                ));
+            }
         }
         for path in [&self.certificate, &self.private_key].into_iter().flatten() {
             std::fs::File::open(path).map_err(Error::io(path))?;
