@@ -20,7 +20,9 @@ unchecked() {
 
 if [ "${1:-}" = sbom ]; then
     # Cargo knows all of it; no tool is needed for the shape.
-    cargo metadata --locked --format-version 1 | python3 deploy/sbom.py "${2:?the file to write}"
+    for workspace in . credentials; do
+        cargo metadata --locked --format-version 1 --manifest-path "$workspace/Cargo.toml"
+    done | python3 deploy/sbom.py "${2:?the file to write}"
     exit
 fi
 
@@ -33,4 +35,7 @@ fi
 checks=(licenses bans sources)
 [ -z "${GUARDSPLAT_ADVISORIES:-}" ] || checks+=(advisories)
 # The graph is of what is locked; whether it is in step is for the build to say.
-"$tools/bin/cargo-deny" --locked check --hide-inclusion-graph "${checks[@]}"
+for workspace in . credentials; do
+    "$tools/bin/cargo-deny" --locked --manifest-path "$workspace/Cargo.toml" --config "$PWD/deny.toml" check --allow license-not-encountered \
+        --hide-inclusion-graph "${checks[@]}"
+done

@@ -1,4 +1,4 @@
-"""Writes what `cargo metadata` tells (standard input) as a bill of materials: CycloneDX 1.5, JSON.
+"""Writes what `cargo metadata` tells (standard input, of one workspace after the other) as a bill of materials: CycloneDX 1.5, JSON.
 
 Components are what is linked into some program, or builds it: what only tests need is left out.
 """
@@ -43,11 +43,16 @@ def component(package, is_program):
 
 
 def main(path):
-    metadata = json.load(sys.stdin)
-    packages = {package["id"]: package for package in metadata["packages"]}
-    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
-    named = ("guardsplat-server", "guardsplat-worker", "guardsplat-client")
-    programs = [i for i in metadata["workspace_members"] if packages[i]["name"] in named]
+    workspaces = [json.loads(line) for line in sys.stdin]
+    packages = {package["id"]: package for metadata in workspaces for package in metadata["packages"]}
+    # What is in both may need more in one of them.
+    nodes = {}
+    for metadata in workspaces:
+        for node in metadata["resolve"]["nodes"]:
+            nodes.setdefault(node["id"], {"deps": []})["deps"].extend(node["deps"])
+    named = ("guardsplat-server", "guardsplat-worker", "guardsplat-client", "guardsplat-credentials")
+    members = {i for metadata in workspaces for i in metadata["workspace_members"]}
+    programs = [i for i in members if packages[i]["name"] in named]
     inside = reached(nodes, programs)
     bill = {
         "bomFormat": "CycloneDX",
@@ -59,9 +64,11 @@ def main(path):
             {
                 "ref": purl(packages[i]),
                 "dependsOn": sorted(
-                    purl(packages[d["pkg"]])
-                    for d in nodes[i]["deps"]
-                    if d["pkg"] in inside and any(kind["kind"] != "dev" for kind in d["dep_kinds"])
+                    {
+                        purl(packages[d["pkg"]])
+                        for d in nodes[i]["deps"]
+                        if d["pkg"] in inside and any(kind["kind"] != "dev" for kind in d["dep_kinds"])
+                    }
                 ),
             }
             for i in sorted(inside)

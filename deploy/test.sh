@@ -60,6 +60,7 @@ stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 stage tests run_tests
 TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
 stage page bash deploy/page.sh
+stage credentials bash deploy/credentials.sh
 # Longer runs are for people: docs/fuzzing.md.
 stage fuzz bash deploy/fuzz.sh 5
 echo "== all: $SECONDS s"

@@ -1,7 +1,7 @@
 //! The command line: what there is to say.
 use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use crate::commands::{self, completions};
+use crate::commands;
 use crate::options::Global;
 
 /// Marks 3D Gaussian Splatting scenes with a message and reads it back, through a GuardSplat server.
@@ -50,8 +50,8 @@ pub enum Command {
     // A doc comment would not be allowed here: each of them has its own.
     #[command(flatten)]
     Server(Box<commands::Command>),
-    /// Prints a script that completes commands and options in a shell
-    Completions(completions::Arguments),
+    #[command(flatten)]
+    Packaging(guardsplat_packaging::Command),
 }
 
 #[cfg(test)]
@@ -117,6 +117,7 @@ mod tests {
             "artifact get A -o F",
             "artifact delete A",
             "completions bash",
+            "manual DIR",
         ] {
             assert!(parse(line).is_ok(), "{line}");
         }

@@ -21,6 +21,9 @@ pub enum Error {
     /// An option or argument is not what it must be.
     #[error("{field}: {reason}")]
     BadOption { field: &'static str, reason: String },
+    /// Man pages can't be written.
+    #[error("{source}")]
+    Packaging { source: std::io::Error },
     /// A file can't be read or written.
     #[error("{}: {source}", path.display())]
     Io { path: PathBuf, source: std::io::Error },

@@ -60,7 +60,12 @@ fn run(arguments: Arguments, name: &str) -> Result<Exit> {
     let Arguments { global, command } = arguments;
     let command = match command {
         Command::Server(command) => *command,
-        Command::Completions(which) => return Ok(commands::completions::run(&which, &mut Arguments::command())),
+        Command::Packaging(command) => {
+            return command
+                .run(Arguments::command())
+                .map(|()| Exit::Done)
+                .map_err(|source| Error::Packaging { source });
+        }
     };
     let mut context = Context::new(&global)?;
     let runtime = tokio::runtime::Builder::new_current_thread()

@@ -3,8 +3,8 @@ use std::io::{IsTerminal, Write as _};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
-use guardsplat_server::settings::{self, Arguments, LogFormat, Settings};
+use clap::{CommandFactory as _, Parser};
+use guardsplat_server::settings::{self, Arguments, Command, LogFormat, Settings};
 use guardsplat_server::{offline, run};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tracing_subscriber::EnvFilter;
@@ -14,6 +14,19 @@ const LAST_WORK: Duration = Duration::from_secs(2);
 
 fn main() -> ExitCode {
     let Arguments { flags, command } = Arguments::parse();
+    let command = match command {
+        Some(Command::Packaging(command)) => {
+            return match command.run(Arguments::command()) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) => {
+                    say(&format!("error: {error}"));
+                    ExitCode::FAILURE
+                }
+            };
+        }
+        Some(Command::Offline(command)) => Some(command),
+        None => None,
+    };
     // A variable that is not text is none of ours, or names a file that will not be found.
     let environment = std::env::vars_os()
         .filter_map(|(name, value)| Some((name.into_string().ok()?, value.to_string_lossy().into_owned())));

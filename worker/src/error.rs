@@ -15,6 +15,15 @@ pub enum Error {
     /// Judging marks failed.
     #[error(transparent)]
     Evaluation(#[from] guardsplat_evaluation::Error),
+    /// Content credentials could not be made or read.
+    #[error("{0}")]
+    Credentials(String),
+    /// What a manifest would say of the mark.
+    #[error(transparent)]
+    SoftBinding(#[from] guardsplat_soft_binding::Error),
+    /// Man pages can't be written.
+    #[error("{source}")]
+    Packaging { source: std::io::Error },
 }
 
 impl Error {

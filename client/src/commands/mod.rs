@@ -2,7 +2,6 @@
 pub mod artifact;
 pub mod asset;
 pub mod commitment;
-pub mod completions;
 pub mod embed;
 mod failed_jobs;
 pub mod hook;

@@ -10,6 +10,7 @@ pub mod inspect;
 pub mod load;
 pub mod render;
 pub mod sample;
+pub mod search;
 pub mod suspect;
 pub mod thumbnails;
 pub mod verification;

@@ -2,10 +2,10 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::{Args, Parser};
+use clap::{Args, Parser, Subcommand};
 
 use super::{Access, DatabaseUrl, LogFormat, Settings, WorkerDevice};
-use crate::offline::Command;
+use crate::offline;
 
 /// The GuardSplat server: takes jobs over gRPC, keeps them, and gives them to workers.
 ///
@@ -21,6 +21,18 @@ pub struct Arguments {
     /// What to do instead of serving.
     #[command(subcommand)]
     pub command: Option<Command>,
+}
+
+/// What there is to do besides serving.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Command {
+    // Doc comments would not be allowed here: each command has its own.
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    Offline(offline::Command),
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    Packaging(guardsplat_packaging::Command),
 }
 
 // No comment for people here: clap would put it in place of the program's.

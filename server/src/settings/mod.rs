@@ -16,7 +16,7 @@ use crate::secrets::KeySource;
 
 pub use database::{DATABASE_VARIABLE, DatabaseUrl};
 pub use error::SettingsError;
-pub use flags::{Arguments, Flags};
+pub use flags::{Arguments, Command, Flags};
 pub use layers::{load, parse};
 
 /// Everything that can be set. `deploy/guardsplat-server.toml` says what each is for.

@@ -287,8 +287,8 @@ fn units_are_sound() {
         assert!(text.contains("\nUser=guardsplat\n"), "{name}");
         // The programs are not installed here.
         let text = text
-            .replace("/usr/local/bin/guardsplat-server", "/bin/true")
-            .replace("/usr/local/bin/guardsplat-worker", "/bin/true");
+            .replace("ExecStart=guardsplat-server", "ExecStart=/bin/true")
+            .replace("ExecStart=guardsplat-worker", "ExecStart=/bin/true");
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
         paths.push(path);
@@ -302,4 +302,20 @@ fn units_are_sound() {
     let text = String::from_utf8_lossy(&output.stderr);
     let ours: Vec<&str> = text.lines().filter(|line| line.contains("guardsplat")).collect();
     assert!(output.status.success() && ours.is_empty(), "{text}");
+}
+
+/// What packages take from the repository is there; the rest is built by deploy/package.sh.
+#[test]
+fn what_goes_into_packages_is_there() {
+    for (folder, fewest) in [("client", 2), ("server", 5), ("worker", 4)] {
+        let text = read(&format!("{folder}/Cargo.toml"));
+        let sources = text
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("[\"../")?.split('"').next());
+        let kept: Vec<&str> = sources.filter(|source| !source.starts_with("target/")).collect();
+        assert!(kept.len() >= fewest, "{folder}: {kept:?}");
+        for source in kept {
+            assert!(root().join(source).is_file(), "{folder}: {source}");
+        }
+    }
 }

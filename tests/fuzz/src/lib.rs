@@ -20,7 +20,7 @@ pub use pictures::{exr, picture};
 pub use scenes::{compressed_ply, gltf, ply, scene, splat, spz, summary};
 pub use server::{names, page_token, requests, sealed, server_settings};
 pub use sog::{sog, sog_meta, sog_picture};
-pub use texts::{cameras, embed_settings, message};
+pub use texts::{cameras, embed_settings, message, soft_binding};
 
 /// A target by its name, which is also that of its program, of its folder in `corpus` and of its dictionary.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +61,7 @@ targets![
     exr,
     embed_settings,
     message,
+    soft_binding,
     page_token,
     names,
     requests,

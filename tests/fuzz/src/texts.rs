@@ -3,6 +3,7 @@ use crate::memory::bounded;
 use guardsplat_codeword::{MAX_BITS, Message};
 use guardsplat_engine::embed::Preset;
 use guardsplat_engine::view::parse_cameras;
+use guardsplat_soft_binding::{BindingKey, Value};
 
 /// `cameras.json` and `transforms.json`.
 pub fn cameras(data: &[u8]) {
@@ -44,6 +45,25 @@ pub fn message(data: &[u8]) {
                 Message::parse(&message.to_string(), bits).expect("it is read back"),
                 message
             );
+        }
+    }
+}
+
+/// Values of soft bindings, as content credentials of strangers have them. A key opens what was sealed with it alone.
+pub fn soft_binding(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(value) = bounded(data.len(), || Value::parse(text)) else {
+        return;
+    };
+    assert_eq!(Value::parse(&value.text()).as_ref(), Ok(&value));
+    let id = value.key_id();
+    let key = BindingKey {
+        id: &id,
+        secret: &[7; 32],
+    };
+    for bits in [1, 8, 32, 33, MAX_BITS as usize, usize::MAX] {
+        if let Some(message) = value.open(key, bits) {
+            assert_eq!(Value::seal(key, &message), Ok(value.clone()));
         }
     }
 }

@@ -11,7 +11,9 @@ use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::write_picture;
 use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::{Error, Result};
+use guardsplat_soft_binding::Value;
 
+use super::credentials::{self, Signing, binding_key};
 use super::display::Display;
 use super::{Budget, Exit, Kind, print_json, print_line};
 use guardsplat_operations::embed_report::EmbedReport;
@@ -72,6 +74,8 @@ pub struct Arguments {
     /// A folder for pictures of original, marked and ten times their difference
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    signing: Signing,
     /// A CLIP that was added with `models add`, instead of the one that the key names
     #[arg(long)]
     clip: Option<String>,
@@ -83,8 +87,9 @@ pub struct Arguments {
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<Exit> {
+pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
     let start = Instant::now();
+    arguments.signing.check([&arguments.input, &arguments.output])?;
     let settings = choices(arguments)?.settings()?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;
@@ -120,6 +125,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         write_report(folder, &outcome.verification)?;
     }
     tell(arguments, &engine, &key, &outcome, start)?;
+    if outcome.written {
+        let value = Value::seal(binding_key(&key, &key.id()), &message)?;
+        let said = credentials::sign(&arguments.signing, &arguments.input, &arguments.output, &value)?;
+        said.iter().for_each(|line| eprintln!("{line}"));
+    }
     Ok(if outcome.missed.is_empty() {
         Exit::Done
     } else {

@@ -2,6 +2,7 @@
 mod bench;
 mod cameras;
 mod convert;
+mod credentials;
 mod display;
 mod embed;
 mod evaluate;
@@ -16,7 +17,7 @@ mod verify;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use guardsplat_engine::view::SceneKind;
 use guardsplat_engine::{Error, Result};
 use guardsplat_operations::error_text::in_full;
@@ -65,6 +66,9 @@ enum Command {
     Embed(embed::Arguments),
     /// Reads the message of a scene, or of pictures of one
     Verify(verify::Arguments),
+    /// Content credentials (C2PA) of marked scenes: checked, and found again by the mark of a copy
+    #[command(subcommand)]
+    Credentials(credentials::Command),
     /// Renders views of a scene
     Render(render::Arguments),
     /// Tells what a scene file holds, and whether marking it fits in memory
@@ -84,6 +88,9 @@ enum Command {
     Bench(bench::Arguments),
     /// Carries out the jobs of a server, until SIGTERM or SIGINT
     Run(run::Arguments),
+    // A doc comment would not be allowed here: each of them has its own.
+    #[command(flatten)]
+    Packaging(guardsplat_packaging::Command),
 }
 
 /// How much memory a command may take.
@@ -190,6 +197,7 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Key(command) => key::run(command)?,
         Command::Embed(arguments) => embed::run(&arguments)?,
         Command::Verify(arguments) => verify::run(&arguments)?,
+        Command::Credentials(command) => credentials::run(&command)?,
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Inspect(arguments) => inspect::run(&arguments)?,
         Command::Evaluate(arguments) => evaluate::run(&arguments)?,
@@ -199,6 +207,12 @@ fn carry_out(command: Command) -> crate::error::Result<Exit> {
         Command::Models(command) => models::run(command)?,
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Run(arguments) => run::run(arguments),
+        Command::Packaging(command) => {
+            command
+                .run(Arguments::command())
+                .map_err(|source| crate::error::Error::Packaging { source })?;
+            Exit::Done
+        }
     })
 }
 
@@ -242,6 +256,10 @@ mod tests {
             "inspect SCENE --json --cameras F --memory 7 --views 16 --ignore-bad-rows",
             "embed IN OUT --key K --message 0 --kind room",
             "verify A --key K --kind forward",
+            "embed IN OUT --key K --message 0 --credentials C --certificate F --private-key P --algorithm es384",
+            "credentials check SCENE SIDECAR --trust T --json",
+            "credentials find A B --key K --store S --json",
+            "credentials value A --key K --kind room",
             "render IN DIR --views 5 --kind terrain",
             "inspect SCENE --kind object",
             "cameras colmap/sparse/0 cameras.json",
@@ -250,6 +268,8 @@ mod tests {
             "bench --gaussians 1000,20000 --presets draft,standard --repetitions 3 --device cpu --key K --json",
             "models list",
             "models verify",
+            "completions zsh",
+            "manual DIR",
         ] {
             let words = std::iter::once("guardsplat-worker").chain(line.split(' '));
             assert!(Arguments::try_parse_from(words).is_ok(), "{line}");

@@ -70,6 +70,14 @@ pub fn put_all() {
     ] {
         put("message", name, text);
     }
+    for (name, text) in [
+        // Of c0ffee42 under a key of sevens.
+        ("bits-32", "ABEiM0RVZneImaq7zN3u/26/lQiL7oK86zTNnhnW0FUnSul2"),
+        ("no-message", "ABEiM0RVZneImaq7zN3u/26/lQiL7oK86zTNnhnW0FU="),
+        ("not-base64", "ABEiM0RVZneImaq7zN3u/26/lQiL7oK86zTNnhnW0FUnSul!"),
+    ] {
+        put("soft_binding", name, text);
+    }
 }
 
 const REFERENCE: &str = r#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],
