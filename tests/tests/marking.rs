@@ -299,6 +299,10 @@ fn a_room_is_marked_for_its_viewers() {
     let read = "verify out.ply --key k --message 2601cd56 --device cpu --json";
     let inside = environment.json(&format!("{read} --cameras room.json"), 0);
     assert!(inside["bit_accuracy"].as_f64().unwrap() > 0.85, "{inside}");
+    // Small views are read as the pictures of 800 px that they stand for.
+    let large = environment.json(&format!("{read} --cameras room.json --size 800"), 0);
+    let [small, large] = [&inside, &large].map(|read| read["bit_accuracy"].as_f64().unwrap());
+    assert!((small - large).abs() < 0.05, "{small} {large}");
     environment.refuses(
         "embed room.ply out.ply --key k --message 2601cd56 --cameras room.json --ring 30 --device cpu",
         &["--cameras", "--ring"],

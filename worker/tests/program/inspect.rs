@@ -70,6 +70,20 @@ fn a_scene_can_be_inspected() {
         assert_eq!(said[part], predicted[part], "{part}");
     }
 
+    // A short trial tells what the mark would come to, and writes nothing.
+    assert!(found["forecast"].is_null());
+    let line = "inspect in.ply --forecast --key k.key --preset draft --device cpu --json";
+    let told = &bench.json(line, 0)["forecast"];
+    assert_eq!((&told["bits"], &told["preset"]), (&32.into(), &"draft".into()));
+    let bits = told["bit_accuracy"].as_f64().unwrap();
+    assert!(
+        (0.5..1.0).contains(&bits) && told["seconds"].as_f64().unwrap() > 0.0,
+        "{told}"
+    );
+    assert_eq!(told["meets_target"], bits >= told["wanted"].as_f64().unwrap());
+    // Where it would miss, a message of 16 bits is tried.
+    assert_eq!(told["shorter"].is_null(), told["meets_target"] == true);
+
     // With less memory, and with NaN.
     let small = bench.json("inspect in.ply --memory 60 --json", 0);
     assert_eq!(
