@@ -135,12 +135,21 @@ fn from_a_sample_to_a_verdict() {
     assert_eq!(verdict["verdict"], "match");
     assert_eq!((&verdict["matched_bits"], &verdict["bits"]), (&32.into(), &32.into()));
     assert!(verdict["p_value"].as_f64().unwrap() <= verdict["threshold"].as_f64().unwrap());
-    let other = u32::from_str_radix(&found, 16).unwrap() ^ u32::MAX;
     // A picture and a scene, together.
     let line = "verify views/view_000.png out.ply --key k.key --device cpu --views 3 --size 40 --seed 1 --json";
     assert_eq!(bench.json(line, 3)["views"], 4);
-    let line = format!("verify out.ply --key k.key --device cpu --views 3 --size 40 --seed 1 --message {other:08x}");
-    assert!(bench.exits(&line, 2).starts_with("no match: 0 of 32 bits"));
+    // A scene is read as pictures of 800 px, not of 40.
+    let line = "verify out.ply --key k.key --device cpu --views 3 --size 40 --seed 1";
+    let found = bench.json(&format!("{line} --json"), 3)["message"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    let other = u32::from_str_radix(&found, 16).unwrap() ^ u32::MAX;
+    assert!(
+        bench
+            .exits(&format!("{line} --message {other:08x}"), 2)
+            .starts_with("no match: 0 of 32 bits")
+    );
 }
 
 #[test]
