@@ -88,7 +88,7 @@ fn mark_into(
     each: &mut dyn FnMut(usize, Event<'_>) -> Result<()>,
 ) -> std::result::Result<(), Stopped> {
     let levels: Vec<usize> = (0..streamed.levels()).filter(|l| streamed.gaussians(*l) > 0).collect();
-    let mut settings = job.settings.clone();
+    let mut settings = *job.settings;
     if settings.kind.is_none()
         && job.cameras.is_empty()
         && let Some(finest) = levels.first()

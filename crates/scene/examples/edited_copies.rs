@@ -21,12 +21,18 @@ fn main() -> Result<()> {
         scale: 2.5,
         shift: [3.0, -1.0, 7.0],
     };
+    // z is where y was, as between programs whose axes differ.
+    let quarter_turn = Motion {
+        rotation: [1.0, 1.0, 0.0, 0.0],
+        ..turned
+    };
     let half = halved(&scene)?;
     for (name, copy) in [
         ("cropped", crop(&scene, least, largest)?),
         ("no-floaters", without_floaters(&scene, 3)?),
         ("shuffled", shuffled(&scene, 1)?),
         ("turned", moved(&scene, turned)?),
+        ("quarter-turn", moved(&scene, quarter_turn)?),
         ("halved", half.clone()),
     ] {
         println!("{name}: {} of {} Gaussians", copy.len(), scene.len());
