@@ -85,7 +85,7 @@ def embed(
     The bytes are those of ``guardsplat-worker embed`` with the same options on the same device.
 
     Args:
-        path_in: the scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat.
+        path_in: the scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF, .ksplat or .splat.
         path_out: where to write the marked scene, in the same format.
         key: the key, or its file.
         message: hexadecimal digits, or bytes, as many bits as the key has.

@@ -117,7 +117,7 @@ def save_gaussians(
 ) -> None:
     """Writes Gaussians in gsplat's layout as a scene file, of the format that the name says.
 
-    ``.ply``, ``.compressed.ply``, ``.spz``, ``.sog``, ``.gltf``, ``.glb`` or ``.splat``; PLY where it says none. All but
+    ``.ply``, ``.compressed.ply``, ``.spz``, ``.sog``, ``.gltf``, ``.glb``, ``.ksplat`` or ``.splat``; PLY where it says none. All but
     PLY and glTF round colours: mark the file then, not the Gaussians.
     """
     arrays, _ = to_engine(means, quats, scales, opacities, sh0, shN)

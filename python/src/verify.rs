@@ -80,6 +80,7 @@ pub fn verify(
             kind,
             bad_rows: BadRows::ignored_if(options.ignore_bad_rows),
             with_files: true,
+            level: 0,
         };
         let clip = options.clip.as_deref();
         let mut engine = load::engine(path, inner, clip, open(device)?, false, options.memory)?;

@@ -52,7 +52,7 @@ impl From<Preset> for embed_spec::Preset {
 /// Arguments of `embed`.
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene to mark: PLY, compressed PLY, SPZ, SOG, glTF in one file or .splat; or one that is there already, artifacts/ID
+    /// The scene to mark: PLY, compressed PLY, SPZ, SOG, glTF in one file, .ksplat or .splat; or one that is there already, artifacts/ID
     #[arg(value_name = "IN")]
     input: String,
     /// Where to write the marked scene, in the format of IN

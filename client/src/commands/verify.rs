@@ -18,7 +18,7 @@ use crate::scene_kind::{self, SceneKind};
 /// Arguments of `verify`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .splat), pictures (PNG, JPEG, WebP) and folders of them; or such that
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .ksplat, .splat), pictures (PNG, JPEG, WebP) and folders of them; or such that
     /// are there already, artifacts/ID
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<String>,

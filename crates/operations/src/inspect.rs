@@ -33,6 +33,8 @@ pub struct Asked {
     pub cameras: Vec<Camera>,
     /// The kind of scene, instead of the one that is found.
     pub kind: Option<SceneKind>,
+    /// The level of detail of a streamed scene, 0 being the finest.
+    pub level: usize,
     /// What becomes of rows with values that are not legal.
     pub bad_rows: BadRows,
     /// Bytes of memory that may be used, if not all of the machine's.
@@ -158,7 +160,7 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
     admission::admit_reading(path, &limits, rest)?;
     let head = admission::summary_of(path);
     let bad_rows = asked.bad_rows;
-    let scene = Scene::read_with_files(path, bad_rows, limits.left(&rest))?;
+    let scene = Scene::read_level(path, asked.level, bad_rows, limits.left(&rest))?;
     let gaussians = &scene.gaussians;
     let cameras = &asked.cameras;
     let size = SceneSize::of(&scene);

@@ -2,6 +2,7 @@
 //! jobs of a server and the Python package, so that all give the same bytes and figures. No command line, no gRPC.
 pub mod comparison_sheet;
 pub mod create_key;
+pub mod embed_levels;
 pub mod embed_report;
 pub mod embed_settings;
 pub mod error_text;

@@ -30,6 +30,8 @@ pub struct Rendering {
     pub background: [f32; 3],
     /// Decides the views where no cameras are given.
     pub seed: u64,
+    /// The level of detail of a streamed scene, 0 being the finest.
+    pub level: usize,
     /// What becomes of rows with values that are not legal.
     pub bad_rows: BadRows,
     /// Where to compute.
@@ -75,7 +77,7 @@ pub fn render_file(
     let limits = Limits::of_machine(rendering.memory);
     let rest = rendering.besides();
     admission::admit_reading(path, &limits, rest)?;
-    let scene = Scene::read_with_files(path, rendering.bad_rows, limits.left(&rest))?;
+    let scene = Scene::read_level(path, rendering.level, rendering.bad_rows, limits.left(&rest))?;
     let ignored = scene.ignored().cloned();
     limits.admit(&rendering_requirements(SceneSize::of(&scene), rest.pictures))?;
     let cameras = render(&scene.into_gaussians(), rendering, each)?;

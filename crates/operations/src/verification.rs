@@ -30,6 +30,8 @@ pub struct Views {
     pub bad_rows: BadRows,
     /// Whether scenes may be in more files than one: where their user chose them on this machine.
     pub with_files: bool,
+    /// The level of detail of streamed scenes that is read, 0 being the finest. For such files as were chosen on this machine.
+    pub level: usize,
 }
 
 /// Logits of views or pictures.
@@ -80,7 +82,7 @@ fn read_scenes(
         admission::admit_reading(path, &engine.limits, rest)?;
         let memory = engine.limits.left(&rest);
         let scene = match views.with_files {
-            true => Scene::read_with_files(path, views.bad_rows, memory)?,
+            true => Scene::read_level(path, views.level, views.bad_rows, memory)?,
             false => Scene::read_within(path, views.bad_rows, memory)?,
         };
         ignored.extend(scene.ignored().cloned());

@@ -15,6 +15,34 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::R
     Pending::write(path, write)?.finish()
 }
 
+/// Fills a folder under a temporary name beside `path`, and only then gives it its name, which nothing may have yet.
+///
+/// # Errors
+/// [`Error::Io`] as for [`write_whole`], and those of `fill`; nothing is left behind.
+pub fn write_folder_whole<E: From<Error>>(path: &Path, fill: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
+    if path.exists() {
+        let reason = std::io::Error::new(
+            std::io::ErrorKind::AlreadyExists,
+            "a folder is written under a new name",
+        );
+        return Err(Error::io(path)(reason).into());
+    }
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        // Like any new folder: what the user's mask allows, not the privacy of a temporary one.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o777));
+    }
+    builder.prefix(".guardsplat-").suffix(".part");
+    let aside = builder.tempdir_in(folder(path)).map_err(Error::io(path))?;
+    fill(aside.path())?;
+    std::fs::rename(aside.path(), path).map_err(Error::io(path))?;
+    // What was renamed is not there to be deleted.
+    let _ = aside.keep();
+    Ok(())
+}
+
 /// A file that is whole and durable, and has yet to get its name; else it is deleted.
 pub(crate) struct Pending {
     file: NamedTempFile,

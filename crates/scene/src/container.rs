@@ -16,6 +16,8 @@ pub enum Format {
     Spz,
     /// 32 bytes a Gaussian without a header.
     Splat,
+    /// mkkellogg's sections of rows, with or without harmonics.
+    Ksplat,
     /// PlayCanvas' pictures in a ZIP.
     Sog,
     /// glTF with KHR_gaussian_splatting, as JSON.
@@ -32,6 +34,7 @@ impl Format {
             Format::CompressedPly => "compressed.ply",
             Format::Spz => "spz",
             Format::Splat => "splat",
+            Format::Ksplat => "ksplat",
             Format::Sog => "sog",
             Format::Gltf => "gltf",
             Format::Glb => "glb",

@@ -44,7 +44,7 @@ impl Error {
 /// What a file is said not to be that begins like none of the formats. What follows says why it is no .splat either,
 /// a format whose files may begin in any way.
 pub(crate) const UNKNOWN: &str =
-    "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF or a .splat, since ";
+    "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF, a .ksplat or a .splat, since ";
 
 pub(crate) fn bad(path: &Path, reason: String) -> Error {
     Error::BadScene {

@@ -44,6 +44,14 @@ impl Ignored {
         &self.first
     }
 
+    /// Adds rows of a part of a scene, which messages call `part` and whose rows are from `first` on.
+    pub(crate) fn append(&mut self, other: &Ignored, first: usize, part: &str) {
+        if self.rows.is_empty() {
+            self.first = format!("{part}: {}", other.first);
+        }
+        self.rows.extend(other.rows.iter().map(|row| first + row));
+    }
+
     /// The row in the file of Gaussian `row` of the scene.
     pub(crate) fn file_row(&self, row: usize) -> usize {
         // Bad row `i`, of which `i` are before, comes before all Gaussians from `rows[i] - i` on.

@@ -14,6 +14,7 @@ mod fields;
 mod gaussians;
 mod gltf;
 mod ignored;
+mod ksplat;
 mod names;
 mod packed;
 mod ply;
@@ -29,11 +30,12 @@ mod summary;
 #[doc(hidden)]
 pub mod testing;
 
-pub use atomic_write::write_whole;
+pub use atomic_write::{write_folder_whole, write_whole};
 pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
 pub use ignored::{BadRows, Ignored};
 pub use scene::Scene;
 pub use sniff::{HEAD, is_loose_sog, sniff, summary};
+pub use sog::StreamedSog;
 pub use summary::Summary;

@@ -4,11 +4,12 @@ use std::path::Path;
 
 impl Format {
     /// All of them.
-    pub const ALL: [Format; 7] = [
+    pub const ALL: [Format; 8] = [
         Format::Ply,
         Format::CompressedPly,
         Format::Spz,
         Format::Splat,
+        Format::Ksplat,
         Format::Sog,
         Format::Gltf,
         Format::Glb,
@@ -21,6 +22,7 @@ impl Format {
             Format::CompressedPly => "compressed PLY",
             Format::Spz => "SPZ",
             Format::Splat => ".splat",
+            Format::Ksplat => ".ksplat",
             Format::Sog => "SOG",
             Format::Gltf => "glTF",
             Format::Glb => "binary glTF",

@@ -32,6 +32,7 @@ enum How {
     Gltf,
     Spz,
     Splat,
+    Ksplat,
     Packed(Chunks),
     Sog(Box<Shared>),
 }
@@ -72,6 +73,7 @@ impl ColorQuantizer {
             Format::Gltf | Format::Glb => How::Gltf,
             Format::Spz => How::Spz,
             Format::Splat => How::Splat,
+            Format::Ksplat => How::Ksplat,
             Format::CompressedPly => How::Packed(Chunks::of(gaussians)),
             Format::Sog => {
                 let colours = sog::Colours::fit(gaussians).map_err(refused)?;
@@ -118,6 +120,7 @@ impl ColorQuantizer {
             }
             How::Spz => coefficients.chunks_exact_mut(self.per_gaussian).for_each(keep_spz),
             How::Splat => coefficients.chunks_exact_mut(self.per_gaussian).for_each(keep_splat),
+            How::Ksplat => coefficients.chunks_exact_mut(self.per_gaussian).for_each(keep_ksplat),
             How::Packed(chunks) => chunks.apply(rows, coefficients, self.per_gaussian),
             How::Sog(shared) => shared.apply(rows, coefficients, self.per_gaussian),
         }
@@ -145,6 +148,14 @@ fn keep_splat(row: &mut [f32]) {
         *value = Range::UNIT.coefficient(splat::kept_byte(*value));
     }
     rest.fill(0.0);
+}
+
+fn keep_ksplat(row: &mut [f32]) {
+    let most = convert::most_degree(Format::Ksplat) + 1;
+    for value in &mut row[..3] {
+        *value = Range::UNIT.coefficient(splat::kept_byte(*value));
+    }
+    row.iter_mut().skip(3 * most * most).for_each(|value| *value = 0.0);
 }
 
 impl Chunks {

@@ -5,7 +5,7 @@ use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
 use crate::sniff::{announced, is_loose_sog};
-use crate::{Error, Result, gltf, ply, sog, splat, spz};
+use crate::{Error, Result, gltf, ksplat, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -62,7 +62,8 @@ impl Scene {
     }
 
     /// Reads a scene as [`Scene::read_within`], and the files in its folder that it refers to: a glTF may have its
-    /// buffers there. The path may also be the folder of a SOG that is not bundled. Only for files that their user chose on this machine: who hands in a file chooses what is read.
+    /// buffers there. The path may also be the folder of a SOG that is not bundled, or of one that is
+    /// streamed, or the `lod-meta.json` of that: then its finest level of detail is read. Only for files that their user chose on this machine: who hands in a file chooses what is read.
     ///
     /// # Errors
     /// Those of [`Scene::read_within`]; [`Error::BadScene`] for references to anything that is not in the folder or
@@ -72,7 +73,27 @@ impl Scene {
         Scene::open(path, bad_rows, memory, Some(folder))
     }
 
+    /// Reads a scene as [`Scene::read_with_files`]; of a streamed SOG this level of detail of all tiles, 0 being the finest.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read_with_files`]; [`Error::BadScene`] for a level that the scene has not.
+    pub fn read_level(path: &Path, level: usize, bad_rows: BadRows, memory: u64) -> Result<Scene> {
+        match sog::StreamedSog::open(path)? {
+            Some(streamed) => streamed.read(level, bad_rows, memory),
+            None if level > 0 => Err(bad(
+                path,
+                format!("no level {level}: only a SOG with a lod-meta.json has levels of detail"),
+            )),
+            None => Scene::read_with_files(path, bad_rows, memory),
+        }
+    }
+
     fn open(path: &Path, bad_rows: BadRows, memory: u64, folder: Option<&Path>) -> Result<Scene> {
+        if folder.is_some()
+            && let Some(streamed) = sog::StreamedSog::open(path)?
+        {
+            return streamed.read(0, bad_rows, memory);
+        }
         if folder.is_some() && is_loose_sog(path) {
             return Scene::of(path, sog::read_folder(path, bad_rows, memory)?);
         }
@@ -119,13 +140,14 @@ impl Scene {
             Some(Format::Spz) => spz::read(path, source, size)?,
             Some(Format::Sog) => sog::read(path, source, size, bad_rows, memory)?,
             Some(Format::Gltf | Format::Glb) => gltf::read(path, source, size, bad_rows, memory, folder)?,
+            Some(Format::Ksplat) => ksplat::read(path, source, size, bad_rows)?,
             _ => splat::read(path, source, size, bad_rows)?,
         };
         Scene::of(path, read)
     }
 
     /// What was read, of which some row must be left.
-    fn of(path: &Path, (gaussians, source): (Gaussians, Arc<dyn Container>)) -> Result<Scene> {
+    pub(crate) fn of(path: &Path, (gaussians, source): (Gaussians, Arc<dyn Container>)) -> Result<Scene> {
         if let Some(ignored) = source.ignored().filter(|_| gaussians.is_empty()) {
             let (count, first) = (ignored.count(), ignored.first());
             return Err(bad(

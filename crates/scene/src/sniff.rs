@@ -3,7 +3,7 @@ use crate::container::Format;
 use crate::error::bad;
 use crate::ignored::BadRows;
 use crate::summary::Summary;
-use crate::{Error, Result, gltf, ply, sog, splat, spz};
+use crate::{Error, Result, gltf, ksplat, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -18,6 +18,7 @@ pub(crate) fn announced(first: &[u8]) -> Option<Format> {
         first if ply::begins(first) => Some(Format::Ply),
         first if spz::is_spz(first) => Some(Format::Spz),
         first if sog::detect(first) => Some(Format::Sog),
+        first if ksplat::detect(first) => Some(Format::Ksplat),
         first => gltf::announced(first),
     }
 }
@@ -45,11 +46,11 @@ pub fn sniff(head: &[u8], size: u64) -> Option<Format> {
     announced(head).or_else(|| splat::looks_like(head, size).then_some(Format::Splat))
 }
 
-/// Whether a folder holds the parts of a SOG that was not bundled: its WebP pictures are numbers, not views.
+/// Whether a folder holds the parts of a SOG that was not bundled, or one that is streamed: WebP pictures in it are
+/// numbers, not views.
 pub fn is_loose_sog(folder: &Path) -> bool {
-    ["meta.json", "means_l.webp"]
-        .iter()
-        .all(|name| folder.join(name).is_file())
+    let has = |name: &str| folder.join(name).is_file();
+    has("meta.json") && has("means_l.webp") || has(sog::INDEX)
 }
 
 impl Format {
@@ -87,6 +88,7 @@ pub fn summary(name: &Path, head: &[u8], size: u64) -> Result<Option<Summary>> {
         _ if ply::begins(head) => ply::summary(head, size),
         _ if spz::is_spz(head) => spz::summary(head, size),
         _ if sog::detect(head) || gltf::announced(head).is_some() => return Ok(None),
+        _ if ksplat::detect(head) => ksplat::summary(head, size),
         _ => splat::summary(head, size),
     };
     said.map(Some).map_err(|reason| bad(name, reason))
@@ -128,6 +130,10 @@ mod tests {
             (gzip, Format::Spz),
             (b"NGSP\x04", Format::Spz),
             (b"PK\x03\x04", Format::Sog),
+            (
+                b"\0\x01\0\0\x01\0\0\0\x01\0\0\0\x07\0\0\0\x07\0\0\0\x02\0\0\0",
+                Format::Ksplat,
+            ),
             (b"glTF\x02\0\0\0", Format::Glb),
             (b" {\n\t\"asset\"", Format::Gltf),
             (b"\xef\xbb\xbf{\"scene\":0", Format::Gltf),

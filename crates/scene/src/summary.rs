@@ -83,7 +83,7 @@ pub(crate) mod tests {
         assert!(said.degree >= sh.degree as u64, "{said:?}, used {}", sh.degree);
         let there = scene.file_bytes() as u64;
         match said.format {
-            Format::Ply | Format::Splat => assert_eq!(said.file, there),
+            Format::Ply | Format::Splat | Format::Ksplat => assert_eq!(said.file, there),
             // Chunks are kept besides, and what follows the Gaussians.
             _ => assert!(said.file <= there, "{said:?}, there are {there}"),
         }

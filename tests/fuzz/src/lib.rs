@@ -17,7 +17,7 @@ pub use claims::{commitment, evidence};
 pub use models::{TINY_CLIP, clip_config, clip_weights, key, lpips, manifest};
 pub use packages::{lpips_checkpoint, lpips_package};
 pub use pictures::{exr, picture};
-pub use scenes::{compressed_ply, gltf, ply, scene, splat, spz, summary};
+pub use scenes::{compressed_ply, gltf, ksplat, ply, scene, splat, spz, summary};
 pub use server::{names, page_token, requests, sealed, server_settings};
 pub use sog::{sog, sog_meta, sog_picture};
 pub use texts::{cameras, embed_settings, message, soft_binding};
@@ -43,6 +43,7 @@ targets![
     compressed_ply,
     spz,
     splat,
+    ksplat,
     sog,
     sog_meta,
     sog_picture,

@@ -67,6 +67,39 @@ pub fn splat(data: &[u8]) {
     scene(data);
 }
 
+/// Sections of rows. A level, a degree and rows are also put behind headers that are right, which few changes would leave so.
+pub fn ksplat(data: &[u8]) {
+    if let [level, degree, rows @ ..] = data {
+        scene(&of_rows(level % 3, degree % 3, rows));
+    }
+    scene(data);
+}
+
+/// A file of one section, and of one bucket where the level has any.
+fn of_rows(level: u8, degree: u8, rows: &[u8]) -> Vec<u8> {
+    let harmonics = 3 * ((usize::from(degree) + 1).pow(2) - 1);
+    let row = match level {
+        0 => 44 + 4 * harmonics,
+        1 => 24 + 2 * harmonics,
+        _ => 24 + harmonics,
+    };
+    let count = (rows.len() / row) as u32;
+    let mut file = vec![0; 4096 + 1024];
+    (file[1], file[20], file[4096 + 40]) = (1, level, degree);
+    let mut numbers = vec![(4, 1), (8, 1), (12, count), (16, count), (4096, count), (4100, count)];
+    if level > 0 {
+        let bucket = [(8, 256), (12, 1), (16, 5f32.to_bits()), (20, 12), (24, 32_767), (36, 1)];
+        numbers.extend(bucket.map(|(at, number)| (4096 + at, number)));
+        file.extend(count.to_le_bytes());
+        file.extend([0; 12]);
+    }
+    for (at, number) in numbers {
+        file[at..at + 4].copy_from_slice(&number.to_le_bytes());
+    }
+    file.extend(rows);
+    file
+}
+
 /// Whatever bytes a file may have that somebody calls a scene.
 pub fn scene(data: &[u8]) {
     if let Some(scene) = read(data) {

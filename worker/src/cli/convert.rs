@@ -11,12 +11,15 @@ use super::{Budget, Exit, print_line};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
+    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder, and streamed), glTF, .ksplat or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// The file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb or .splat
+    /// The file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb, .ksplat or .splat
     #[arg(value_name = "OUT")]
     output: PathBuf,
+    /// The level of detail of a SOG with a lod-meta.json; 0 is the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    level: u32,
     /// Leaves out Gaussians with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
@@ -38,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let rest = MemoryRequirements::of_program();
     admission::admit_reading(input, &limits, rest)?;
     let bad_rows = BadRows::ignored_if(arguments.ignore_bad_rows);
-    let scene = Scene::read_with_files(input, bad_rows, limits.left(&rest))?;
+    let scene = Scene::read_level(input, arguments.level as usize, bad_rows, limits.left(&rest))?;
     if let Some(ignored) = scene.ignored() {
         eprintln!("note: {ignored}");
     }

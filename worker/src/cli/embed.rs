@@ -15,19 +15,19 @@ use guardsplat_soft_binding::Value;
 
 use super::credentials::{self, Signing, binding_key};
 use super::display::Display;
-use super::{Budget, Exit, Kind, print_json, print_line};
+use super::{Budget, Exit, Kind, embed_levels, print_json, print_line};
 use guardsplat_operations::embed_report::EmbedReport;
 use guardsplat_operations::embed_settings::Choices;
 use guardsplat_operations::{comparison_sheet, load};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene to mark: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
+    /// The scene to mark: PLY, compressed PLY, SPZ, SOG (also as a folder, and streamed), glTF, .ksplat or .splat
     #[arg(value_name = "IN")]
-    input: PathBuf,
+    pub(super) input: PathBuf,
     /// Where to write the marked scene, in the format of IN
     #[arg(value_name = "OUT")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     /// The key file
     #[arg(long)]
     key: PathBuf,
@@ -36,7 +36,7 @@ pub struct Arguments {
     message: String,
     /// draft, standard, robust, thorough or paper
     #[arg(long, default_value = "standard")]
-    preset: Preset,
+    pub(super) preset: Preset,
     /// Decides views, backgrounds and augmentation
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -73,9 +73,9 @@ pub struct Arguments {
     ignore_bad_rows: bool,
     /// A folder for pictures of original, marked and ten times their difference
     #[arg(long, value_name = "DIR")]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     #[command(flatten)]
-    signing: Signing,
+    pub(super) signing: Signing,
     /// A CLIP that was added with `models add`, instead of the one that the key names
     #[arg(long)]
     clip: Option<String>,
@@ -84,12 +84,13 @@ pub struct Arguments {
     settings: Option<PathBuf>,
     /// Prints JSON on standard output
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
     let start = Instant::now();
     arguments.signing.check([&arguments.input, &arguments.output])?;
+    let streamed = embed_levels::open(arguments)?;
     let settings = choices(arguments)?.settings()?;
     let key = Key::read(&arguments.key)?;
     let message = key.message(&arguments.message)?;
@@ -114,6 +115,9 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
         force: arguments.force,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
+    if let Some(streamed) = streamed {
+        return Ok(embed_levels::run(arguments, &engine, &key, &job, &streamed)?);
+    }
     let mut display = Display::new("embedding");
     let mut verifying = None;
     let outcome = embed_with_files(&engine, &job, &mut |progress| {
@@ -151,7 +155,7 @@ fn choices(arguments: &Arguments) -> Result<Choices> {
     })
 }
 
-fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {
+pub(super) fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progress) {
     match progress {
         Progress::Step(step) => display.set(step.step, step.total, || {
             format!(
@@ -185,7 +189,7 @@ fn show(display: &mut Display, verifying: &mut Option<Display>, progress: Progre
     }
 }
 
-fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
+pub(super) fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     write_picture(
         &folder.join(comparison_sheet::NAME),
@@ -193,32 +197,33 @@ fn write_report(folder: &Path, verification: &Verification) -> Result<()> {
     )
 }
 
+/// What became of a mark, in a line.
+pub(super) fn line(report: &EmbedReport<'_>) -> String {
+    let psnr = report.quality.psnr.psnr_db;
+    let psnr = psnr.map_or("identical".into(), |db| format!("{db:.2} dB"));
+    format!(
+        "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
+        100.0 * report.bit_accuracy,
+        100.0 * report.bit_accuracy_worst_view,
+        report.message,
+        if report.message_recovered {
+            "recovered"
+        } else {
+            "not recovered"
+        },
+        report.quality.ssim,
+        report.steps,
+        report.seconds,
+        report.device
+    )
+}
+
 fn tell(arguments: &Arguments, engine: &Engine, key: &Key, outcome: &Outcome, start: Instant) -> Result<()> {
-    let found = &outcome.verification;
     let report = EmbedReport::of(outcome, engine, key, arguments.preset, start.elapsed());
     if arguments.json {
         print_json(&report)?;
     } else {
-        let psnr = found
-            .quality
-            .psnr
-            .psnr_db
-            .map_or("identical".into(), |db| format!("{db:.2} dB"));
-        print_line(&format!(
-            "bits {:.2} % (worst view {:.2} %), message {} {}, PSNR {psnr}, SSIM {:.4}; {} steps, {:.0} s on {}",
-            100.0 * report.bit_accuracy,
-            100.0 * report.bit_accuracy_worst_view,
-            report.message,
-            if report.message_recovered {
-                "recovered"
-            } else {
-                "not recovered"
-            },
-            found.quality.ssim,
-            outcome.steps,
-            report.seconds,
-            report.device
-        ));
+        print_line(&line(&report));
         if let Some(ignored) = &outcome.ignored {
             print_line(&ignored.to_string());
         }

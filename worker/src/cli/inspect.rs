@@ -19,7 +19,7 @@ use super::{Budget, Exit, Kind, print_json, print_line};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
+    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder, and streamed), glTF, .ksplat or .splat
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Counts the Gaussians that so many training views show; takes a while
@@ -31,6 +31,9 @@ pub struct Arguments {
     /// The kind of scene, which says where its viewers are; found from the scene unless given
     #[arg(long, value_enum, conflicts_with = "cameras")]
     kind: Option<Kind>,
+    /// The level of detail of a SOG with a lod-meta.json; 0 is the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    level: u32,
     /// Leaves out rows with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
@@ -69,6 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         views: arguments.views,
         cameras: load::cameras(arguments.cameras.as_deref())?,
         kind: arguments.kind.map(Kind::scene),
+        level: arguments.level as usize,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
         memory: arguments.budget.bytes(),
         forecast: arguments.forecast.then_some(wish),

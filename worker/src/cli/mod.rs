@@ -5,6 +5,7 @@ mod convert;
 mod credentials;
 mod display;
 mod embed;
+mod embed_levels;
 mod evaluate;
 mod inspect;
 mod key;
@@ -255,7 +256,8 @@ mod tests {
             "render IN DIR --ignore-bad-rows --views 5 --cameras F --size 64 --background black --format exr --seed 3 --memory 9",
             "inspect SCENE --json --cameras F --memory 7 --views 16 --ignore-bad-rows",
             "embed IN OUT --key K --message 0 --kind room",
-            "verify A --key K --kind forward",
+            "verify A --key K --kind forward --level 2",
+            "convert IN OUT --level 1",
             "embed IN OUT --key K --message 0 --credentials C --certificate F --private-key P --algorithm es384",
             "credentials check SCENE SIDECAR --trust T --json",
             "credentials find A B --key K --store S --json",

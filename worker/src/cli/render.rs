@@ -25,7 +25,7 @@ enum Format {
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder), glTF or .splat
+    /// The scene: PLY, compressed PLY, SPZ, SOG (also as a folder, and streamed), glTF, .ksplat or .splat
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A folder for the pictures and their cameras
@@ -52,6 +52,9 @@ pub struct Arguments {
     /// Decides the views. No embedding uses any of them, whatever its seed
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// The level of detail of a SOG with a lod-meta.json; 0 is the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    level: u32,
     /// Leaves out Gaussians with NaN and other impossible values instead of refusing the scene
     #[arg(long)]
     ignore_bad_rows: bool,
@@ -70,6 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         size: arguments.size,
         background: arguments.background.rgb(),
         seed: arguments.seed,
+        level: arguments.level as usize,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
         device: arguments.device,
         memory: arguments.budget.bytes(),

@@ -9,7 +9,7 @@ use super::{Exit, Kind, print_line};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb or .splat
+    /// The scene file to write, of the format that its name says: .ply, .compressed.ply, .spz, .sog, .gltf, .glb, .ksplat or .splat
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// What it is of: things on a disc, a room with things in it, hills with houses, or a stage that was captured from its

@@ -19,7 +19,7 @@ use guardsplat_operations::verification_report::{VerificationReport, VerifyRepor
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .splat), pictures (PNG, JPEG, WebP, OpenEXR) and folders of them, all of one
+    /// Scenes (PLY, compressed PLY, SPZ, SOG, glTF, .ksplat, .splat), pictures (PNG, JPEG, WebP, OpenEXR) and folders of them, all of one
     /// suspect
     #[arg(value_name = "PATH", required = true)]
     paths: Vec<PathBuf>,
@@ -49,6 +49,9 @@ pub struct Arguments {
     /// The kind of scene, which says where its viewers are; found from the scene unless given
     #[arg(long, value_enum, conflicts_with = "cameras")]
     kind: Option<Kind>,
+    /// The level of detail of a SOG with a lod-meta.json; 0 is the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    level: u32,
     /// Decides the views of a scene
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -88,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         kind: arguments.kind.map(Kind::scene),
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
         with_files: true,
+        level: arguments.level as usize,
     };
     let mut display = Display::new("reading");
     let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {

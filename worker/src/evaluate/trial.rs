@@ -131,11 +131,12 @@ impl SceneChange {
 }
 
 /// Formats by the names that reports have for them.
-const FORMATS: [(&str, Format); 7] = [
+const FORMATS: [(&str, Format); 8] = [
     ("ply", Format::Ply),
     ("compressed-ply", Format::CompressedPly),
     ("spz", Format::Spz),
     ("splat", Format::Splat),
+    ("ksplat", Format::Ksplat),
     ("sog", Format::Sog),
     ("gltf", Format::Gltf),
     ("glb", Format::Glb),

@@ -100,6 +100,7 @@ pub fn views(spec: &api::VerifySpec) -> Result<Views> {
         kind: kind(spec.scene_kind)?,
         bad_rows: BadRows::ignored_if(spec.ignore_bad_rows),
         with_files: false,
+        level: 0,
     })
 }
 

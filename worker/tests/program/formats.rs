@@ -1,6 +1,10 @@
 //! Formats whose scenes are more than one file, or only a part of one, through the commands.
 use std::path::Path;
 
+use guardsplat_engine::scene::Scene;
+use guardsplat_engine::scene::alter::halved;
+use guardsplat_engine::scene::testing::write_streamed_sog;
+
 use super::{Bench, files, write};
 
 /// A bench with a key and settings of two steps.
@@ -81,7 +85,15 @@ fn a_gltf_is_marked_in_place() {
 fn scenes_are_converted_by_name() {
     let bench = bench();
     bench.exits("sample in.ply --gaussians 300 --sh-degree 3 --seed 2", 0);
-    for name in ["a.glb", "a.gltf", "a.spz", "a.sog", "a.compressed.ply", "a.splat"] {
+    for name in [
+        "a.glb",
+        "a.gltf",
+        "a.spz",
+        "a.sog",
+        "a.compressed.ply",
+        "a.splat",
+        "a.ksplat",
+    ] {
         let told = bench.exits(&format!("convert in.ply {name}"), 0);
         assert!(
             told.starts_with("300 Gaussians of degree 3 as PLY written to a."),
@@ -118,6 +130,75 @@ fn the_folder_of_a_sog_is_marked_as_a_folder() {
     assert_eq!(verify(&bench, "bundled.sog"), marked);
     let line = "embed scene marked --key k.key --message 0123abcd --preset draft --device cpu --size 32";
     assert!(bench.fails(line).contains("not a regular file"));
+}
+
+#[test]
+fn every_level_of_a_streamed_sog_is_marked() {
+    let bench = bench();
+    bench.exits("sample in.ply --gaussians 300 --sh-degree 1 --seed 2", 0);
+    let finest = Scene::read(&bench.path("in.ply")).unwrap().into_gaussians();
+    let coarser = halved(&finest).unwrap();
+    write_streamed_sog(&bench.path("scene"), &[finest, coarser], 2).unwrap();
+    // Two steps miss the target: the first level ends it, and nothing is there.
+    embed(&bench, "scene", "missed", false);
+    assert!(!bench.path("missed").exists());
+    embed(&bench, "scene/lod-meta.json", "marked", true);
+    assert_eq!(files(&bench.path("marked")), files(&bench.path("scene")));
+    for tile in ["0_0", "0_1", "1_0", "1_1"] {
+        for name in files(&bench.path("scene").join(tile)) {
+            let [old, new] = ["scene", "marked"].map(|scene| read(&bench, &format!("{scene}/{tile}/{name}")));
+            assert_eq!(old == new, name != "sh0.webp", "{tile}/{name}");
+        }
+    }
+    assert_eq!(
+        read(&bench, "marked/lod-meta.json"),
+        read(&bench, "scene/lod-meta.json")
+    );
+    // A level reads as it does by itself; the finest is read unless another is asked for.
+    for level in 0..2 {
+        bench.exits(&format!("convert marked level-{level}.ply --level {level}"), 0);
+        let alone = verify(&bench, &format!("level-{level}.ply"));
+        assert_eq!(verify(&bench, &format!("marked --level {level}")), alone);
+    }
+    assert_eq!(verify(&bench, "marked"), verify(&bench, "marked/lod-meta.json"));
+    bench.exits("render marked views --views 1 --size 32 --level 1 --device cpu", 0);
+    assert!(bench.exits("inspect marked --level 1", 0).contains("150"));
+    assert!(
+        bench
+            .fails("convert marked x.ply --level 2")
+            .contains("no level 2: there are 2")
+    );
+    assert!(
+        bench
+            .fails("convert in.ply x.ply --level 1")
+            .contains("only a SOG with a lod-meta.json")
+    );
+    let line = "embed scene marked --key k.key --message 0123abcd --preset draft --device cpu --size 32";
+    assert!(bench.fails(line).contains("under a new name"));
+    assert!(
+        bench
+            .fails(&format!("{line}2 --credentials c.c2pa"))
+            .contains("--credentials")
+    );
+}
+
+#[test]
+fn a_ksplat_is_marked_in_place() {
+    let bench = bench();
+    bench.exits("sample in.ksplat --gaussians 300 --sh-degree 1 --seed 2", 0);
+    embed(&bench, "in.ksplat", "out.ksplat", true);
+    let (old, new) = (read(&bench, "in.ksplat"), read(&bench, "out.ksplat"));
+    assert_ne!(old, new);
+    // Headers, then rows of 80 bytes: 40 of geometry, colour, opacity, harmonics.
+    let may = |i: usize| i >= 5120 && (i - 5120) % 80 >= 40 && (i - 5120) % 80 != 43;
+    assert_eq!(old.len(), new.len());
+    assert!((0..old.len()).all(|i| may(i) || old[i] == new[i]));
+    bench.exits("convert out.ksplat out.ply", 0);
+    assert_eq!(verify(&bench, "out.ksplat"), verify(&bench, "out.ply"));
+    let told = bench.exits("inspect out.ksplat", 0);
+    assert!(told.contains(".ksplat"), "{told}");
+    let line = "embed in.ksplat out.splat --key k.key --message 0123abcd --device cpu";
+    assert!(bench.fails(line).contains("name it *.ksplat"));
 }
 
 fn unzip(file: &Path, folder: &Path) {

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::memory::{MemoryRequirements, admission};
 use crate::message::Message;
-use crate::scene::{BadRows, Gaussians, Scene};
+use crate::scene::{BadRows, Gaussians, Scene, StreamedSog};
 use crate::view::Camera;
 
 /// What to embed where.
@@ -50,6 +50,26 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
 pub fn embed_with_files(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     let read = |memory| Scene::read_with_files(job.input, job.bad_rows, memory);
     embed_scene(engine, job, &read, progress)
+}
+
+/// Marks a level of detail of a SOG that is streamed, in all tiles, as [`embed_with_files`]. The output is a folder with a
+/// `lod-meta.json` of that level alone.
+///
+/// # Errors
+/// Those of [`embed`].
+pub fn embed_level(
+    engine: &Engine,
+    job: &Job<'_>,
+    streamed: &StreamedSog,
+    level: usize,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Outcome> {
+    embed_scene(
+        engine,
+        job,
+        &|memory| streamed.read(level, job.bad_rows, memory),
+        progress,
+    )
 }
 
 fn embed_scene(

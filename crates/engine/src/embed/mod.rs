@@ -29,7 +29,7 @@ mod view_pool;
 
 pub use adam::{Adam, AdamOptions, Penalty};
 pub use augment::Augmentation;
-pub use embed_file::{Job, embed, embed_with_files};
+pub use embed_file::{Job, embed, embed_level, embed_with_files};
 pub use embed_gaussians::embed_gaussians;
 pub use forecast::{Forecast, forecast};
 pub use learned_offsets::LearnedOffsets;

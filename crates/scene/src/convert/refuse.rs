@@ -15,6 +15,11 @@ pub(super) fn check(gaussians: &Gaussians, format: Format) -> Result<(), String>
     match format {
         Format::Ply => Ok(()),
         Format::CompressedPly => check_colours(gaussians),
+        Format::Ksplat if n == 0 => Err("no Gaussian; a .ksplat has one at least".to_string()),
+        Format::Ksplat if u32::try_from(n).is_err() => {
+            Err(format!("{n} Gaussians; the limit of .ksplat is {}", u32::MAX))
+        }
+        Format::Ksplat => Ok(()),
         Format::Splat if n == 0 => Err("no Gaussian; a .splat has one at least".to_string()),
         Format::Splat => Ok(()),
         Format::Spz if u32::try_from(n).is_err() => Err(format!("{n} Gaussians; the limit of SPZ is {}", u32::MAX)),

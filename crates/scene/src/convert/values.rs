@@ -25,7 +25,7 @@ pub(super) fn step(range: Range, value: f32, top: u32) -> u32 {
 }
 
 /// The quaternion of length 1 of the same rotation; that of none where the length is 0.
-pub(super) fn unit(rotation: [f32; 4]) -> [f64; 4] {
+pub(crate) fn unit(rotation: [f32; 4]) -> [f64; 4] {
     // The largest component is divided out first: squares of the largest floats fit in double precision anyway, but
     // those of the smallest would lose their digits.
     let largest = rotation.iter().fold(0.0f64, |most, v| most.max(f64::from(v.abs())));

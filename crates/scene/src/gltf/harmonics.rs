@@ -7,11 +7,11 @@
 use crate::MAX_DEGREE;
 
 /// Rows are x, y, z.
-pub(super) type Matrix = [[f64; 3]; 3];
+pub(crate) type Matrix = [[f64; 3]; 3];
 
 /// A turn of spherical harmonics.
 #[derive(Clone, Debug)]
-pub(super) struct Turn {
+pub(crate) struct Turn {
     /// Of band `l`, at `l - 1`: `(2 l + 1)^2` entries, row by row.
     bands: Vec<Vec<f64>>,
 }

@@ -27,6 +27,9 @@ mod splats;
 mod splice;
 mod write;
 
+pub(crate) use harmonics::Turn;
+pub(crate) use placement::{Placement, matrix};
+
 use crate::container::{Container, Format};
 use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};

@@ -13,7 +13,7 @@ const NOWHERE: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 
 
 /// Where a node is in the world.
 #[derive(Clone, Debug)]
-pub(super) struct Placement {
+pub(crate) struct Placement {
     scale: f64,
     /// w, x, y, z, of length 1; `None` without a turn.
     rotation: Option<[f64; 4]>,
@@ -62,6 +62,20 @@ impl Placement {
             matrix: rotation.map_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], matrix),
             rotation,
             shift,
+        })
+    }
+
+    /// By a turn w, x, y, z of any length but 0, then a scale of more than 0, then a shift; `None` for others.
+    pub(crate) fn of(rotation: [f32; 4], scale: f32, shift: [f32; 3]) -> Option<Placement> {
+        let [w, x, y, z] = rotation.map(f64::from);
+        let length = (w * w + x * x + y * y + z * z).sqrt();
+        let finite = length.is_finite() && scale.is_finite() && shift.iter().all(|v| v.is_finite());
+        let unit = [w, x, y, z].map(|v| v / length);
+        (finite && length > 0.0 && scale > 0.0).then(|| Placement {
+            scale: scale.into(),
+            matrix: matrix(unit),
+            rotation: Some(unit).filter(|q| *q != [1.0, 0.0, 0.0, 0.0]),
+            shift: shift.map(f64::from),
         })
     }
 
@@ -187,7 +201,7 @@ fn product(a: &Affine, b: &Affine) -> Affine {
 }
 
 /// The matrix of a quaternion w, x, y, z of length 1.
-pub(super) fn matrix([w, x, y, z]: [f64; 4]) -> Matrix {
+pub(crate) fn matrix([w, x, y, z]: [f64; 4]) -> Matrix {
     [
         [
             1.0 - 2.0 * (y * y + z * z),

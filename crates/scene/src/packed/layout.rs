@@ -96,7 +96,9 @@ impl Layout {
                 chunks.count, gaussians.count
             ));
         }
-        let (degree, rest) = match header.elements.contains_key("sh") {
+        // gsplat writes the element without a property where there is nothing in it.
+        let has_rest = header.elements.get("sh").is_some_and(|sh| !sh.properties.is_empty());
+        let (degree, rest) = match has_rest {
             true => {
                 let (degree, rest) = find_rest(header, gaussians.count)?;
                 (degree, Some(rest))

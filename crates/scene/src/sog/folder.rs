@@ -1,6 +1,6 @@
 //! A SOG as it lies on servers: `meta.json` and its pictures in a folder, which is read as if it were bundled, and written
 //! as a folder again, with every file but one as it was.
-use crate::atomic_write::write_whole;
+use crate::atomic_write::{write_folder_whole, write_whole};
 use crate::container::{Container, Format};
 use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
@@ -111,45 +111,24 @@ impl Container for Folder {
         if Format::of_name(path) == Some(Format::Sog) {
             return write_whole(path, |out| self.write(sh, out));
         }
-        self.write_folder(sh, path).map_err(Error::io(path))
+        write_folder_whole(path, |aside| self.write_folder(sh, aside).map_err(Error::io(path)))
     }
 }
 
 impl Folder {
-    fn write_folder(&self, sh: &Sh, path: &Path) -> io::Result<()> {
-        if path.exists() {
-            return Err(io::Error::new(
-                io::ErrorKind::AlreadyExists,
-                "a folder is written under a new name",
-            ));
-        }
+    fn write_folder(&self, sh: &Sh, aside: &Path) -> io::Result<()> {
         let mut file = Vec::new();
         self.bundle.write(sh, &mut file)?;
         let mut zip = ZipArchive::new(Cursor::new(file)).map_err(io::Error::other)?;
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            // Like any new folder: what the user's mask allows, not the privacy of a temporary one.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o777));
-        }
-        let aside = builder
-            .prefix(".guardsplat-")
-            .suffix(".part")
-            .tempdir_in(parent.unwrap_or(Path::new(".")))?;
         for i in 0..zip.len() {
             let mut entry = zip.by_index(i).map_err(io::Error::other)?;
             // All names are those of files that lay in one folder.
             let name = entry.name().map_err(io::Error::other)?.into_owned();
             let name = Path::new(&name).file_name().unwrap_or_default();
-            let mut out = fs::File::create_new(aside.path().join(name))?;
+            let mut out = fs::File::create_new(aside.join(name))?;
             io::copy(&mut entry, &mut out)?;
             out.sync_all()?;
         }
-        fs::rename(aside.path(), path)?;
-        // What was renamed is not there to be deleted.
-        let _ = aside.keep();
         Ok(())
     }
 }

@@ -8,12 +8,17 @@ pub(crate) mod budget;
 pub(crate) mod codebook;
 pub(crate) mod decode;
 mod folder;
+mod index;
 mod json;
+mod level;
 pub(crate) mod meta;
 pub(crate) mod palette;
 pub(crate) mod picture;
+mod streamed;
 
 pub(crate) use folder::read as read_folder;
+pub(crate) use streamed::INDEX;
+pub use streamed::StreamedSog;
 
 use crate::container::{Container, Format};
 use crate::error::bad;
@@ -94,9 +99,11 @@ pub(crate) fn read(
 
 fn parse(file: Vec<u8>, bad_rows: BadRows, budget: &mut Budget) -> Result<(Gaussians, Sog), String> {
     if !file.starts_with(ZIP) {
-        return Err(
-            "the meta.json of an SOG without its pictures; give its folder, or bundle it into one .sog file".into(),
-        );
+        return Err(match streamed::announced(&file) {
+            true => "the lod-meta.json of a streamed SOG without its files; only the worker's commands take it, or its folder",
+            false => "the meta.json of an SOG without its pictures; give its folder, or bundle it into one .sog file",
+        }
+        .into());
     }
     let mut archive = Archive::open(&file)?;
     let meta = archive.unpack("meta.json", "meta.json", MAX_META, budget)?;

@@ -78,7 +78,8 @@ fn a_write_changes_colours_and_nothing_else() {
 
 #[test]
 fn what_is_no_scene_is_refused_with_a_reason() {
-    let unknown = "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF or a .splat, since ";
+    let unknown =
+        "not a scene: neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF, a .ksplat or a .splat, since ";
     assert_eq!(refused(b""), format!("{unknown}it is empty"));
     assert_eq!(
         refused(&[7; 35]),

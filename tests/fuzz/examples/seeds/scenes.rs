@@ -1,4 +1,4 @@
-//! Scenes: PLY, compressed PLY, SPZ, glTF, .splat.
+//! Scenes: PLY, compressed PLY, SPZ, glTF, .splat, .ksplat.
 use super::{put, put_damaged};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -12,6 +12,7 @@ pub fn put_all() {
     packed();
     spz();
     splat();
+    ksplat();
     gltf();
 }
 
@@ -267,7 +268,8 @@ fn splat() {
     put("summary", "splat", rows(0.5));
 }
 
-fn gltf() {
+/// A scene of three Gaussians in a file of a format.
+fn converted(degree: usize, format: Format) -> Vec<u8> {
     let scene = |degree: usize| {
         let mut numbers = values(60, 3).cycle();
         let mut next = || numbers.next().unwrap_or_default();
@@ -284,11 +286,30 @@ fn gltf() {
             sh,
         }
     };
-    let file = |degree, format| {
-        let mut bytes = Vec::new();
-        convert(&scene(degree), format, Path::new("seed"), &mut bytes).expect("a small scene has a place");
-        bytes
-    };
+    let mut bytes = Vec::new();
+    convert(&scene(degree), format, Path::new("seed"), &mut bytes).expect("a small scene has a place");
+    bytes
+}
+
+fn ksplat() {
+    let target = "ksplat";
+    put_damaged(target, "level-0-degree-0", &converted(0, Format::Ksplat));
+    put_damaged(target, "level-0-degree-2", &converted(2, Format::Ksplat));
+    // What the target puts behind headers: a level, a degree, and rows. Halves from 0.5 to 2.
+    for (level, degree, row) in [(0, 1, 80), (1, 0, 24), (1, 2, 72), (2, 1, 33), (2, 2, 48)] {
+        let mut rows = vec![level, degree];
+        rows.extend((0..2 * row).map(|i| if i % 2 == 1 { 0x38 + i as u8 % 8 } else { i as u8 }));
+        put(target, &format!("rows-level-{level}-degree-{degree}"), rows);
+    }
+    let mut two = converted(1, Format::Ksplat);
+    (two[4], two[8]) = (2, 2);
+    put(target, "section-missing", two);
+    put("scene", "ksplat", converted(1, Format::Ksplat));
+    put("summary", "ksplat", converted(1, Format::Ksplat));
+}
+
+fn gltf() {
+    let file = converted;
     for (name, degree, format) in [
         ("glb-0", 0, Format::Glb),
         ("glb-3", 3, Format::Glb),

@@ -239,6 +239,7 @@ impl Files {
             kind: None,
             bad_rows: BadRows::Refuse,
             with_files: true,
+            level: 0,
         };
         let suspect = Suspect::from(find_source(&[path.to_owned()])?);
         let found = read_and_compare(&given.engine, &suspect, &views, Some(&given.message), |_, _| {})?;

@@ -76,6 +76,7 @@ impl Arguments {
             kind: self.kind.map(Kind::scene),
             bad_rows: BadRows::ignored_if(true),
             with_files: true,
+            level: 0,
         })
     }
 }

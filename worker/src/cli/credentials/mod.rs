@@ -78,6 +78,11 @@ pub struct Signing {
 }
 
 impl Signing {
+    /// Whether credentials are asked for.
+    pub fn is_wanted(&self) -> bool {
+        self.credentials.is_some()
+    }
+
     /// Fails before any work is done where credentials are wanted that can't be written: without the program, for a scene
     /// in several files, without the certificate's files.
     pub fn check(&self, scenes: [&Path; 2]) -> Result<()> {

@@ -20,6 +20,10 @@ fn no_gaussian() {
             assert!(checked(&none, format).written.order.is_empty());
         }
         assert_eq!(refused(&none, Format::Splat), "no Gaussian; a .splat has one at least");
+        assert_eq!(
+            refused(&none, Format::Ksplat),
+            "no Gaussian; a .ksplat has one at least"
+        );
         for format in [Format::Gltf, Format::Glb] {
             assert_eq!(refused(&none, format), "no Gaussian; a glTF has one at least");
         }
@@ -83,14 +87,17 @@ fn large_numbers() {
     scene.rotations[7] = [1e-45, 0.0, 0.0, -1e-45];
     scene.log_scales[8] = [300.0, 60.0, -200.0];
     scene.sh.coefficients[..12].copy_from_slice(&[9.0, -9.0, 1e3, 9.0, -9.0, 1e3, 5.0, -5.0, 2.0, -2.0, 0.0, -0.0]);
-    for format in Format::ALL.into_iter().filter(|format| *format != Format::Splat) {
+    let rows = [Format::Splat, Format::Ksplat];
+    for format in Format::ALL.into_iter().filter(|format| !rows.contains(format)) {
         checked(&scene, format);
     }
     // A deviation of e^300 is the largest float.
-    let read = converted(&scene, Format::Splat);
-    let place = read.written.order.iter().position(|row| *row == 8).unwrap();
-    assert_eq!(read.scene.gaussians.log_scales[place][..2], [88.72284, 60.0]);
-    assert_eq!(place, 0, "the largest is first");
+    for format in rows {
+        let read = converted(&scene, format);
+        let place = read.written.order.iter().position(|row| *row == 8).unwrap();
+        assert_eq!(read.scene.gaussians.log_scales[place][..2], [88.72284, 60.0]);
+        assert!(place == 0 || format == Format::Ksplat, "the largest is first");
+    }
 }
 
 #[test]

@@ -14,7 +14,8 @@ fn real_scenes_in_every_format() {
         for format in Format::ALL {
             let file = checked(&scene, format);
             assert!(
-                matches!(format, Format::Ply | Format::Gltf | Format::Glb) || file.bytes.len() < 50 * scene.len(),
+                matches!(format, Format::Ply | Format::Ksplat | Format::Gltf | Format::Glb)
+                    || file.bytes.len() < 50 * scene.len(),
                 "{format:?} of {name}"
             );
         }

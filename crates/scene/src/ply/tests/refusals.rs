@@ -109,11 +109,11 @@ fn other_files_are_refused() {
     for (text, expected) in [
         (
             "",
-            "neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF or a .splat, since it is empty",
+            "neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF, a .ksplat or a .splat, since it is empty",
         ),
         (
             "Dear reader,\nthis is prose.\n",
-            "neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF or a .splat",
+            "neither a PLY, plain or compressed, nor an SPZ, a SOG, a glTF, a .ksplat or a .splat",
         ),
         ("ply", "ends before end_header"),
         ("ply is a word\n", "not a PLY file: its first line is not \"ply\""),

@@ -8,6 +8,7 @@ mod pictures;
 mod real;
 mod refusals;
 mod round_trips;
+mod streamed;
 
 use crate::{Error, Result, Scene, Sh};
 use image_webp::{ColorType, WebPEncoder};

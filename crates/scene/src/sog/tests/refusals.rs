@@ -165,7 +165,7 @@ fn folders_are_refused_by_their_meta_json() {
     );
     assert_eq!(
         refused(br#" {"version": 1, "lodLevels": 3, "filenames": ["0_0/meta.json"]}"#),
-        reason
+        "the lod-meta.json of a streamed SOG without its files; only the worker's commands take it, or its folder"
     );
     // In front of all else in the archive it may have a mark of byte order.
     let mut entries = file.entries();

@@ -1,5 +1,12 @@
-//! What strangers do to a scene: leave Gaussians out, drop bands of colour, add noise. Each gives a new scene; rows that
-//! stay keep their order, and the same arguments give the same bytes.
+//! What strangers do to a scene: leave Gaussians out, merge or move them, drop bands of colour, add noise. Each gives a new scene; rows that
+//! stay keep their order unless it is said, and the same arguments give the same bytes.
+mod edit;
+mod merge;
+mod symmetric;
+
+pub use edit::{Motion, crop, moved, shuffled, without_floaters};
+pub use merge::halved;
+
 use crate::error::bad;
 use crate::{Gaussians, Result, Sh};
 use rand::{RngExt, SeedableRng};
@@ -116,7 +123,7 @@ fn pruned(gaussians: &Gaussians, share: f64) -> Result<usize> {
 }
 
 /// The Gaussians that are not in `rows`.
-fn without(gaussians: &Gaussians, rows: &[usize]) -> Gaussians {
+pub(crate) fn without(gaussians: &Gaussians, rows: &[usize]) -> Gaussians {
     let mut stays = vec![true; gaussians.len()];
     rows.iter().for_each(|row| stays[*row] = false);
     fn some<T: Copy>(values: &[T], each: usize, stays: &[bool]) -> Vec<T> {
