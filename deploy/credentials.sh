@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Content credentials: builds guardsplat-credentials beside the other programs, runs its tests, and has a second reader, the
-# C2PA's Python library, validate what the worker writes. The worker must be built.
+# C2PA's Python library, validate what the worker writes, and has jobs of a server write it, too. The worker must be built.
 #
 #     deploy/credentials.sh          all of that
 #     deploy/credentials.sh build    the program only
@@ -23,6 +23,9 @@ unchecked() {
     exit
 }
 [ -x "$target/release/guardsplat-worker" ] || unchecked "guardsplat-worker is not built"
+# Jobs of a server. Without the program these tests are skipped.
+GUARDSPLAT_CREDENTIALS_BUILT=1 CARGO_TARGET_DIR=$target \
+    cargo test --quiet --release --workspace --locked --test service -- credentials
 if ! cmp -s "$requirements" "$tools/installed.txt"; then
     command -v python3 >/dev/null || unchecked "python3 was not found"
     { python3 -m venv --clear "$tools" &&

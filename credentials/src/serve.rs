@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use guardsplat_soft_binding::resolution::MAX_BODY;
 use http_body_util::{BodyExt as _, Full, Limited};
 use hyper::body::{Body as _, Bytes, Incoming};
 use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HeaderValue, WWW_AUTHENTICATE};
@@ -30,9 +31,6 @@ const SILENCE: Duration = Duration::from_secs(30);
 const PAUSE: Duration = Duration::from_millis(100);
 /// The folder is looked at again after this.
 const REFRESH: Duration = Duration::from_secs(1);
-/// Most bytes of a question.
-const MAX_BODY: usize = 1 << 16;
-
 /// Arguments of `serve`.
 #[derive(Args)]
 pub struct Arguments {

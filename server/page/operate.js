@@ -1,8 +1,8 @@
-// Jobs of the project: the queue, which workers have what, and what failed and why.
+// Jobs of the project: the queue, what failed and why; and the workers with what they have.
 import { Outcome, State } from "./vendor/api.js";
 import { jobs, patiently, SOON } from "./calls.js";
-import { alertIn, announce, by, element, moment } from "./elements.js";
-import { explain } from "./errors.js";
+import { alertIn, announce, by, bytes, element, moment } from "./elements.js";
+import { explain, reason } from "./errors.js";
 import { isOver, standing } from "./jobs.js";
 
 const STATES = { open: [State.QUEUED, State.RUNNING], failed: [State.FAILED], all: [] };
@@ -80,11 +80,40 @@ async function page() {
     by("jobs-summary").textContent = there === 0 ? "There are none." : `${there}${next ? " and more" : ""}.`;
 }
 
+function worker({ name, device, version, memoryBytes, seenTime, busy, job, attempt, startTime }) {
+    const own = job ? `Has attempt ${attempt} of ${job.replace("jobs/", "")}` : "Has a job of another project";
+    const does = busy ? `${own}, since ${moment(startTime)}.` : "Waits for a job.";
+    const what = [device, version && `version ${version}`, memoryBytes > 0n && `${bytes(memoryBytes)} for a job`];
+    return element(
+        "li",
+        {},
+        element("p", {}, element("strong", {}, name)),
+        element("p", {}, does),
+        element("p", { className: "hint" }, [...what, `last heard of ${moment(seenTime)}`].filter(Boolean).join(", ")),
+    );
+}
+
+/** Those who carry jobs out, for who may see them. */
+async function workers() {
+    try {
+        const answer = await patiently(() => jobs.listWorkers({}, { timeoutMs: SOON }));
+        by("workers-list").replaceChildren(...answer.workers.map(worker));
+        const free = answer.workers.filter(({ busy }) => !busy).length;
+        const there = `${answer.workers.length} within the last hour, ${free} without a job.`;
+        by("workers-summary").textContent = answer.workers.length === 0 ? "None asked for a job within the last hour." : there;
+        by("workers").hidden = false;
+    } catch (error) {
+        if (reason(error) !== "SCOPE_MISSING") throw error;
+        by("workers").hidden = true;
+    }
+}
+
 /** Looks anew. */
 export async function open() {
     next = "";
     by("jobs-list").replaceChildren();
     await page();
+    await workers();
     announce(by("jobs-summary").textContent);
 }
 

@@ -137,7 +137,7 @@ impl Server {
             connections: files::connections(&settings, files),
             handshake: listener::HANDSHAKE,
             idle: settings.connection_idle(),
-            measured: api.measured(),
+            api: api.clone(),
         };
         let page = match settings.page_listen {
             Some(wanted) => Some(listen_for_browsers(wanted, &door).await?),
@@ -201,7 +201,7 @@ impl Server {
                 connections: SIDE,
                 handshake: listener::HANDSHAKE,
                 idle: None,
-                measured: self.api.measured(),
+                api: self.api.clone(),
             };
             tokio::spawn(listener::serve(routes.clone(), door, listener, drained.clone()))
         });
@@ -279,7 +279,7 @@ async fn listen_for_browsers(wanted: SocketAddr, door: &ListenerOptions) -> Resu
         connections: door.connections,
         handshake: door.handshake,
         idle: door.idle,
-        measured: door.measured.clone(),
+        api: door.api.clone(),
     };
     Ok((listener, door))
 }

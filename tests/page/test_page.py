@@ -120,6 +120,37 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     marking = tab.locator("#jobs-list > li").filter(has_text="Marking: sample.ply")
     marking.get_by_role("button", name="Attempts").click()
     expect(marking).to_contain_text(re.compile(r"Attempt 1, .*, worker .*: succeeded"))
+    # And who could do more.
+    workers = tab.get_by_role("list", name="Workers").get_by_role("listitem")
+    expect(workers).to_have_count(1)
+    expect(workers).to_contain_text("Waits for a job.")
+    expect(workers).to_contain_text(re.compile(r"version \d.*, last heard of .*\d"))
+
+
+def test_a_worker_is_seen_with_its_job_by_admins(service: Service, token: str, small: Path, key: str, tab: Page) -> None:
+    name = key.split()[0]
+    long = ("--preset", "thorough", "--display-name", "long")
+    job = service.client(token, "embed", small, "--key", name, "--message", MESSAGE, "--no-wait", *long).split()[0]
+    sign_in(tab, address(service), token)
+    tab.get_by_role("link", name="Jobs").click()
+    workers = tab.get_by_role("list", name="Workers").get_by_role("listitem")
+    had = re.compile(f"Has attempt 1 of {job.removeprefix('jobs/')}, since ")
+    for _ in range(60):
+        tab.get_by_role("button", name="Look again").click()
+        expect(workers).to_have_count(1)
+        if had.search(workers.inner_text()):
+            break
+        tab.wait_for_timeout(500)
+    expect(workers).to_contain_text(had)
+    tab.locator("#jobs-list > li").filter(has_text="long").get_by_role("button", name="Cancel").click()
+    # Whoever may not see workers sees the jobs all the same.
+    other = tab.context.new_page()
+    sign_in(other, address(service), service.token("embed"))
+    other.get_by_role("link", name="Jobs").click()
+    expect(other.locator("#jobs-summary")).not_to_be_empty()
+    expect(other.get_by_role("heading", name="Workers")).to_be_hidden()
+    expect(other.locator("#jobs-alert")).to_be_hidden()
+    other.close()
 
 
 def test_an_owner_is_registered_and_found(service: Service, token: str, small: Path, tab: Page, folder: Path) -> None:

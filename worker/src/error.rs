@@ -18,6 +18,9 @@ pub enum Error {
     /// Content credentials could not be made or read.
     #[error("{0}")]
     Credentials(String),
+    /// The program that makes or reads them failed.
+    #[error(transparent)]
+    CredentialsProgram(#[from] crate::credentials_program::Error),
     /// What a manifest would say of the mark.
     #[error(transparent)]
     SoftBinding(#[from] guardsplat_soft_binding::Error),

@@ -106,6 +106,9 @@ pub struct Arguments {
     /// Where to write a picture of original, marked and ten times their difference
     #[arg(long, value_name = "FILE")]
     comparison: Option<PathBuf>,
+    /// Has content credentials (C2PA) made of the marked scene, and fetches them into this file, such as OUT.c2pa
+    #[arg(long, value_name = "FILE")]
+    credentials: Option<PathBuf>,
     #[command(flatten)]
     submission: Submission,
 }
@@ -120,6 +123,7 @@ struct Report<'a> {
     seed: u64,
     written: bool,
     output: Option<&'a Path>,
+    credentials_file: Option<&'a Path>,
     #[serde(flatten)]
     result: Option<EmbedReport>,
     /// Of a job that failed; a result has its own.
@@ -132,7 +136,10 @@ struct Report<'a> {
 pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     // What can't be written, or is not there, is better known before the work.
     if !arguments.submission.no_wait {
-        for path in arguments.output.iter().chain(&arguments.comparison) {
+        for path in [&arguments.output, &arguments.comparison, &arguments.credentials]
+            .into_iter()
+            .flatten()
+        {
             Destination::check(path)?;
         }
     }
@@ -191,6 +198,7 @@ fn spec(arguments: &Arguments, key: &Key, message: String, asset: String, inputs
         force: arguments.force,
         ignore_bad_rows: arguments.ignore_bad_rows,
         scene_kind: scene_kind::number(arguments.kind),
+        credentials: arguments.credentials.is_some(),
         robust_to: distortion::named(&arguments.robust_to),
         ..EmbedSpec::default()
     };
@@ -205,6 +213,12 @@ async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -
     context.enter(Stage::Fetching { job: job.name.clone() });
     if let Some(path) = &arguments.comparison {
         download(context, &result.comparison, path).await?;
+    }
+    if let Some(path) = &arguments.credentials {
+        let made = result.credentials.as_ref().ok_or_else(|| Error::Answer {
+            reason: "it has no credentials: the server is older than they are".into(),
+        })?;
+        download(context, &made.artifact, path).await?;
     }
     let mut misnamed = None;
     // The scene comes last: where it is, all is.
@@ -224,6 +238,7 @@ async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -
         print_json(&Report {
             written: arguments.output.is_some(),
             output: arguments.output.as_deref(),
+            credentials_file: arguments.credentials.as_deref(),
             result: Some(report),
             target_missed: None,
             ..facts(&job, key)
@@ -232,6 +247,9 @@ async fn finish(context: &Context, arguments: &Arguments, job: Job, key: &Key) -
         print_line(&report.line());
         if let Some(path) = &arguments.output {
             print_line(&format!("written to {}", path.display()));
+        }
+        if let Some(path) = &arguments.credentials {
+            print_line(&format!("credentials written to {}", path.display()));
         }
     }
     if missed.is_empty() {
@@ -268,6 +286,7 @@ fn facts<'a>(job: &'a Job, key: &'a Key) -> Report<'a> {
         seed,
         written: false,
         output: None,
+        credentials_file: None,
         result: None,
         target_missed: None,
         failure: job.failure.as_ref().map(Into::into),

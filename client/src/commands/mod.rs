@@ -12,6 +12,7 @@ pub mod owner;
 pub mod report;
 pub mod token;
 pub mod verify;
+pub mod worker;
 
 use clap::Subcommand;
 
@@ -37,6 +38,9 @@ pub enum Command {
     /// Work that is waiting, under way or over
     #[command(subcommand)]
     Jobs(jobs::Command),
+    /// Those who carry jobs out
+    #[command(subcommand)]
+    Worker(worker::Command),
     /// Scenes and pictures that the server keeps
     #[command(subcommand)]
     Artifact(artifact::Command),
@@ -67,6 +71,7 @@ pub async fn run(context: &Context, command: Command) -> Result<Exit> {
         Command::Embed(arguments) => embed::run(context, &arguments).await,
         Command::Verify(arguments) => verify::run(context, &arguments).await,
         Command::Jobs(command) => jobs::run(context, &command).await,
+        Command::Worker(command) => worker::run(context, &command).await,
         Command::Artifact(command) => artifact::run(context, &command).await,
         Command::Owner(command) => owner::run(context, &command).await,
         Command::Asset(command) => asset::run(context, &command).await,

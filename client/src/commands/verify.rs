@@ -1,7 +1,10 @@
 //! `verify`.
+use std::path::{Path, PathBuf};
+
 use clap::Args;
-use guardsplat_proto::v1::VerifySpec;
 use guardsplat_proto::v1::job::{Result as Outcome, Spec};
+use guardsplat_proto::v1::verify_result::Verdict;
+use guardsplat_proto::v1::{Job, VerifyResult, VerifySpec};
 use serde::Serialize;
 
 use super::{key, owner};
@@ -10,10 +13,12 @@ use crate::error::Result;
 use crate::inputs;
 use crate::job::create::{create_with, leave, no_result, succeeded, wait};
 use crate::options::Submission;
-use crate::output::{Exit, print_json, print_line};
+use crate::output::{Exit, print_json, print_line, say};
 use crate::report::VerifyReport;
 use crate::resource_names;
 use crate::scene_kind::{self, SceneKind};
+use crate::stage::Stage;
+use crate::transfer::{Destination, download};
 
 /// Arguments of `verify`.
 #[derive(Args)]
@@ -45,6 +50,9 @@ pub struct Arguments {
     /// Leaves out Gaussians of a scene with NaN and other impossible values instead of refusing it
     #[arg(long)]
     ignore_bad_rows: bool,
+    /// Where to write the content credentials (C2PA) of the scene whose mark is found; of several the newest
+    #[arg(long, value_name = "FILE")]
+    credentials: Option<PathBuf>,
     #[command(flatten)]
     submission: Submission,
 }
@@ -71,12 +79,17 @@ struct Claim {
 struct Report<'a> {
     job: &'a str,
     key: &'a str,
+    credentials_file: Option<&'a Path>,
     #[serde(flatten)]
     result: &'a VerifyReport,
 }
 
 /// Reads a suspect.
 pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
+    // What can't be written is better known before the work.
+    if let Some(path) = arguments.credentials.as_ref().filter(|_| !arguments.submission.no_wait) {
+        Destination::check(path)?;
+    }
     let found = inputs::find(&arguments.paths)?;
     let key = key::find(context, &arguments.key).await?;
     let claim = &arguments.claim;
@@ -115,15 +128,43 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
     let Some(Outcome::VerifyResult(result)) = &job.result else {
         return Err(no_result(&job));
     };
+    let fetched = fetch_credentials(context, &job, result, arguments.credentials.as_deref()).await?;
     let report = VerifyReport::from(result);
     if context.json {
         print_json(&Report {
             job: &job.name,
             key: &key.name,
+            credentials_file: fetched,
             result: &report,
         });
     } else {
         print_line(&report.lines());
+        if let Some(path) = fetched {
+            print_line(&format!("credentials written to {}", path.display()));
+        }
+    }
+    if arguments.credentials.is_some() && fetched.is_none() {
+        say(match result.verdict() {
+            Verdict::Match => "no credentials: the mark that was found was made without any, or they were deleted",
+            _ => "no credentials: no mark was found that could have any",
+        });
     }
     Ok(report.exit())
+}
+
+/// Fetches the newest credentials of the mark that was found, if there are any and they are wanted; where they are then.
+async fn fetch_credentials<'a>(
+    context: &Context,
+    job: &Job,
+    result: &VerifyResult,
+    path: Option<&'a Path>,
+) -> Result<Option<&'a Path>> {
+    let Some((path, newest)) = path.zip(result.credentials.first()) else {
+        return Ok(None);
+    };
+    context.enter(Stage::Fetching { job: job.name.clone() });
+    download(context, &newest.artifact, path).await?;
+    context.enter(Stage::Nothing);
+    context.console.clear();
+    Ok(Some(path))
 }

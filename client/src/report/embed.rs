@@ -2,6 +2,7 @@
 use guardsplat_proto::v1::EmbedResult;
 use serde::Serialize;
 
+use super::credentials::CredentialsReport;
 use super::text::{rows_ignored, seconds, some};
 use crate::output::printable;
 
@@ -33,6 +34,8 @@ pub struct EmbedReport {
     ignored_rows: u64,
     evidence_html: Option<String>,
     evidence_json: Option<String>,
+    /// Null unless they were asked for.
+    credentials: Option<CredentialsReport>,
     target_missed: Vec<String>,
 }
 
@@ -61,6 +64,7 @@ impl From<&EmbedResult> for EmbedReport {
             ignored_rows: result.ignored_rows,
             evidence_html: some(&result.evidence_html),
             evidence_json: some(&result.evidence_json),
+            credentials: result.credentials.as_ref().map(Into::into),
             target_missed: result.target_missed.clone(),
         }
     }
@@ -97,6 +101,11 @@ impl EmbedReport {
             .as_ref()
             .map(|name| format!("\nevidence: {name}"))
             .unwrap_or_default()
+            + &self
+                .credentials
+                .as_ref()
+                .map(CredentialsReport::line)
+                .unwrap_or_default()
             + &rows_ignored(self.ignored_rows)
     }
 }

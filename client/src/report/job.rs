@@ -51,6 +51,7 @@ enum SpecReport {
         ignore_bad_rows: bool,
         /// Empty where the preset decides.
         robust_to: Vec<String>,
+        credentials: bool,
     },
     Verify {
         suspects: Vec<String>,
@@ -149,6 +150,7 @@ impl From<&Spec> for SpecReport {
                 force: spec.force,
                 ignore_bad_rows: spec.ignore_bad_rows,
                 robust_to: distortion::names(spec),
+                credentials: spec.credentials,
             },
             Spec::Verify(spec) => verify(spec, given(spec.views), given(spec.size)),
             // A seed is as good as the key: it is not printed.

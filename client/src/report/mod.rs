@@ -1,6 +1,7 @@
 //! What commands print as JSON: names and meanings as in the engine's own, where they mean the same.
 mod artifact;
 mod attempt;
+mod credentials;
 mod embed;
 mod hook;
 mod job;
@@ -9,6 +10,7 @@ mod registry;
 mod text;
 mod token;
 mod verify;
+mod worker;
 
 pub use artifact::ArtifactReport;
 pub use attempt::{AttemptReport, outcome_word};
@@ -20,3 +22,4 @@ pub use registry::{AssetReport, OwnerReport};
 pub use text::{time, word};
 pub use token::TokenReport;
 pub use verify::VerifyReport;
+pub use worker::WorkerReport;

@@ -3,6 +3,7 @@ use guardsplat_proto::v1::VerifyResult;
 use guardsplat_proto::v1::verify_result::Verdict;
 use serde::Serialize;
 
+use super::credentials::CredentialsReport;
 use super::text::{rows_ignored, seconds, some, time, word};
 use crate::output::{Exit, printable};
 
@@ -32,6 +33,8 @@ pub struct VerifyReport {
     corrected_bits: Option<u32>,
     evidence_html: Option<String>,
     evidence_json: Option<String>,
+    /// Of scenes that were marked with the mark that was found, newest first.
+    credentials: Vec<CredentialsReport>,
     assets_paid: Option<u64>,
     readings_paid: Option<u64>,
     first_seen_time: Option<String>,
@@ -80,6 +83,7 @@ impl From<&VerifyResult> for VerifyReport {
             corrected_bits: result.corrected_bits,
             evidence_html: some(&result.evidence_html),
             evidence_json: some(&result.evidence_json),
+            credentials: result.credentials.iter().map(Into::into).collect(),
             reason: some(&result.reason),
             ignored_rows: result.ignored_rows,
             seconds: seconds(result.duration),
@@ -130,7 +134,11 @@ impl VerifyReport {
             text.push('\n');
             text.push_str(&printable(reason));
         }
-        text + &rows_ignored(self.ignored_rows)
+        text + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
+    }
+
+    fn credentials_lines(&self) -> String {
+        self.credentials.iter().map(CredentialsReport::line).collect()
     }
 
     /// Of a raw verification, to who is no admin.
@@ -138,7 +146,7 @@ impl VerifyReport {
         if let Some(reason) = &self.reason {
             text = format!("{text}\n{}", printable(reason));
         }
-        text + "\nhow near it was is told to admins" + &rows_ignored(self.ignored_rows)
+        text + "\nhow near it was is told to admins" + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
     }
 
     /// Of a claim: whose mark it is, and what was tried to find it.
@@ -181,7 +189,7 @@ impl VerifyReport {
         if let Some(evidence) = &self.evidence_html {
             text += &format!("\nevidence: {evidence}");
         }
-        text + &rows_ignored(self.ignored_rows)
+        text + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
     }
 }
 

@@ -157,3 +157,30 @@ fn artifacts_are_put_and_deleted() {
     assert_eq!((&json["name"], &json["deleted"]), (&name.into(), &true.into()));
     assert!(environment.fake.state().artifacts.is_empty());
 }
+
+#[test]
+fn workers_are_listed_with_what_they_have() {
+    let environment = TestEnvironment::new();
+    let ran = environment.run("worker list");
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let lines: Vec<&str> = ran.out.lines().collect();
+    assert_eq!(
+        lines[0],
+        "busy  attempt 2 of jobs/7  last heard of 1970-01-01T00:00:00Z  a GPU, 1.2.3, 3.0 GiB"
+    );
+    assert!(
+        lines[1].starts_with("elsewhere  a job of another project  "),
+        "{}",
+        lines[1]
+    );
+    assert!(lines[2].starts_with("idle  waits  "), "{}", lines[2]);
+    let json = environment.run("worker list --json").json();
+    assert_eq!(
+        (&json["workers"][0]["job"], &json["workers"][0]["attempt"]),
+        (&"jobs/7".into(), &2.into())
+    );
+    assert!(
+        json["workers"][1]["job"].is_null() && json["workers"][1]["busy"] == true,
+        "{json}"
+    );
+}

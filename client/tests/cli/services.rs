@@ -13,10 +13,10 @@ use guardsplat_proto::v1::{
     GetCommitmentRequest, GetDownloadUrlRequest, GetDownloadUrlResponse, GetHeadRequest, GetJobRequest, GetKeyRequest,
     GetOwnerRequest, GetPublicKeyRequest, HttpHeader, Job, JobAttempt, Key, ListAssetsRequest, ListAssetsResponse,
     ListCommitmentsRequest, ListCommitmentsResponse, ListJobAttemptsRequest, ListJobAttemptsResponse, ListJobsRequest,
-    ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, Owner, PublicKey,
-    RequeueJobRequest, RevealCommitmentRequest, RevealCommitmentResponse, StartUploadRequest, StartUploadResponse,
-    UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest, WatchJobResponse, download_artifact_response,
-    job_attempt, upload_artifact_request,
+    ListJobsResponse, ListKeysRequest, ListKeysResponse, ListOwnersRequest, ListOwnersResponse, ListWorkersRequest,
+    ListWorkersResponse, Owner, PublicKey, RequeueJobRequest, RevealCommitmentRequest, RevealCommitmentResponse,
+    StartUploadRequest, StartUploadResponse, UpdateKeyStateRequest, UploadArtifactRequest, WatchJobRequest,
+    WatchJobResponse, Worker, download_artifact_response, job_attempt, upload_artifact_request,
 };
 use sha2::{Digest, Sha256};
 use tokio::sync::mpsc;
@@ -284,6 +284,26 @@ impl JobService for Fake {
         };
         let attempts = vec![attempt];
         Ok(Response::new(ListJobAttemptsResponse { attempts }))
+    }
+
+    async fn list_workers(&self, _: Request<ListWorkersRequest>) -> Result<Response<ListWorkersResponse>, Status> {
+        let worker = |name: &str, job: &str, attempt| Worker {
+            name: name.into(),
+            device: "a GPU".into(),
+            version: "1.2.3".into(),
+            memory_bytes: 3 << 30,
+            seen_time: Some(prost_types::Timestamp::default()),
+            busy: name != "idle",
+            job: job.into(),
+            attempt,
+            start_time: None,
+        };
+        let workers = vec![
+            worker("busy", "jobs/7", 2),
+            worker("elsewhere", "", 0),
+            worker("idle", "", 0),
+        ];
+        Ok(Response::new(ListWorkersResponse { workers }))
     }
 
     type WatchJobStream = Replies<WatchJobResponse>;

@@ -4,6 +4,8 @@
 //! A value is the base64 of `key id [16] | tag [16] | sealed message [ceil(bits / 8)]`. The tag is an HMAC-SHA256 over the
 //! message, and the message is sealed with a pad that follows from the tag (a synthetic initialisation vector, as in
 //! RFC 5297): the same key and message always give the same value, so that it can be looked up.
+pub mod resolution;
+
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 pub use guardsplat_codeword::Message;

@@ -60,6 +60,8 @@ class Embed(Submission, total=False):
     """Hands out a scene that misses its target all the same."""
     ignore_bad_rows: bool
     """Leaves rows with NaN alone."""
+    credentials: bool
+    """Has content credentials made; :meth:`download` fetches ``embed_result.credentials.artifact``."""
 
 
 class Verify(Submission, total=False):
@@ -165,6 +167,7 @@ def embed_spec(scene: str, key: str, cameras: str, options: dict[str, Any]) -> j
         robust_to=_distortions(options.get("robust_to")),
         force=bool(options.get("force")),
         ignore_bad_rows=bool(options.get("ignore_bad_rows")),
+        credentials=bool(options.get("credentials")),
     )
 
 

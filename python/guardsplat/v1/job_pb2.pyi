@@ -74,7 +74,7 @@ class Job(_message.Message):
     def __init__(self, name: _Optional[str] = ..., display_name: _Optional[str] = ..., embed: _Optional[_Union[EmbedSpec, _Mapping]] = ..., verify: _Optional[_Union[VerifySpec, _Mapping]] = ..., create_key: _Optional[_Union[KeySpec, _Mapping]] = ..., state: _Optional[_Union[Job.State, str]] = ..., cancel_requested: bool = ..., attempt: _Optional[int] = ..., max_attempts: _Optional[int] = ..., queue_position: _Optional[int] = ..., progress: _Optional[_Union[Progress, _Mapping]] = ..., embed_result: _Optional[_Union[EmbedResult, _Mapping]] = ..., verify_result: _Optional[_Union[VerifyResult, _Mapping]] = ..., key_result: _Optional[_Union[KeyResult, _Mapping]] = ..., failure: _Optional[_Union[Failure, _Mapping]] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., update_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., start_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., retry_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., priority: _Optional[int] = ..., waiting_reason: _Optional[str] = ...) -> None: ...
 
 class EmbedSpec(_message.Message):
-    __slots__ = ("scene", "key", "message", "preset", "seed", "size", "force", "ignore_bad_rows", "asset", "robust_to", "cameras", "scene_kind")
+    __slots__ = ("scene", "key", "message", "preset", "seed", "size", "force", "ignore_bad_rows", "asset", "robust_to", "cameras", "scene_kind", "credentials")
     class Preset(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         PRESET_UNSPECIFIED: _ClassVar[EmbedSpec.Preset]
@@ -149,6 +149,7 @@ class EmbedSpec(_message.Message):
     ROBUST_TO_FIELD_NUMBER: _ClassVar[int]
     CAMERAS_FIELD_NUMBER: _ClassVar[int]
     SCENE_KIND_FIELD_NUMBER: _ClassVar[int]
+    CREDENTIALS_FIELD_NUMBER: _ClassVar[int]
     scene: str
     key: str
     message: str
@@ -161,7 +162,8 @@ class EmbedSpec(_message.Message):
     robust_to: _containers.RepeatedScalarFieldContainer[EmbedSpec.Distortion]
     cameras: str
     scene_kind: EmbedSpec.SceneKind
-    def __init__(self, scene: _Optional[str] = ..., key: _Optional[str] = ..., message: _Optional[str] = ..., preset: _Optional[_Union[EmbedSpec.Preset, str]] = ..., seed: _Optional[int] = ..., size: _Optional[int] = ..., force: bool = ..., ignore_bad_rows: bool = ..., asset: _Optional[str] = ..., robust_to: _Optional[_Iterable[_Union[EmbedSpec.Distortion, str]]] = ..., cameras: _Optional[str] = ..., scene_kind: _Optional[_Union[EmbedSpec.SceneKind, str]] = ...) -> None: ...
+    credentials: bool
+    def __init__(self, scene: _Optional[str] = ..., key: _Optional[str] = ..., message: _Optional[str] = ..., preset: _Optional[_Union[EmbedSpec.Preset, str]] = ..., seed: _Optional[int] = ..., size: _Optional[int] = ..., force: bool = ..., ignore_bad_rows: bool = ..., asset: _Optional[str] = ..., robust_to: _Optional[_Iterable[_Union[EmbedSpec.Distortion, str]]] = ..., cameras: _Optional[str] = ..., scene_kind: _Optional[_Union[EmbedSpec.SceneKind, str]] = ..., credentials: bool = ...) -> None: ...
 
 class VerifySpec(_message.Message):
     __slots__ = ("suspects", "key", "message", "views", "size", "seed", "ignore_bad_rows", "asset", "owner", "search", "cameras", "scene_kind")
@@ -228,7 +230,7 @@ class Progress(_message.Message):
     def __init__(self, stage: _Optional[_Union[Progress.Stage, str]] = ..., done: _Optional[int] = ..., total: _Optional[int] = ..., bit_accuracy: _Optional[float] = ..., psnr_db: _Optional[float] = ...) -> None: ...
 
 class EmbedResult(_message.Message):
-    __slots__ = ("scene", "comparison", "bit_accuracy", "bit_accuracy_worst_view", "message", "message_recovered", "psnr_db", "ssim", "lpips", "steps", "view_steps", "duration", "device", "clip", "target_missed", "gaussians", "changed_gaussians", "ignored_rows", "evidence_html", "evidence_json", "psnr_covered_db", "covered")
+    __slots__ = ("scene", "comparison", "bit_accuracy", "bit_accuracy_worst_view", "message", "message_recovered", "psnr_db", "ssim", "lpips", "steps", "view_steps", "duration", "device", "clip", "target_missed", "gaussians", "changed_gaussians", "ignored_rows", "evidence_html", "evidence_json", "psnr_covered_db", "covered", "credentials")
     SCENE_FIELD_NUMBER: _ClassVar[int]
     COMPARISON_FIELD_NUMBER: _ClassVar[int]
     BIT_ACCURACY_FIELD_NUMBER: _ClassVar[int]
@@ -251,6 +253,7 @@ class EmbedResult(_message.Message):
     EVIDENCE_JSON_FIELD_NUMBER: _ClassVar[int]
     PSNR_COVERED_DB_FIELD_NUMBER: _ClassVar[int]
     COVERED_FIELD_NUMBER: _ClassVar[int]
+    CREDENTIALS_FIELD_NUMBER: _ClassVar[int]
     scene: str
     comparison: str
     bit_accuracy: float
@@ -273,10 +276,25 @@ class EmbedResult(_message.Message):
     evidence_json: str
     psnr_covered_db: float
     covered: float
-    def __init__(self, scene: _Optional[str] = ..., comparison: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., message: _Optional[str] = ..., message_recovered: bool = ..., psnr_db: _Optional[float] = ..., ssim: _Optional[float] = ..., lpips: _Optional[float] = ..., steps: _Optional[int] = ..., view_steps: _Optional[int] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., target_missed: _Optional[_Iterable[str]] = ..., gaussians: _Optional[int] = ..., changed_gaussians: _Optional[int] = ..., ignored_rows: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., psnr_covered_db: _Optional[float] = ..., covered: _Optional[float] = ...) -> None: ...
+    credentials: Credentials
+    def __init__(self, scene: _Optional[str] = ..., comparison: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., message: _Optional[str] = ..., message_recovered: bool = ..., psnr_db: _Optional[float] = ..., ssim: _Optional[float] = ..., lpips: _Optional[float] = ..., steps: _Optional[int] = ..., view_steps: _Optional[int] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., target_missed: _Optional[_Iterable[str]] = ..., gaussians: _Optional[int] = ..., changed_gaussians: _Optional[int] = ..., ignored_rows: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., psnr_covered_db: _Optional[float] = ..., covered: _Optional[float] = ..., credentials: _Optional[_Union[Credentials, _Mapping]] = ...) -> None: ...
+
+class Credentials(_message.Message):
+    __slots__ = ("artifact", "manifest", "soft_binding", "test_certificate", "job")
+    ARTIFACT_FIELD_NUMBER: _ClassVar[int]
+    MANIFEST_FIELD_NUMBER: _ClassVar[int]
+    SOFT_BINDING_FIELD_NUMBER: _ClassVar[int]
+    TEST_CERTIFICATE_FIELD_NUMBER: _ClassVar[int]
+    JOB_FIELD_NUMBER: _ClassVar[int]
+    artifact: str
+    manifest: str
+    soft_binding: str
+    test_certificate: bool
+    job: str
+    def __init__(self, artifact: _Optional[str] = ..., manifest: _Optional[str] = ..., soft_binding: _Optional[str] = ..., test_certificate: bool = ..., job: _Optional[str] = ...) -> None: ...
 
 class VerifyResult(_message.Message):
-    __slots__ = ("verdict", "p_value", "threshold", "matched_bits", "needed_bits", "bits", "views", "message", "bit_accuracy", "bit_accuracy_worst_view", "mean_abs_logit", "view_agreement", "reason", "duration", "device", "clip", "ignored_rows", "hypotheses", "framings", "assets", "framing", "asset", "owner", "payload_number", "corrected_bits", "evidence_html", "evidence_json", "assets_paid", "readings_paid", "first_seen_time", "asset_commit_time", "asset_registered_later", "redacted")
+    __slots__ = ("verdict", "p_value", "threshold", "matched_bits", "needed_bits", "bits", "views", "message", "bit_accuracy", "bit_accuracy_worst_view", "mean_abs_logit", "view_agreement", "reason", "duration", "device", "clip", "ignored_rows", "hypotheses", "framings", "assets", "framing", "asset", "owner", "payload_number", "corrected_bits", "evidence_html", "evidence_json", "assets_paid", "readings_paid", "first_seen_time", "asset_commit_time", "asset_registered_later", "redacted", "credentials")
     class Verdict(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         VERDICT_UNSPECIFIED: _ClassVar[VerifyResult.Verdict]
@@ -322,6 +340,7 @@ class VerifyResult(_message.Message):
     ASSET_COMMIT_TIME_FIELD_NUMBER: _ClassVar[int]
     ASSET_REGISTERED_LATER_FIELD_NUMBER: _ClassVar[int]
     REDACTED_FIELD_NUMBER: _ClassVar[int]
+    CREDENTIALS_FIELD_NUMBER: _ClassVar[int]
     verdict: VerifyResult.Verdict
     p_value: float
     threshold: float
@@ -355,7 +374,8 @@ class VerifyResult(_message.Message):
     asset_commit_time: _timestamp_pb2.Timestamp
     asset_registered_later: bool
     redacted: bool
-    def __init__(self, verdict: _Optional[_Union[VerifyResult.Verdict, str]] = ..., p_value: _Optional[float] = ..., threshold: _Optional[float] = ..., matched_bits: _Optional[int] = ..., needed_bits: _Optional[int] = ..., bits: _Optional[int] = ..., views: _Optional[int] = ..., message: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., mean_abs_logit: _Optional[float] = ..., view_agreement: _Optional[float] = ..., reason: _Optional[str] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., ignored_rows: _Optional[int] = ..., hypotheses: _Optional[int] = ..., framings: _Optional[int] = ..., assets: _Optional[int] = ..., framing: _Optional[str] = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., payload_number: _Optional[int] = ..., corrected_bits: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., assets_paid: _Optional[int] = ..., readings_paid: _Optional[int] = ..., first_seen_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_commit_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_registered_later: bool = ..., redacted: bool = ...) -> None: ...
+    credentials: _containers.RepeatedCompositeFieldContainer[Credentials]
+    def __init__(self, verdict: _Optional[_Union[VerifyResult.Verdict, str]] = ..., p_value: _Optional[float] = ..., threshold: _Optional[float] = ..., matched_bits: _Optional[int] = ..., needed_bits: _Optional[int] = ..., bits: _Optional[int] = ..., views: _Optional[int] = ..., message: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., mean_abs_logit: _Optional[float] = ..., view_agreement: _Optional[float] = ..., reason: _Optional[str] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., ignored_rows: _Optional[int] = ..., hypotheses: _Optional[int] = ..., framings: _Optional[int] = ..., assets: _Optional[int] = ..., framing: _Optional[str] = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., payload_number: _Optional[int] = ..., corrected_bits: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., assets_paid: _Optional[int] = ..., readings_paid: _Optional[int] = ..., first_seen_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_commit_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_registered_later: bool = ..., redacted: bool = ..., credentials: _Optional[_Iterable[_Union[Credentials, _Mapping]]] = ...) -> None: ...
 
 class KeyResult(_message.Message):
     __slots__ = ("key", "bit_accuracy_unseen", "bit_accuracy_unseen_noisy", "duration", "device")

@@ -1,4 +1,6 @@
 //! The one table of calls and what a token must be good for. A call that is not in it is refused, whoever makes it.
+use guardsplat_soft_binding::resolution::{ALGORITHMS_PATH, BY_BINDING_PATH, BY_CONTENT_PATH, MANIFESTS_PATH};
+
 use super::Scope::{self, Admin, Embed, Verify, Worker};
 
 /// What a call needs, where tokens are asked for.
@@ -35,6 +37,7 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/guardsplat.v1.JobService/WatchJob", LOOK),
     ("/guardsplat.v1.JobService/RequeueJob", ADMIN),
     ("/guardsplat.v1.JobService/ListJobAttempts", LOOK),
+    ("/guardsplat.v1.JobService/ListWorkers", ADMIN),
     ("/guardsplat.v1.ArtifactService/UploadArtifact", WORK),
     ("/guardsplat.v1.ArtifactService/StartUpload", WORK),
     ("/guardsplat.v1.ArtifactService/AppendUpload", WORK),
@@ -80,7 +83,22 @@ pub const METHODS: &[(&str, Need)] = &[
     ("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Token),
 ];
 
+/// Paths of the C2PA's resolution API, which only the listener for browsers has. One that ends with a slash stands for all
+/// below it. Sidecars are for whoever may download artifacts.
+pub const RESOLUTION: &[(&str, Need)] = &[
+    (ALGORITHMS_PATH, Nothing),
+    (BY_BINDING_PATH, WORK),
+    (BY_CONTENT_PATH, WORK),
+    (MANIFESTS_PATH, WORK),
+];
+
 /// What a call needs; `None` for one that is not in the table.
 pub fn need(path: &str) -> Option<Need> {
     METHODS.iter().find(|(known, _)| *known == path).map(|(_, need)| *need)
+}
+
+/// What a question of the resolution API needs; `None` for none of it.
+pub fn need_to_resolve(path: &str) -> Option<Need> {
+    let is = |known: &str| known == path || known.ends_with('/') && path.starts_with(known);
+    RESOLUTION.iter().find(|(known, _)| is(known)).map(|(_, need)| *need)
 }

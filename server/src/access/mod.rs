@@ -5,6 +5,6 @@ mod scope;
 mod secret;
 
 pub use caller::{Caller, DEFAULT_PROJECT, check_project};
-pub use methods::{METHODS, Need, need};
+pub use methods::{METHODS, Need, RESOLUTION, need, need_to_resolve};
 pub use scope::{Scope, Scopes};
 pub use secret::{Fresh, TOKEN_VARIABLE, fresh, hash};

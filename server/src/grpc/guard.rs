@@ -8,7 +8,8 @@ use std::task::{Context, Poll};
 use futures::future::BoxFuture;
 use tonic::Status;
 use tonic::body::Body;
-use tonic::codegen::http::{HeaderMap, Request, Response};
+use tonic::codegen::http::request::Parts;
+use tonic::codegen::http::{Extensions, HeaderMap, Request, Response};
 use tonic::transport::server::TcpConnectInfo;
 use tower::{Layer, Service};
 
@@ -78,7 +79,23 @@ impl Guard {
 
     /// Who makes a call, if they may; none for calls that anybody may make.
     async fn admit(&self, path: &str, headers: &HeaderMap, address: Option<IpAddr>) -> Result<Option<Caller>> {
-        let need = access::need(path);
+        self.let_in(access::need(path), path, headers, address).await
+    }
+
+    /// Who asks the resolution API, if they may; none for what anybody may ask.
+    pub async fn admit_to_resolve(&self, head: &Parts) -> Result<Option<Caller>> {
+        let path = head.uri.path();
+        let need = access::need_to_resolve(path);
+        self.let_in(need, path, &head.headers, address(&head.extensions)).await
+    }
+
+    async fn let_in(
+        &self,
+        need: Option<Need>,
+        path: &str,
+        headers: &HeaderMap,
+        address: Option<IpAddr>,
+    ) -> Result<Option<Caller>> {
         if need == Some(Need::Nothing) {
             return Ok(None);
         }
@@ -141,8 +158,8 @@ impl Guard {
 }
 
 /// Where a request comes from.
-fn address<B>(request: &Request<B>) -> Option<IpAddr> {
-    let info = request.extensions().get::<TcpConnectInfo>();
+fn address(extensions: &Extensions) -> Option<IpAddr> {
+    let info = extensions.get::<TcpConnectInfo>();
     info.and_then(TcpConnectInfo::remote_addr).map(|address| address.ip())
 }
 
@@ -231,7 +248,7 @@ where
         let mut inner = std::mem::replace(&mut self.inner, other);
         let guard = self.guard.clone();
         Box::pin(async move {
-            let address = address(&request);
+            let address = address(request.extensions());
             match guard.admit(request.uri().path(), request.headers(), address).await {
                 Ok(caller) => {
                     // What the services know of the caller is in the extensions, and nothing of the token goes further.

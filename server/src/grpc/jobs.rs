@@ -3,7 +3,8 @@ use futures::stream::{BoxStream, StreamExt as _};
 use guardsplat_proto::v1::job_service_server::JobService;
 use guardsplat_proto::v1::{
     CancelJobRequest, CreateJobRequest, GetJobRequest, Job, ListJobAttemptsRequest, ListJobAttemptsResponse,
-    ListJobsRequest, ListJobsResponse, RequeueJobRequest, WatchJobRequest, WatchJobResponse,
+    ListJobsRequest, ListJobsResponse, ListWorkersRequest, ListWorkersResponse, RequeueJobRequest, WatchJobRequest,
+    WatchJobResponse,
 };
 use tonic::{Request, Response, Status};
 
@@ -76,5 +77,14 @@ impl JobService for Service {
         let project = caller(&request)?.project;
         let attempts = self.attempts(&project, &request.get_ref().name).await?;
         Ok(Response::new(ListJobAttemptsResponse { attempts }))
+    }
+
+    async fn list_workers(
+        &self,
+        request: Request<ListWorkersRequest>,
+    ) -> Result<Response<ListWorkersResponse>, Status> {
+        let project = caller(&request)?.project;
+        let workers = self.workers_of_all(&project).await?;
+        Ok(Response::new(ListWorkersResponse { workers }))
     }
 }

@@ -23,9 +23,9 @@ pub use crate::grpc::connections::ConnectionLimits;
 use crate::grpc::connections::Connections;
 use crate::grpc::deadline::Deadlines;
 use crate::grpc::guard::Guard;
-use crate::grpc::metrics_layer::MetricsLayer;
 use crate::grpc::transport_errors::ErrorDetailsLayer;
-use crate::page::PageLayer;
+use crate::page::{PageLayer, Resolution};
+use crate::service::Service as Api;
 
 /// TLS and the preface of HTTP/2 may take so long, unless something else is asked for.
 pub const HANDSHAKE: Duration = Duration::from_secs(10);
@@ -48,8 +48,8 @@ pub struct ListenerOptions {
     pub handshake: Duration,
     /// How long a connection may be open without a call, where that is limited.
     pub idle: Option<Duration>,
-    /// What counts calls.
-    pub measured: MetricsLayer,
+    /// What counts calls, and resolves beside the page where [`Protocol::Page`] is spoken.
+    pub api: Api,
 }
 
 /// Answers calls that come through `door` until `shutdown`, then finishes those that have begun. When it is dropped
@@ -60,13 +60,20 @@ pub async fn serve(
     listener: TcpListener,
     shutdown: impl Future<Output = ()>,
 ) -> Result<()> {
-    let connections = Connections::new(door.connections, door.measured.metrics.clone());
+    let connections = Connections::new(door.connections, door.api.metrics());
     let service = door.guard.layer(routes.prepare());
     let service = Around(ErrorDetailsLayer).layer(Around(Deadlines).layer(service));
-    let service = door.measured.layer(service);
+    let service = door.api.measured().layer(service);
     match door.protocol {
         Protocol::Grpc => accept(connections, service, door, listener, shutdown).await,
-        Protocol::Page => accept(connections, PageLayer::new().layer(service), door, listener, shutdown).await,
+        Protocol::Page => {
+            let resolution = Resolution {
+                api: door.api.clone(),
+                guard: door.guard.clone(),
+            };
+            let service = PageLayer::new(resolution).layer(service);
+            accept(connections, service, door, listener, shutdown).await;
+        }
     }
     Ok(())
 }

@@ -79,6 +79,7 @@ impl WorkerService for Service {
                 Ok(()) | Err(Error::LeaseLost { .. }) => {}
                 Err(error) => return Err(error.into()),
             }
+            self.name_credentials(&job, &mut completion).await?;
         }
         let done = self.ledger().complete(id, &lease_token, completion, clock::now());
         let done = done.await.map_err(Error::from)?;

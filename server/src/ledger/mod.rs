@@ -19,6 +19,7 @@ mod codec;
 mod commitments;
 #[cfg(test)]
 pub mod conformance;
+mod credentials;
 mod discriminants;
 mod error;
 mod generation;
@@ -47,6 +48,7 @@ use tokio::sync::broadcast;
 
 pub use artifacts::ArtifactLedger;
 pub use commitments::{CommitmentLog, SealedSigningKey};
+pub use credentials::{CredentialsLedger, CredentialsOf, CredentialsRow, Mark, NewCredentials};
 pub use error::{LedgerError, Result};
 pub use generation::{Generation, GenerationLedger};
 pub use history::{Before as ReadBefore, NewReading, ReadingHistory};
@@ -73,7 +75,7 @@ pub use types::{
     KeyId, KeyRow, Lease, NewArtifact, NewJob, NewKey, Origin,
 };
 pub use work::{JobResult, JobSpec, KeyOrder, Progress, Seed};
-pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPresence};
+pub use workers::{LeasedJob, ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPresence, WorkerRow};
 
 /// What the service keeps of its work, by capability. A call that returned `Ok` is on disk.
 ///
@@ -82,6 +84,7 @@ pub use workers::{ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerPr
 pub trait Ledger:
     ArtifactLedger
     + CommitmentLog
+    + CredentialsLedger
     + GenerationLedger
     + HookLedger
     + JobQueue

@@ -4,6 +4,7 @@ use std::fmt;
 
 use uuid::Uuid;
 
+use super::credentials::NewCredentials;
 use super::registry::KeyState;
 use super::work::{JobResult, JobSpec, Progress};
 use super::workers::ResourceRequirements;
@@ -307,6 +308,8 @@ pub struct Completion {
     pub outputs: Vec<ArtifactId>,
     /// The key that was made.
     pub key: Option<NewKey>,
+    /// The content credentials that were made, of one of the outputs.
+    pub credentials: Option<NewCredentials>,
     /// SHA-256 of what the worker said, by which it is known when it is said again.
     pub fingerprint: [u8; 32],
 }

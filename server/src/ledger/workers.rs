@@ -1,5 +1,6 @@
 //! Workers: what they can hold, what jobs ask of them, and which ones were seen.
 use super::Result;
+use super::types::JobId;
 
 /// What a job asks of the worker that it is given to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -47,20 +48,52 @@ pub struct SeenWorker {
     pub name: String,
     /// What it computes on.
     pub device: String,
+    /// Its version; empty where it did not say.
+    pub version: String,
     /// Bytes of memory that a job may take there; none where it did not say.
     pub memory: Option<i64>,
     /// CLIPs that it can load; any, when there are none.
     pub clips: Vec<String>,
 }
 
+/// A worker, and what it does.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkerRow {
+    /// How it described itself.
+    pub seen: SeenWorker,
+    /// When it last asked for a job.
+    pub time: i64,
+    /// What it has, if anything.
+    pub has: Option<LeasedJob>,
+}
+
+/// The job that a worker has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeasedJob {
+    /// The job.
+    pub id: JobId,
+    /// Whose it is.
+    pub project: String,
+    /// How often it was given to a worker.
+    pub attempt: i32,
+    /// When this one was given it.
+    pub start_time: i64,
+    /// When its lease ends, unless the worker is heard of again.
+    pub lease_expires: i64,
+}
+
 /// The workers that ask for jobs.
 #[async_trait::async_trait]
 pub trait WorkerPresence: Send + Sync + 'static {
-    /// Notes that a worker was seen, and forgets those that were not for a day.
+    /// Notes that a worker was seen, and forgets those that were not for a day and have no job.
     async fn note_worker(&self, worker: SeenWorker, now: i64) -> Result<()>;
 
     /// Workers that were seen since then, or that have a job, by name.
     async fn workers_since(&self, since: i64) -> Result<Vec<SeenWorker>>;
+
+    /// The same with what they have, by name, at most so many: one that has several jobs, as workers of one name may, is
+    /// there once for each.
+    async fn workers_and_jobs(&self, since: i64, limit: u32) -> Result<Vec<WorkerRow>>;
 }
 
 /// Microseconds after which a worker that was not seen is forgotten.

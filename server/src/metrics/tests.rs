@@ -127,6 +127,7 @@ fn the_queue_is_as_the_ledger_has_it_or_not_told() {
 fn memory_is_told_by_what_workers_compute_on() {
     let metrics = Metrics::default();
     let worker = |device: &str, memory| SeenWorker {
+        version: String::new(),
         name: device.into(),
         device: device.into(),
         memory,

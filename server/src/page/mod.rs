@@ -1,6 +1,7 @@
 //! The page for browsers: files that are compiled in, which anybody may have, and the calls of the API as gRPC-Web, which
-//! go through the same guard as all others.
+//! go through the same guard as all others. Beside them the resolution API of content credentials, for programs.
 mod files;
+mod resolution;
 #[cfg(test)]
 mod tests;
 
@@ -9,6 +10,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use futures::future::{BoxFuture, Either, FutureExt as _, Ready, ready};
+use guardsplat_soft_binding::resolution::is_of_api;
 use http_body_util::{BodyStream, StreamBody};
 use tokio_stream::StreamExt as _;
 use tonic::Status;
@@ -45,14 +47,22 @@ const HEADERS: [(&str, &str); 6] = [
     ("x-content-type-options", "nosniff"),
 ];
 
-/// Puts the page, and the translation from gRPC-Web, before the API.
-#[derive(Clone, Debug, Default)]
-pub struct PageLayer(GrpcWebLayer);
+pub use resolution::Resolution;
+
+/// Puts the page, the translation from gRPC-Web, and the resolution API before the API.
+#[derive(Clone)]
+pub struct PageLayer {
+    web: GrpcWebLayer,
+    resolution: Resolution,
+}
 
 impl PageLayer {
-    /// The one there is.
-    pub fn new() -> Self {
-        Self::default()
+    /// One that resolves so.
+    pub fn new(resolution: Resolution) -> Self {
+        Self {
+            web: GrpcWebLayer::new(),
+            resolution,
+        }
     }
 }
 
@@ -61,15 +71,17 @@ impl<S> Layer<S> for PageLayer {
 
     fn layer(&self, inner: S) -> Self::Service {
         PageService {
-            calls: self.0.layer(inner),
+            calls: self.web.layer(inner),
+            resolution: self.resolution.clone(),
         }
     }
 }
 
 /// Answers with files, and hands calls on.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct PageService<S> {
     calls: S,
+    resolution: Resolution,
 }
 
 type Answer = Result<Response<Body>, Infallible>;
@@ -89,6 +101,13 @@ where
 
     fn call(&mut self, request: Request<Body>) -> Self::Future {
         let path = request.uri().path();
+        if is_of_api(path) {
+            let answer = self
+                .resolution
+                .clone()
+                .answer(request.map(|body| timely(body, SILENCE)));
+            return Either::Right(async move { Ok(with_headers(answer.await)) }.boxed());
+        }
         if !SERVICES.iter().any(|service| path.starts_with(service)) {
             return Either::Left(ready(Ok(with_headers(file(&request)))));
         }

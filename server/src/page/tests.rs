@@ -3,6 +3,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use futures::StreamExt as _;
+use guardsplat_proto::v1::EmbedSpec;
 use http_body_util::{BodyExt as _, Full, StreamBody};
 use hyper::body::{Bytes, Frame};
 use reqwest::{Client, Method, Response, StatusCode};
@@ -16,6 +17,7 @@ use crate::access::{self, Need, Scope};
 use crate::grpc::guard::Guard;
 use crate::grpc::listener::{ConnectionLimits, HANDSHAKE, ListenerOptions, Protocol, serve};
 use crate::grpc::tests::calls::paths;
+use crate::grpc::tests::credentials::{SIDECAR, VALUES, delete, marked};
 use crate::grpc::tests::harness::Server;
 use crate::settings::Settings;
 
@@ -32,7 +34,7 @@ async fn page(server: &Server) -> String {
         connections: ConnectionLimits::default(),
         handshake: HANDSHAKE,
         idle: None,
-        measured: server.api.measured(),
+        api: server.api.clone(),
     };
     let routes = server.api.routes().unwrap();
     tokio::spawn(serve(routes, door, listener, std::future::pending()));
@@ -238,4 +240,115 @@ fn the_page_has_no_inline_script_and_asks_nobody_else() {
             );
         }
     }
+}
+
+/// Status and body of a question.
+async fn asked(request: reqwest::RequestBuilder, token: Option<&str>) -> (StatusCode, Bytes) {
+    let request = match token {
+        Some(token) => request.header("authorization", format!("Bearer {token}")),
+        None => request,
+    };
+    let answer = request.send().await.unwrap();
+    assert_eq!(text(&answer, "cache-control"), Some("no-store"));
+    assert_eq!(
+        answer.status() == StatusCode::UNAUTHORIZED,
+        text(&answer, "www-authenticate").is_some()
+    );
+    (answer.status(), answer.bytes().await.unwrap())
+}
+
+fn manifests(answer: (StatusCode, Bytes)) -> Vec<String> {
+    assert_eq!(answer.0, StatusCode::OK, "{answer:?}");
+    let told: serde_json::Value = serde_json::from_slice(&answer.1).unwrap();
+    let matches = told["matches"].as_array().unwrap();
+    let id = |found: &serde_json::Value| found["manifestId"].as_str().unwrap().to_owned();
+    matches.iter().map(id).collect()
+}
+
+#[tokio::test]
+async fn credentials_are_resolved_for_their_project_and_nobody_else() {
+    // Workers and jobs come by an open door; the page has one of its own.
+    let server = Server::start().await;
+    let key = server.key(32, b"the key file").await;
+    let scene = server.upload("scene.ply", b"a scene").await.name;
+    let spec = |message: &str| EmbedSpec {
+        scene: scene.clone(),
+        key: key.clone(),
+        message: message.into(),
+        ..EmbedSpec::default()
+    };
+    let first = marked(&server, spec("c0ffee42"), "urn:c2pa:1").await;
+    marked(&server, spec("c0ffee42"), "urn:c2pa:2").await;
+    let (url, client) = (page(&server).await, Client::new());
+    let own = server.token(access::DEFAULT_PROJECT, &[Scope::Verify]).await;
+    let other = server.token("other", &[Scope::Embed, Scope::Verify]).await;
+    let value = VALUES[0].replace('/', "%2F");
+    let by_binding = format!("{url}/matches/byBinding?alg=org.guardsplat.sh.1&value={value}");
+    let get = |at: &str, token| asked(client.get(at), token);
+    let post = |body: String, token| asked(client.post(format!("{url}/matches/byBinding")).body(body), token);
+    let question = |value| format!(r#"{{"alg": "org.guardsplat.sh.1", "value": "{value}"}}"#);
+
+    assert_eq!(
+        manifests(get(&by_binding, Some(&own)).await),
+        ["urn:c2pa:2", "urn:c2pa:1"]
+    );
+    let one = format!("{by_binding}&maxResults=1");
+    assert_eq!(manifests(get(&one, Some(&own)).await), ["urn:c2pa:2"]);
+    assert_eq!(manifests(post(question(VALUES[0]), Some(&own)).await).len(), 2);
+    assert_eq!(manifests(post(question(VALUES[1]), Some(&own)).await).len(), 0);
+    let foreign = r#"{"alg": "com.example", "value": "x"}"#.to_owned();
+    assert_eq!(manifests(post(foreign, Some(&own)).await).len(), 0);
+    let manifest = format!("{url}/manifests/urn:c2pa:1");
+    let (status, bytes) = get(&manifest, Some(&own)).await;
+    assert_eq!((status, &bytes[..]), (StatusCode::OK, SIDECAR));
+
+    // Another project has none of it, and without a token that is good for it nobody has.
+    assert_eq!(manifests(get(&by_binding, Some(&other)).await).len(), 0);
+    assert_eq!(get(&manifest, Some(&other)).await.0, StatusCode::NOT_FOUND);
+    let expired = server
+        .token_until(access::DEFAULT_PROJECT, &[Scope::Verify], Some(1))
+        .await;
+    let others = server
+        .token(access::DEFAULT_PROJECT, &[Scope::Worker, Scope::Admin])
+        .await;
+    let mut tried = 0;
+    for (path, need) in access::RESOLUTION {
+        let at = format!("{url}{path}{}", if path.ends_with('/') { "urn:c2pa:1" } else { "" });
+        for method in [Method::GET, Method::POST] {
+            for token in [None, Some("gst_0_0"), Some(expired.as_str()), Some(others.as_str())] {
+                let (status, body) = asked(client.request(method.clone(), &at), token).await;
+                let expected = match (need, token) {
+                    (Need::Nothing, _) if method == Method::GET => StatusCode::OK,
+                    (Need::Nothing, _) => StatusCode::METHOD_NOT_ALLOWED,
+                    (_, Some(token)) if token == others => StatusCode::FORBIDDEN,
+                    _ => StatusCode::UNAUTHORIZED,
+                };
+                assert_eq!(status, expected, "{method} {at} with {token:?}: {body:?}");
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried >= 32, "{tried}");
+    // Wrong questions are told.
+    for (request, status) in [
+        (client.get(format!("{url}/matches/byBinding?alg=a")), 400),
+        (
+            client.post(format!("{url}/matches/byContent")).body(vec![7; 1 << 20]),
+            501,
+        ),
+        (
+            client
+                .post(format!("{url}/matches/byBinding"))
+                .body(vec![b' '; 1 << 17]),
+            413,
+        ),
+        (client.get(format!("{url}/manifests/urn:c2pa:3")), 404),
+        (client.delete(&manifest), 405),
+    ] {
+        assert_eq!(asked(request, Some(&own)).await.0.as_u16(), status);
+    }
+    // What is deleted is not found any more.
+    delete(&server, &first.artifact).await;
+    assert_eq!(manifests(get(&by_binding, Some(&own)).await), ["urn:c2pa:2"]);
+    assert_eq!(get(&manifest, Some(&own)).await.0, StatusCode::NOT_FOUND);
 }

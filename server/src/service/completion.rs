@@ -1,15 +1,15 @@
 //! Checks what a worker says came out of a job, before it becomes the job's result.
 use guardsplat_proto::v1::complete_job_request::Result as Output;
-use guardsplat_proto::v1::{CompleteJobRequest, EmbedResult, KeyOutput, KeyResult, VerifyResult};
+use guardsplat_proto::v1::{CompleteJobRequest, EmbedResult, EmbedSpec, KeyOutput, KeyResult, VerifyResult};
 use prost::Message as _;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, KeyOrder, NewKey};
+use crate::ledger::{ArtifactId, Completion, JobKind, JobResult, JobRow, JobSpec, KeyOrder, NewCredentials, NewKey};
 use crate::service::names::ResourceKind;
 use crate::service::violations::Violations;
-use crate::service::{text, upload};
+use crate::service::{credentials, text, upload};
 
 /// Most bytes of a result; figures and a few sentences need far less.
 const MAX_RESULT_BYTES: usize = 64 << 10;
@@ -19,13 +19,19 @@ struct Outcome {
     result: JobResult,
     outputs: Vec<ArtifactId>,
     key: Option<NewKey>,
+    credentials: Option<NewCredentials>,
 }
 
 /// Checks what came out of `job`, as far as that can be said without the ledger.
 pub fn check(job: &JobRow, told: CompleteJobRequest) -> Result<Completion> {
     let fingerprint = fingerprint(&told);
-    let Outcome { result, outputs, key } = match (&job.spec, told.result) {
-        (JobSpec::Embed(_), Some(Output::EmbedResult(result))) => embed(result)?,
+    let Outcome {
+        result,
+        outputs,
+        key,
+        credentials,
+    } = match (&job.spec, told.result) {
+        (JobSpec::Embed(spec), Some(Output::EmbedResult(result))) => embed(job, spec, result)?,
         (JobSpec::Verify(_), Some(Output::VerifyResult(result))) => verify(result)?,
         (JobSpec::CreateKey(spec), Some(Output::KeyOutput(output))) => key(job, spec, output)?,
         (_, None) => return Err(Error::invalid("result", "is missing")),
@@ -54,6 +60,7 @@ pub fn check(job: &JobRow, told: CompleteJobRequest) -> Result<Completion> {
         result,
         outputs,
         key,
+        credentials,
         fingerprint,
     })
 }
@@ -68,7 +75,7 @@ fn fingerprint(told: &CompleteJobRequest) -> [u8; 32] {
     Sha256::digest(told.encode_to_vec()).into()
 }
 
-fn embed(result: EmbedResult) -> Result<Outcome> {
+fn embed(job: &JobRow, spec: &EmbedSpec, mut result: EmbedResult) -> Result<Outcome> {
     let mut problems = Violations::default();
     let scene = problems.take(ResourceKind::Artifact.parse("embed_result.scene", &result.scene))?;
     let comparison = problems.take(ResourceKind::Artifact.parse("embed_result.comparison", &result.comparison))?;
@@ -77,16 +84,29 @@ fn embed(result: EmbedResult) -> Result<Outcome> {
         "embed_result.comparison",
         "is the scene, must be another output",
     );
+    let credentials = problems
+        .take(credentials::told(spec, result.credentials.as_ref()))?
+        .flatten();
+    let sidecar = credentials.as_ref().map(|new| new.artifact);
+    problems.check(
+        sidecar.is_none() || ![scene, comparison].contains(&sidecar),
+        "embed_result.credentials.artifact",
+        "is the scene or the comparison, must be another output",
+    );
     problems.finish()?;
-    let outputs = scene.into_iter().chain(comparison).collect();
+    if let Some(told) = &mut result.credentials {
+        told.job = ResourceKind::Job.name(job.id);
+    }
+    let outputs = scene.into_iter().chain(comparison).chain(sidecar).collect();
     Ok(Outcome {
         result: JobResult::Embed(result),
         outputs,
         key: None,
+        credentials,
     })
 }
 
-fn verify(result: VerifyResult) -> Result<Outcome> {
+fn verify(mut result: VerifyResult) -> Result<Outcome> {
     use guardsplat_proto::v1::verify_result::Verdict;
     let verdict = Verdict::try_from(result.verdict)
         .ok()
@@ -94,10 +114,13 @@ fn verify(result: VerifyResult) -> Result<Outcome> {
     if verdict.is_none() {
         return Err(Error::invalid("verify_result.verdict", "is missing or not known"));
     }
+    // The server alone knows of any.
+    result.credentials.clear();
     Ok(Outcome {
         result: JobResult::Verify(result),
         outputs: Vec::new(),
         key: None,
+        credentials: None,
     })
 }
 
@@ -144,5 +167,6 @@ fn key(job: &JobRow, order: &KeyOrder, output: KeyOutput) -> Result<Outcome> {
         result: JobResult::CreateKey(result),
         outputs: Vec::new(),
         key: Some(key),
+        credentials: None,
     })
 }

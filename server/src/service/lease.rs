@@ -32,8 +32,9 @@ impl Service {
             device,
             memory_bytes,
             clip_sha256,
+            version,
         } = request;
-        let worker = described(worker, device, memory_bytes, clip_sha256)?;
+        let worker = described(worker, device, version, memory_bytes, clip_sha256)?;
         let wait = clock::duration(wait.unwrap_or_default()).filter(|&wait| wait <= MAX_WAIT);
         let wait = wait.ok_or_else(|| Error::invalid("wait", "must be 0 to 60 seconds"))?;
         let end = Instant::now() + wait;

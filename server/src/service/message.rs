@@ -13,6 +13,12 @@ pub fn check(field: &str, text: &str, bits: u32) -> Result<()> {
     }
 }
 
+/// The one spelling of a message that was checked: digits in lower case.
+pub fn canonical(text: &str) -> String {
+    let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+    digits.unwrap_or(text).to_ascii_lowercase()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -23,6 +29,13 @@ mod tests {
             check("message", text, bits).unwrap();
         }
         check("message", &format!("7{}", "f".repeat(18)), 75).unwrap();
+    }
+
+    #[test]
+    fn spellings_of_a_message_are_one() {
+        for text in ["0xC0ffEE42", "0XC0FFEE42", "c0ffee42"] {
+            assert_eq!(canonical(text), Message::parse(text, 32).unwrap().to_string());
+        }
     }
 
     #[test]

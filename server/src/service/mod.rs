@@ -19,6 +19,7 @@ pub(crate) mod claims;
 pub mod clock;
 pub(crate) mod completion;
 pub(crate) mod concurrency_limit;
+pub(crate) mod credentials;
 pub(crate) mod direct_upload;
 pub(crate) mod evidence;
 pub(crate) mod fingerprint;
@@ -39,6 +40,7 @@ pub(crate) mod queue_positions;
 pub(crate) mod quota;
 pub mod rate_limit;
 pub(crate) mod registry;
+pub(crate) mod resolution;
 pub mod retention;
 pub(crate) mod scene_summaries;
 pub(crate) mod seeds;
@@ -51,6 +53,7 @@ pub(crate) mod upload;
 pub(crate) mod upload_parts;
 pub(crate) mod violations;
 pub mod worker_presence;
+pub(crate) mod workers;
 
 /// What the API holds its callers to.
 #[derive(Clone, Debug, PartialEq)]

@@ -108,6 +108,7 @@ impl Service {
 pub(crate) fn described(
     worker: String,
     device: String,
+    version: String,
     memory_bytes: u64,
     mut clip_sha256: Vec<String>,
 ) -> Result<SeenWorker> {
@@ -116,6 +117,7 @@ pub(crate) fn described(
     }
     text::display_name("worker", &worker)?;
     text::display_name("device", &device)?;
+    text::display_name("version", &version)?;
     let count = clip_sha256.len();
     if count > MAX_CLIPS {
         return Err(Error::invalid(
@@ -137,6 +139,7 @@ pub(crate) fn described(
     Ok(SeenWorker {
         name: worker,
         device,
+        version,
         memory: (memory_bytes > 0).then(|| i64::try_from(memory_bytes).unwrap_or(i64::MAX)),
         clips: clip_sha256,
     })
@@ -205,6 +208,7 @@ mod tests {
         SeenWorker {
             name: format!("{memory:?}{clips:?}"),
             device: String::new(),
+            version: String::new(),
             memory: memory.map(|gib| gib << 30),
             clips: clips.iter().map(|&clip| clip.into()).collect(),
         }

@@ -20,7 +20,7 @@ pub use pictures::{exr, picture};
 pub use scenes::{compressed_ply, gltf, ksplat, ply, scene, splat, spz, summary};
 pub use server::{names, page_token, requests, sealed, server_settings};
 pub use sog::{sog, sog_meta, sog_picture};
-pub use texts::{cameras, embed_settings, message, soft_binding};
+pub use texts::{cameras, embed_settings, message, resolution, soft_binding};
 
 /// A target by its name, which is also that of its program, of its folder in `corpus` and of its dictionary.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +63,7 @@ targets![
     embed_settings,
     message,
     soft_binding,
+    resolution,
     page_token,
     names,
     requests,

@@ -3,6 +3,7 @@ use crate::memory::bounded;
 use guardsplat_codeword::{MAX_BITS, Message};
 use guardsplat_engine::embed::Preset;
 use guardsplat_engine::view::parse_cameras;
+use guardsplat_soft_binding::resolution::{self, Question};
 use guardsplat_soft_binding::{BindingKey, Value};
 
 /// `cameras.json` and `transforms.json`.
@@ -65,5 +66,29 @@ pub fn soft_binding(data: &[u8]) {
         if let Some(message) = value.open(key, bits) {
             assert_eq!(Value::seal(key, &message), Ok(value.clone()));
         }
+    }
+}
+
+/// Questions of the resolution API: a line of method and target, as HTTP has it, and a body.
+pub fn resolution(data: &[u8]) {
+    let (line, body) = match data.iter().position(|byte| *byte == b'\n') {
+        Some(end) => (&data[..end], &data[end + 1..]),
+        None => (data, &[][..]),
+    };
+    let Ok(line) = std::str::from_utf8(line) else { return };
+    let Some((method, target)) = line.split_once(' ') else {
+        return;
+    };
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    match bounded(data.len(), || resolution::parse(method, path, query, body)) {
+        Ok(question) => {
+            assert!(resolution::is_of_api(path), "{path}");
+            if let Question::ByBinding { value, most } = question {
+                assert!((1..=1000).contains(&most));
+                let again = value.map(|value| (Value::parse(&value.text()), value));
+                assert!(again.is_none_or(|(again, value)| again == Ok(value)));
+            }
+        }
+        Err(refusal) => assert!((400..600).contains(&refusal.status) && !refusal.told.is_empty()),
     }
 }

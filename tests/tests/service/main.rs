@@ -4,6 +4,7 @@ mod bad_input;
 mod cameras;
 mod claims;
 mod crashes;
+mod credentials;
 mod languages;
 mod main_job;
 mod memory;

@@ -13,9 +13,10 @@ use guardsplat_engine::scene::BadRows;
 use guardsplat_engine::{Error, Result};
 use guardsplat_soft_binding::Value;
 
-use super::credentials::{self, Signing, binding_key};
+use super::credentials::{self, Signing};
 use super::display::Display;
 use super::{Budget, Exit, Kind, embed_levels, print_json, print_line};
+use crate::credentials_program::binding_key;
 use guardsplat_operations::embed_report::EmbedReport;
 use guardsplat_operations::embed_settings::Choices;
 use guardsplat_operations::{comparison_sheet, load};

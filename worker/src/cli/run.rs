@@ -7,6 +7,7 @@ use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::{TOKEN_VARIABLE, Target, Token};
 
 use super::{Budget, Exit};
+use crate::credentials_program::Certificate;
 use crate::jobs;
 
 #[derive(Args)]
@@ -40,6 +41,23 @@ pub struct Arguments {
     /// A folder for the files of jobs under way; the system's for temporary files unless given
     #[arg(long, value_name = "DIR")]
     work_dir: Option<PathBuf>,
+    #[command(flatten)]
+    signing: Signing,
+}
+
+/// Who signs the content credentials (C2PA) that jobs ask for.
+#[derive(Args)]
+struct Signing {
+    /// The certificate that content credentials (C2PA) are signed with and those above it (PEM, its own first); a test
+    /// certificate unless given
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_CREDENTIALS_CERTIFICATE", value_parser = file())]
+    certificate: Option<PathBuf>,
+    /// Its private key (PEM, PKCS #8)
+    #[arg(long, value_name = "FILE", env = "GUARDSPLAT_CREDENTIALS_PRIVATE_KEY", value_parser = file())]
+    private_key: Option<PathBuf>,
+    /// How that key signs: es256, es384, es512, ps256, ps384, ps512 or ed25519; es256 unless given
+    #[arg(long, value_name = "NAME", env = "GUARDSPLAT_CREDENTIALS_ALGORITHM")]
+    algorithm: Option<String>,
 }
 
 /// Takes the name of a file, an empty one too: that is how a variable is unset in many places.
@@ -71,6 +89,11 @@ pub fn run(arguments: Arguments) -> Exit {
         name: arguments.name,
         stop_with_stdin: arguments.stop_with_stdin,
         work_dir: arguments.work_dir,
+        certificate: Certificate {
+            certificate: path(arguments.signing.certificate),
+            private_key: path(arguments.signing.private_key),
+            algorithm: arguments.signing.algorithm.filter(|name| !name.is_empty()),
+        },
     };
     match jobs::run(&options) {
         Ok(()) => Exit::Done,

@@ -15,6 +15,7 @@ use super::lease::{Lease, Reporter};
 use super::server::Server;
 use super::transfer::{self, Content};
 use super::{create_key_job, embed_job, verify_job};
+use crate::credentials_program::Certificate;
 
 /// What came out of an attempt.
 pub struct Outcome {
@@ -36,6 +37,14 @@ impl From<complete_job_request::Result> for Outcome {
     }
 }
 
+/// An artifact that was fetched.
+pub struct Input {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The name of its file where it came from; empty where nobody said.
+    pub name: String,
+}
+
 /// An attempt under way.
 pub struct Attempt<'a> {
     /// Where inputs come from and outputs go.
@@ -50,6 +59,8 @@ pub struct Attempt<'a> {
     pub stop: &'a Stop,
     /// Hears of progress.
     pub reporter: Reporter,
+    /// Who signs content credentials.
+    pub certificate: &'a Certificate,
     /// What users know the downloaded files as.
     pub known_as: Vec<(PathBuf, String)>,
 }
@@ -82,8 +93,8 @@ impl Attempt<'_> {
     }
 
     /// Fetches artifacts; the files are in their order.
-    pub async fn download(&mut self, names: &[&str]) -> Result<Vec<PathBuf>> {
-        let mut paths = Vec::with_capacity(names.len());
+    pub async fn download(&mut self, names: &[&str]) -> Result<Vec<Input>> {
+        let mut inputs = Vec::with_capacity(names.len());
         for (index, name) in names.iter().enumerate() {
             let path = self.folder.join(format!("input-{index}"));
             let artifact = transfer::download(self.server, name, &path).await?;
@@ -92,11 +103,14 @@ impl Attempt<'_> {
                 display_name => format!("{display_name} ({name})"),
             };
             self.known_as.push((path.clone(), known_as));
-            paths.push(path);
+            inputs.push(Input {
+                path,
+                name: artifact.display_name,
+            });
             let (done, total) = (index + 1, names.len());
             self.reporter.tell(convert::stage(Stage::Preparing, done, total));
         }
-        Ok(paths)
+        Ok(inputs)
     }
 
     /// Fetches the bytes of the job's key.

@@ -52,6 +52,7 @@ impl WorkerCapabilities {
             device: self.device.clone(),
             memory_bytes: self.memory,
             clip_sha256: self.clips(),
+            version: env!("CARGO_PKG_VERSION").into(),
         }
     }
 

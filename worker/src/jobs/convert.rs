@@ -260,6 +260,8 @@ pub fn failure(error: &Error) -> (api::Failure, bool) {
         Error::TargetMissed(_) => (Reason::TargetMissed, false),
         Error::BadJob(_) => (Reason::InvalidInput, false),
         Error::Panicked(_) | Error::Stuck(_) => (Reason::Internal, true),
+        // What is missing, or is not a certificate, is so next time too.
+        Error::Credentials(_) => (Reason::Internal, false),
         Error::Engine(error) => match error {
             EngineError::BadScene { .. }
             | EngineError::BadPicture { .. }

@@ -9,12 +9,15 @@ use guardsplat_engine::picture::Picture;
 use guardsplat_engine::quality::{PictureFormat, encode_picture};
 use guardsplat_engine::scene::BadRows;
 use guardsplat_proto::v1::complete_job_request::Result as Done;
-use guardsplat_proto::v1::{EmbedResult, EmbedSpec, SeenView};
+use guardsplat_proto::v1::{Credentials, EmbedResult, EmbedSpec, SeenView};
+use guardsplat_soft_binding::Value;
 
-use super::attempt::{Attempt, Outcome as Finished};
+use super::attempt::{Attempt, Input, Outcome as Finished};
 use super::convert;
+use super::credentials::{self, Order, Signed};
 use super::error::{Error, Result};
 use super::transfer::Content;
+use crate::credentials_program::binding_key;
 use guardsplat_operations::thumbnails::small_png;
 use guardsplat_operations::{comparison_sheet, load};
 
@@ -26,19 +29,34 @@ struct Marked {
     outcome: Outcome,
     sheet: Vec<u8>,
     views: Vec<SeenView>,
+    credentials: Option<Signed>,
     device: String,
     clip: String,
     duration: Duration,
 }
 
-/// Fetches scene and key, marks, stores the marked scene and a picture of what changed.
+/// What a marked scene is called.
+fn marked_name(outcome: &Outcome) -> String {
+    format!("marked.{}", outcome.format.extension())
+}
+
+/// Fetches scene and key, marks, signs content credentials where they are wanted, stores the marked scene and a picture
+/// of what changed.
 pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Finished> {
     let settings = convert::settings(spec)?;
     let cameras_file = Some(spec.cameras.as_str()).filter(|name| !name.is_empty());
     let names: Vec<&str> = std::iter::once(spec.scene.as_str()).chain(cameras_file).collect();
     let mut inputs = attempt.download(&names).await?;
-    let cameras_file = cameras_file.and_then(|_| inputs.pop());
-    let input = inputs.swap_remove(0);
+    let cameras_file = cameras_file.and_then(|_| inputs.pop()).map(|input| input.path);
+    let Input {
+        path: input,
+        name: original_name,
+    } = inputs.swap_remove(0);
+    let order = spec.credentials.then(|| Order {
+        certificate: attempt.certificate.clone(),
+        folder: attempt.folder.to_owned(),
+        original_name,
+    });
     let key_file = attempt.download_key().await?;
     // Its format, and so its name, is known when it is there.
     let output = attempt.folder.join("marked");
@@ -50,6 +68,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
     let rate = attempt.lease.false_positive_rate;
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
+        order.as_ref().map_or(Ok(()), |order| order.check(&input))?;
         let key = Key::from_bytes(&name, &key_file)?;
         drop(key_file);
         let message = key.message(&message)?;
@@ -89,21 +108,36 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
             })
         };
         let views = pairs.map(view).collect::<guardsplat_engine::Result<_>>()?;
+        let sign = |order: &Order| {
+            let value = Value::seal(binding_key(&key, &key.id()), &message);
+            let value = value.map_err(|error| Error::BadJob(error.to_string()))?;
+            order.sign(&input, &output, &marked_name(&outcome), &value)
+        };
+        let credentials = order.as_ref().map(sign).transpose()?;
         Ok(Marked {
             outcome,
             sheet,
             views,
+            credentials,
             device,
             clip: key.clip.name.clone(),
             duration: start.elapsed(),
         })
     });
     let marked = work.await?;
-    let marked_name = format!("marked.{}", marked.outcome.format.extension());
-    let scene = attempt.upload(&marked_name, marked_file, false).await?;
+    let scene = attempt
+        .upload(&marked_name(&marked.outcome), marked_file, false)
+        .await?;
     let comparison = attempt
         .upload(comparison_sheet::NAME, Content::Bytes(marked.sheet), false)
         .await?;
+    let credentials = match marked.credentials {
+        Some(Signed { path, told }) => Some(Credentials {
+            artifact: attempt.upload(credentials::NAME, Content::File(path), false).await?,
+            ..told
+        }),
+        None => None,
+    };
     // What was read back of all views, for the evidence of an asset.
     let readings = vec![convert::framed_reading(
         Hypothesis::default(),
@@ -115,6 +149,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         duration: convert::duration(marked.duration),
         device: marked.device,
         clip: marked.clip,
+        credentials,
         ..convert::embed_result(&marked.outcome)
     });
     Ok(Finished {

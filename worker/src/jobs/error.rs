@@ -52,6 +52,9 @@ pub enum Error {
     /// The engine failed.
     #[error("{0}")]
     Engine(#[from] guardsplat_engine::Error),
+    /// Content credentials can't be made here.
+    #[error("content credentials: {0}")]
+    Credentials(#[from] crate::credentials_program::Error),
     /// The engine's thread is gone.
     #[error("the engine panicked: {0}")]
     Panicked(String),

@@ -8,6 +8,7 @@ mod backoff;
 mod capabilities;
 mod convert;
 mod create_key_job;
+mod credentials;
 mod direct;
 mod embed_job;
 mod engine_cache;
@@ -25,6 +26,7 @@ use std::path::PathBuf;
 use guardsplat_engine::device::DeviceChoice;
 use guardsplat_proto::connect::Target;
 
+use crate::credentials_program::Certificate;
 use accelerator::Accelerator;
 use capabilities::WorkerCapabilities;
 pub use error::{Error, Result};
@@ -49,6 +51,8 @@ pub struct Options {
     pub stop_with_stdin: bool,
     /// Where the files of jobs are kept for as long as these last.
     pub work_dir: Option<PathBuf>,
+    /// Who signs content credentials.
+    pub certificate: Certificate,
 }
 
 /// Works until it is asked to leave.
@@ -67,6 +71,7 @@ pub fn run(options: &Options) -> Result<()> {
 
 async fn work(options: &Options) -> Result<()> {
     let server = Server::new(&options.server)?;
+    credentials::check(&options.certificate)?;
     let leaving = shutdown::listen(options.stop_with_stdin).map_err(Error::io("signals"))?;
     let parent = options.work_dir.clone().unwrap_or_else(std::env::temp_dir);
     let folder = WorkDirectory::new(&parent)?;
@@ -78,6 +83,7 @@ async fn work(options: &Options) -> Result<()> {
         leaving,
         folder,
         accelerator,
+        certificate: options.certificate.clone(),
         capabilities: WorkerCapabilities::new(name, &device, options.memory),
     };
     worker.serve().await

@@ -38,7 +38,8 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
     let cameras_file = Some(spec.cameras.as_str()).filter(|name| !name.is_empty());
     let suspects = spec.suspects.iter().map(String::as_str);
     let names: Vec<&str> = suspects.chain(cameras_file).collect();
-    let mut paths = attempt.download(&names).await?;
+    let inputs = attempt.download(&names).await?;
+    let mut paths: Vec<_> = inputs.into_iter().map(|input| input.path).collect();
     let cameras_file = cameras_file.and_then(|_| paths.pop());
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());

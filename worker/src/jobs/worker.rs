@@ -14,6 +14,7 @@ use super::lease::{Ended, Lease, Reporter};
 use super::server::{Server, persist, within};
 use super::shutdown::ShutdownSignal;
 use super::work_directory::WorkDirectory;
+use crate::credentials_program::Certificate;
 
 /// How long to wait for a job before asking again.
 const WAIT: Duration = Duration::from_secs(30);
@@ -40,6 +41,8 @@ pub struct Worker {
     pub folder: WorkDirectory,
     /// Where to compute.
     pub accelerator: Accelerator,
+    /// Who signs content credentials.
+    pub certificate: Certificate,
     /// What it calls itself, and what it can do.
     pub capabilities: WorkerCapabilities,
 }
@@ -112,6 +115,7 @@ impl Worker {
             folder: folder.path(),
             stop: &stop,
             reporter,
+            certificate: &self.certificate,
             known_as: Vec::new(),
         };
         let mut leaving = self.leaving.clone();

@@ -34,7 +34,7 @@ async fn door(server: &Server, total: usize, handshake: Duration, idle: Option<D
         },
         handshake,
         idle,
-        measured: server.api.measured(),
+        api: server.api.clone(),
     };
     let routes = server.api.routes().unwrap();
     tokio::spawn(serve(routes, options, listener, std::future::pending()));

@@ -137,7 +137,7 @@ impl Server {
             connections: ConnectionLimits::default(),
             handshake: HANDSHAKE,
             idle: None,
-            measured: api.measured(),
+            api: api.clone(),
         };
         let served = tokio::spawn(serve(routes, door, listener, shutdown));
         let housekeeper = tokio::spawn(housekeeping(api.clone()));

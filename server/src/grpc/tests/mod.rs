@@ -5,6 +5,7 @@ mod artifacts;
 pub(crate) mod calls;
 mod claims;
 mod connections;
+pub(crate) mod credentials;
 mod deletions;
 mod direct;
 mod endless;

@@ -237,6 +237,8 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "RequeueJob" => named!(RequeueJobRequest, job),
         "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
+        // What they have of others is in a test of its own, below.
+        "ListWorkers" => NamesNothing,
         "ListJobs" => Own(Vec::new(), own.job.clone()),
         "AppendUpload" => {
             let request = AppendUploadRequest {
@@ -389,6 +391,29 @@ async fn workers_read_what_running_jobs_need_and_nothing_else() {
         .await
         .unwrap();
     assert_eq!(not_found(download().await), studio.artifact);
+}
+
+/// Workers are everybody's, their jobs are not.
+#[tokio::test]
+async fn workers_are_seen_and_what_they_have_of_others_is_not() {
+    let server = Server::with_tokens().await;
+    let worker = server.token("operator", &[Worker]).await;
+    let studio = Project::new(&server, "studio", &worker).await;
+    let other = server.token("other", &[Admin]).await;
+    let seen = async |token: &str| {
+        let request = asking(token, ListWorkersRequest {});
+        let answer = JobServiceClient::new(server.channel.clone())
+            .list_workers(request)
+            .await;
+        answer.unwrap().into_inner().workers.remove(0)
+    };
+    let idle = seen(&other).await;
+    assert_eq!((idle.name.as_str(), idle.busy, idle.start_time), ("w", false, None));
+    server.take_as(&worker).await;
+    let (own, theirs) = (seen(&studio.token).await, seen(&other).await);
+    assert_eq!((own.busy, &own.job, own.attempt), (true, &studio.job, 1));
+    assert_eq!((theirs.busy, theirs.job.as_str(), theirs.attempt), (true, "", 0));
+    assert!(own.start_time.is_some() && own.seen_time.is_some());
 }
 
 /// `CreateJob` and `CancelJob` need the scope of the job's kind.

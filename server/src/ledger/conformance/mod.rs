@@ -5,6 +5,7 @@
 mod artifacts;
 mod attempts;
 mod cancelling;
+mod credentials;
 mod fencing;
 pub(crate) mod fixture;
 mod generation;
@@ -28,6 +29,7 @@ use super::Ledger;
 pub(crate) use artifacts::*;
 pub(crate) use attempts::*;
 pub(crate) use cancelling::*;
+pub(crate) use credentials::*;
 pub(crate) use fencing::*;
 pub(crate) use generation::*;
 pub(crate) use history::*;
@@ -104,6 +106,8 @@ macro_rules! conformance_suite {
             outputs_of_attempts_that_are_over_are_collected
             outputs_are_published_by_completion_only
             completion_publishes_all_or_nothing
+            credentials_are_found_by_their_mark
+            credentials_come_with_their_job_and_go_with_their_sidecar
             keys_are_published_and_their_files_never
             keys_come_in_pages
             keys_are_retired_and_revoked_for_good

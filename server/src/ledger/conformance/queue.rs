@@ -3,7 +3,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::super::queue::PATIENCE;
-use super::super::{JobId, JobRow, Ledger, NewJob, ResourceRequirements, SeenWorker, WorkerCapabilities};
+use super::super::{JobId, JobRow, Ledger, NewJob, ResourceRequirements, SeenWorker, WorkerCapabilities, WorkerRow};
 use super::Factory;
 use super::fixture::*;
 
@@ -249,6 +249,7 @@ pub(crate) async fn workers_are_seen_for_a_while(factory: &dyn Factory) {
     let worker = |name: &str, memory| SeenWorker {
         name: name.into(),
         device: "a GPU".into(),
+        version: "1.2.3".into(),
         memory,
         clips: vec!["ab".repeat(32), "cd".repeat(32)],
     };
@@ -269,8 +270,25 @@ pub(crate) async fn workers_are_seen_for_a_while(factory: &dyn Factory) {
     let id = queue(&*ledger, at(6)).await;
     let lease = claim_of(&*ledger, id, at(6)).await;
     assert_eq!(names(at(1000)).await, ["worker-1"]);
-    complete(&*ledger, &lease, &[], at(1000)).await;
-    assert_eq!(names(at(1000)).await, Vec::<String>::new());
-    ledger.note_worker(worker("worker-3", None), at(86_405)).await.unwrap();
+    let both = ledger.workers_and_jobs(at(0), 9).await.unwrap();
+    let idle = WorkerRow {
+        seen: worker("worker-2", None),
+        time: at(0),
+        has: None,
+    };
+    assert_eq!((both.len(), &both[1]), (2, &idle));
+    assert_eq!((&both[0].seen, both[0].time), (&worker("worker-1", Some(7)), at(5)));
+    let has = both[0].has.as_ref().unwrap();
+    assert_eq!((has.id, has.attempt, has.start_time), (id, 1, at(6)));
+    assert_eq!((has.project.as_str(), has.lease_expires > at(6)), ("default", true));
+    assert_eq!(ledger.workers_and_jobs(at(1000), 9).await.unwrap(), both[..1]);
+    assert_eq!(ledger.workers_and_jobs(at(0), 1).await.unwrap(), both[..1]);
+    // Nor is it forgotten.
+    ledger.note_worker(worker("worker-3", None), at(86_406)).await.unwrap();
     assert_eq!(names(0).await, ["worker-1", "worker-3"]);
+    complete(&*ledger, &lease, &[], at(1000)).await;
+    assert_eq!(names(at(1000)).await, ["worker-3"]);
+    ledger.note_worker(worker("worker-3", None), at(86_407)).await.unwrap();
+    assert_eq!(names(0).await, ["worker-3"]);
+    assert_eq!(ledger.workers_and_jobs(0, 9).await.unwrap()[0].has, None);
 }

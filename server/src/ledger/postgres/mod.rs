@@ -77,6 +77,8 @@ pub(crate) mod tests;
 mod artifacts;
 #[path = "../shared/commitments.rs"]
 mod commitments;
+#[path = "../shared/credentials.rs"]
+mod credentials;
 #[path = "../shared/generation.rs"]
 mod generation;
 #[path = "../shared/history.rs"]

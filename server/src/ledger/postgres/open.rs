@@ -208,5 +208,15 @@ pub(super) fn steps() -> Vec<Migration> {
             "hardening",
             include_str!("../../../migrations/postgres/0010_hardening.sql"),
         ),
+        step(
+            11,
+            "workers",
+            include_str!("../../../migrations/postgres/0011_workers.sql"),
+        ),
+        step(
+            12,
+            "credentials",
+            include_str!("../../../migrations/postgres/0012_credentials.sql"),
+        ),
     ]
 }

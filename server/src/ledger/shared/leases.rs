@@ -10,7 +10,7 @@ use super::super::work::Progress;
 use super::super::workers::WorkerCapabilities;
 use super::super::{JobQueue, LedgerError, Result, codec, token};
 use super::transition::leave;
-use super::{DbConnection, DbLedger, DbRow, artifacts, jobs, keys, presence, queue, rows};
+use super::{DbConnection, DbLedger, DbRow, artifacts, credentials, jobs, keys, presence, queue, rows};
 
 #[async_trait::async_trait]
 impl JobQueue for DbLedger {
@@ -144,6 +144,7 @@ pub(super) async fn complete(
         result,
         outputs,
         key,
+        credentials,
         fingerprint,
     } = completion;
     let row = jobs::locked(db, id).await?;
@@ -157,6 +158,9 @@ pub(super) async fn complete(
     }
     for output in outputs {
         artifacts::publish(db, *output, id, token, false, now).await?;
+    }
+    if let Some(new) = credentials {
+        credentials::create(db, new, id, now).await?;
     }
     if let Some(key) = key {
         artifacts::publish(db, key.artifact, id, token, true, now).await?;

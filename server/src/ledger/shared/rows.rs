@@ -1,8 +1,9 @@
 //! Rows of the tables, read into the ledger's types.
 use sqlx::Row;
+use uuid::Uuid;
 
 use super::super::types::{ArtifactRow, Failure, FailureReason, JobRow, KeyRow};
-use super::super::workers::{ResourceRequirements, SeenWorker};
+use super::super::workers::{LeasedJob, ResourceRequirements, SeenWorker, WorkerRow};
 use super::super::{Result, codec, discriminants};
 use super::DbRow;
 
@@ -54,8 +55,27 @@ pub(super) fn worker(row: &DbRow) -> Result<SeenWorker> {
     Ok(SeenWorker {
         name: row.try_get("name")?,
         device: row.try_get("device")?,
+        version: row.try_get("version")?,
         memory: row.try_get("memory")?,
         clips: clips.split_ascii_whitespace().map(ToOwned::to_owned).collect(),
+    })
+}
+
+pub(super) fn worker_with_job(row: &DbRow) -> Result<WorkerRow> {
+    let id: Option<Uuid> = row.try_get("id")?;
+    let has = id.map(|id| {
+        Ok::<_, sqlx::Error>(LeasedJob {
+            id,
+            project: row.try_get("project")?,
+            attempt: row.try_get("attempt")?,
+            start_time: row.try_get("start_time")?,
+            lease_expires: row.try_get("lease_expires")?,
+        })
+    });
+    Ok(WorkerRow {
+        seen: worker(row)?,
+        time: row.try_get("time")?,
+        has: has.transpose()?,
     })
 }
 

@@ -67,6 +67,8 @@ mod writer;
 mod artifacts;
 #[path = "../shared/commitments.rs"]
 mod commitments;
+#[path = "../shared/credentials.rs"]
+mod credentials;
 #[path = "../shared/generation.rs"]
 mod generation;
 #[path = "../shared/history.rs"]

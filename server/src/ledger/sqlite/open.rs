@@ -97,5 +97,15 @@ fn migrator() -> Migrator {
             "hardening",
             include_str!("../../../migrations/sqlite/0012_hardening.sql"),
         ),
+        step(
+            13,
+            "workers",
+            include_str!("../../../migrations/sqlite/0013_workers.sql"),
+        ),
+        step(
+            14,
+            "credentials",
+            include_str!("../../../migrations/sqlite/0014_credentials.sql"),
+        ),
     ])
 }

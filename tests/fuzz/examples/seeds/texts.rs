@@ -78,6 +78,23 @@ pub fn put_all() {
     ] {
         put("soft_binding", name, text);
     }
+    for (name, text) in [
+        (
+            "by-binding",
+            "GET /matches/byBinding?alg=org.guardsplat.sh.1&value=\
+             ABEiM0RVZneImaq7zN3u%2F26%2FlQiL7oK86zTNnhnW0FUnSul2&maxResults=5",
+        ),
+        (
+            "by-json",
+            "POST /matches/byBinding?maxResults=2\n{\"alg\": \"org.guardsplat.sh.1\", \"value\": \
+             \"ABEiM0RVZneImaq7zN3u/26/lQiL7oK86zTNnhnW0FUnSul2\"}",
+        ),
+        ("manifest", "GET /manifests/urn%3Ac2pa%3A1?returnActiveManifest=true"),
+        ("algorithms", "GET /services/supportedAlgorithms"),
+        ("by-content", "POST /matches/byContent\nply"),
+    ] {
+        put("resolution", name, text);
+    }
 }
 
 const REFERENCE: &str = r#"[{"id": 0, "img_name": "a", "width": 10, "height": 20, "position": [1, 2, 3],

@@ -7,12 +7,12 @@ use guardsplat_engine::message::Key;
 use guardsplat_operations::search::{Nearest, read_and_search};
 use guardsplat_operations::suspect::Suspect;
 use guardsplat_soft_binding::Value;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::program::run_with_output;
-use super::{Exit, binding_key, copy};
+use super::{Exit, copy};
 use crate::cli::display::Display;
 use crate::cli::{print_json, print_line};
+use crate::credentials_program::{Named, binding_key, marks};
 use crate::error::{Error, Result};
 
 #[derive(Args)]
@@ -22,16 +22,6 @@ pub struct Arguments {
     /// The folder with credentials (.c2pa)
     #[arg(long, value_name = "FOLDER")]
     store: PathBuf,
-}
-
-/// What `guardsplat-credentials marks` tells of a sidecar.
-#[derive(Deserialize)]
-struct Named {
-    path: PathBuf,
-    manifest: Option<String>,
-    intact: bool,
-    marks: Vec<String>,
-    reason: Option<String>,
 }
 
 /// A message that credentials name.
@@ -103,32 +93,22 @@ fn candidates(store: &Path, key: &Key) -> Result<Vec<Candidate>> {
         .map_err(Error::io(store))?;
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "c2pa"));
     paths.sort();
-    let mut named: Vec<Named> = Vec::new();
-    // As many as fit on a command line.
-    for some in paths.chunks(256) {
-        let arguments: Vec<_> = std::iter::once("marks".into())
-            .chain(some.iter().map(Into::into))
-            .collect();
-        let told = run_with_output(&arguments)?;
-        let read = serde_json::from_str::<Vec<Named>>(&told);
-        named.extend(read.map_err(|error| Error::Credentials(format!("guardsplat-credentials marks: {error}")))?);
-    }
     let id = key.id();
     let mut candidates: Vec<Candidate> = Vec::new();
     for Named {
         path,
         manifest,
         intact,
-        marks,
+        marks: values,
         reason,
-    } in named
+    } in marks(&paths)?
     {
         if !intact {
             let reason = reason.unwrap_or_else(|| "changed since it was signed".into());
             eprintln!("left out: {}: {reason}", path.display());
             continue;
         }
-        let values = marks.iter().filter_map(|text| Value::parse(text).ok());
+        let values = values.iter().filter_map(|text| Value::parse(text).ok());
         for message in values.filter_map(|value| value.open(binding_key(key, &id), key.bits())) {
             if candidates.iter().all(|known| known.message != message) {
                 candidates.push(Candidate {

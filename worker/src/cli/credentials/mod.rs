@@ -2,18 +2,16 @@
 //! `guardsplat-credentials`: the C2PA's library would have burn built with other features, and read strangers' files here.
 mod copy;
 mod find;
-mod program;
 mod value;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use guardsplat_engine::message::Key;
-use guardsplat_soft_binding::{BindingKey, Value};
+use guardsplat_soft_binding::Value;
 
 use super::Exit;
+use crate::credentials_program::{self, Certificate, run_to_end};
 use crate::error::{Error, Result};
-use program::{run_to_end, run_with_output};
 
 #[derive(Subcommand)]
 pub enum Command {
@@ -53,7 +51,13 @@ pub fn run(command: &Command) -> Result<Exit> {
             let mut arguments = vec!["check".into(), scene.into(), sidecar.into()];
             arguments.extend(trust.iter().flat_map(|path| ["--trust".into(), path.into()]));
             arguments.extend(json.then(|| "--json".into()));
-            run_to_end(&arguments)
+            // Its exit codes are the same.
+            Ok(match run_to_end(&arguments)?.code() {
+                Some(0) => Exit::Done,
+                Some(2) => Exit::NoMatch,
+                Some(3) => Exit::Inconclusive,
+                _ => Exit::Failed,
+            })
         }
         Command::Find(arguments) => find::run(arguments),
         Command::Value(arguments) => value::run(arguments),
@@ -103,18 +107,18 @@ impl Signing {
                 ));
             }
         }
-        for path in [&self.certificate, &self.private_key].into_iter().flatten() {
+        for path in self.certificate().files() {
             std::fs::File::open(path).map_err(Error::io(path))?;
         }
-        run_with_output(&["--version".into()]).map(|_| ())
+        Ok(credentials_program::check()?)
     }
-}
 
-/// What soft bindings of a key are sealed and opened with.
-pub fn binding_key<'a>(key: &'a Key, id: &'a str) -> BindingKey<'a> {
-    BindingKey {
-        id,
-        secret: key.secret.expose(),
+    fn certificate(&self) -> Certificate {
+        Certificate {
+            certificate: self.certificate.clone(),
+            private_key: self.private_key.clone(),
+            algorithm: self.algorithm.clone(),
+        }
     }
 }
 
@@ -123,21 +127,8 @@ pub fn sign(signing: &Signing, original: &Path, marked: &Path, value: &Value) ->
     let Some(output) = &signing.credentials else {
         return Ok(None);
     };
-    let mut arguments = vec!["sign".into(), original.into(), marked.into(), output.into()];
-    arguments.extend(["--soft-binding".into(), value.text().into()]);
-    for (flag, path) in [
-        ("--certificate", &signing.certificate),
-        ("--private-key", &signing.private_key),
-    ] {
-        arguments.extend(path.iter().flat_map(|path| [flag.into(), path.into()]));
-    }
-    arguments.extend(
-        signing
-            .algorithm
-            .iter()
-            .flat_map(|name| ["--algorithm".into(), name.into()]),
-    );
-    let said = run_with_output(&arguments).map_err(|error| {
+    let said = credentials_program::sign(&signing.certificate(), original, marked, output, value);
+    let said = said.map_err(|error| {
         Error::Credentials(format!(
             "{error}\n  the marked scene is written, its credentials are not"
         ))

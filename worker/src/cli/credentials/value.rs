@@ -4,9 +4,10 @@ use guardsplat_operations::verification::read;
 use guardsplat_soft_binding::{ALGORITHM, Value};
 use serde::Serialize;
 
-use super::{Exit, binding_key, copy};
+use super::{Exit, copy};
 use crate::cli::display::Display;
 use crate::cli::{print_json, print_line};
+use crate::credentials_program::binding_key;
 use crate::error::Result;
 
 /// What is told: the query of the C2PA's Soft Binding Resolution API.

@@ -26,6 +26,7 @@ async fn worker(server: &server::Server, folder: &std::path::Path) -> Worker {
         folder: WorkDirectory::new(folder).unwrap(),
         accelerator,
         capabilities: WorkerCapabilities::new("test".into(), "cpu", None),
+        certificate: crate::credentials_program::Certificate::default(),
     }
 }
 

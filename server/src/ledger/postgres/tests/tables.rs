@@ -8,7 +8,7 @@ use super::super::super::{
 };
 use super::super::jobs::{PAGE, PAGE_OF_STATE};
 use super::super::queue::{CLAIM, GET, QUEUE};
-use super::super::{commitments, deliveries, hooks, keys, open, registry, statistics, tokens};
+use super::super::{commitments, credentials, deliveries, hooks, keys, open, registry, statistics, tokens};
 use super::Place;
 
 #[tokio::test]
@@ -147,6 +147,26 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
             "uuid, bigint, bigint",
         ),
         (registry::LAST_PAYLOAD, "assets_key_id_payload_key", "uuid"),
+        (
+            credentials::BY_ASSET,
+            "content_credentials_by_asset",
+            "text, uuid, uuid, bigint",
+        ),
+        (
+            credentials::BY_MESSAGE,
+            "content_credentials_by_message",
+            "text, text, uuid, bigint",
+        ),
+        (
+            credentials::BY_BINDING,
+            "content_credentials_by_binding",
+            "text, text, bigint",
+        ),
+        (
+            credentials::BY_MANIFEST,
+            "content_credentials_by_manifest",
+            "text, text, bigint",
+        ),
         (commitments::HEAD, "commitments_pkey", ""),
         (commitments::CHAIN, "commitments_pkey", "bigint, bigint, text"),
     ];

@@ -163,6 +163,7 @@ async fn a_file_of_the_first_version_is_taken_along() {
         "DROP INDEX jobs_failed",
         "ALTER TABLE jobs DROP COLUMN trace_parent",
         "DROP TABLE tokens",
+        "DROP TABLE content_credentials",
         "DROP TABLE read_files",
         "DROP TABLE readings",
         "DROP TABLE seen_files",

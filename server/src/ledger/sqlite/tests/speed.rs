@@ -7,7 +7,7 @@ use super::super::super::conformance::fixture::*;
 use super::super::super::{JobStore, Ledger as _, NewJob};
 use super::super::jobs::{PAGE, PAGE_OF_STATE};
 use super::super::queue::{CLAIM, POSITION, QUEUE};
-use super::super::{commitments, deliveries, hooks, keys, registry, statistics, tokens};
+use super::super::{commitments, credentials, deliveries, hooks, keys, registry, statistics, tokens};
 use super::Folder;
 use super::file::raw;
 
@@ -63,6 +63,19 @@ async fn rows_are_found_by_their_indexes_and_never_sorted() {
         (
             hooks::OF_HOOK,
             "INDEX deliveries_by_hook (hook_id=? AND (create_time,id)<",
+        ),
+        (credentials::BY_ASSET, "INDEX content_credentials_by_asset (asset_id=?)"),
+        (
+            credentials::BY_MESSAGE,
+            "INDEX content_credentials_by_message (key_id=? AND message=?)",
+        ),
+        (
+            credentials::BY_BINDING,
+            "INDEX content_credentials_by_binding (project=? AND soft_binding=?)",
+        ),
+        (
+            credentials::BY_MANIFEST,
+            "INDEX content_credentials_by_manifest (project=? AND manifest=?)",
         ),
         (commitments::CHAIN, "INTEGER PRIMARY KEY (rowid>?)"),
     ];

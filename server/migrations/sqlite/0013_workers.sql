@@ -1,0 +1,3 @@
+-- Operators see the workers, and which of them are old.
+
+ALTER TABLE seen_workers ADD COLUMN version TEXT NOT NULL DEFAULT ''; -- empty where the worker did not say
