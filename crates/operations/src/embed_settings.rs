@@ -53,6 +53,7 @@ pub fn chosen(base: Settings, seed: u64, size: Option<u32>) -> Result<Settings> 
     let mut settings = Settings { seed, ..base };
     if let Some(size) = size {
         settings.size = size;
+        settings.times_of_fine = 1;
         settings.verify.size = Some(size);
     }
     settings.check()?;

@@ -172,6 +172,7 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
         extent = Some(Extent::of(gaussians)?);
         let mut settings = Preset::Standard.settings();
         settings.kind = asked.kind;
+        let settings = settings.for_scene(gaussians, cameras)?;
         let view = measure_view_on_cpu(gaussians, &settings, cameras)?;
         let clip = Clip::shipped(&open(DeviceChoice::Cpu)?.device, Parts::Image)?;
         let clip = 4 * clip.parameters() as u64;

@@ -3,10 +3,12 @@ use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
     Comparison, Engine, PictureLogits, PooledLogits, default_size, estimates, hypotheses, read_given, read_scene,
+    size_for_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::{BadRows, Ignored, Scene};
+use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::view::{Camera, SceneKind, ViewSampler, Viewpoints};
 
 use crate::suspect::Suspect;
@@ -73,10 +75,10 @@ fn read_scenes(
     let (mut logits, mut ignored) = (Logits::new(), Vec::new());
     let total = count(suspect, views);
     for path in &suspect.scenes {
-        let size = views.size.unwrap_or_else(|| default_size(engine));
+        let largest = views.size.unwrap_or_else(|| 2 * default_size(engine));
         let rest = MemoryRequirements {
             models: engine.model_bytes(false),
-            pictures: picture_bytes(size, size),
+            pictures: picture_bytes(largest, largest),
             ..MemoryRequirements::of_program()
         };
         admission::admit_reading(path, &engine.limits, rest)?;
@@ -97,6 +99,10 @@ fn read_scenes(
             cameras: &views.cameras,
         };
         let sampler = ViewSampler::seen_from(&gaussians, views.seed, viewpoints)?;
+        let size = match views.size {
+            Some(size) => size,
+            None => size_for_scene(engine, &Geometry::new(&gaussians), &sampler)?,
+        };
         let reading = read_scene(engine, &gaussians, &sampler, views.count, size, views.background, seen)?;
         logits.extend(reading.views);
     }

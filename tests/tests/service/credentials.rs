@@ -50,11 +50,7 @@ fn ask(address: &str, target: &str, token: Option<&str>) -> (u16, Vec<u8>) {
     let shown = token
         .map(|token| format!("Authorization: Bearer {token}\r\n"))
         .unwrap_or_default();
-    write!(
-        stream,
-        "GET {target} HTTP/1.0\r\nHost: h\r\n{shown}\r\n"
-    )
-    .unwrap();
+    write!(stream, "GET {target} HTTP/1.0\r\nHost: h\r\n{shown}\r\n").unwrap();
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).unwrap();
     let end = answer.windows(4).position(|part| part == b"\r\n\r\n").unwrap();

@@ -89,6 +89,7 @@ fn embed_scene(
     admission::admit_marking(job.input, &engine.limits, rest)?;
     let scene = read(engine.limits.left(&rest))?;
     stop.check()?;
+    let settings = &settings.for_scene(&scene.gaussians, job.cameras)?;
     let work = Work {
         message: job.message,
         settings,

@@ -27,6 +27,7 @@ pub fn embed_gaussians(
     settings.check()?;
     engine.stop.check()?;
     let scene = Scene::from_gaussians(gaussians);
+    let settings = &settings.for_scene(&scene.gaussians, cameras)?;
     let work = Work {
         message,
         settings,

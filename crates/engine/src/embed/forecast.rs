@@ -66,6 +66,7 @@ fn trial(settings: &Settings) -> Settings {
         steps: (settings.steps / SHARE).clamp(LEAST_STEPS.min(settings.steps), settings.steps),
         pool_views: settings.pool_views.min(POOL),
         early_stop: None,
+        extension: None,
         // In so few steps a change that may only be small has not got anywhere.
         balance: settings.balance.map(|balance| LossWeightControl {
             covered_psnr_db: None,
@@ -93,8 +94,9 @@ pub fn forecast(
     cameras: &[Camera],
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Forecast> {
-    let trial = trial(settings);
     let start = Instant::now();
+    let settings = &settings.for_scene(&scene.gaussians, cameras)?;
+    let trial = trial(settings);
     let mut covered_at = None;
     let optimised = optimise(engine, scene, message, &trial, cameras, &mut |event| {
         if matches!(event, Progress::Covered { .. }) {

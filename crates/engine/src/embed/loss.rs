@@ -48,6 +48,11 @@ impl<'a> Loss<'a> {
         }
     }
 
+    /// Divides logits by `temperature` from now on.
+    pub fn set_temperature(&mut self, temperature: f32) {
+        self.settings.lambda.temperature = temperature;
+    }
+
     /// Loss and gradient of `pictures` against `references`, with terms multiplied by `factors`.
     ///
     /// # Errors

@@ -12,8 +12,8 @@ use super::loss::{Loss, finite};
 use super::loss_weight_controller::LossWeightController;
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgd;
-use super::progress::{Progress, Step};
-use super::settings::Settings;
+use super::progress::{Check, Progress, Step};
+use super::settings::{Extension, Settings};
 use super::step_timer::{Stage, StepTimer};
 use super::view_pool::{Coverage, PooledView, ViewPool};
 use crate::error::{Error, Result};
@@ -55,6 +55,7 @@ pub fn optimise(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Optimised> {
     settings.check()?;
+    let settings = &settings.for_scene(&scene.gaussians, cameras)?;
     if message.len() != engine.bits {
         return Err(Error::BadOption {
             field: "message",
@@ -67,7 +68,6 @@ pub fn optimise(
     if let Some(ring) = settings.ring {
         sampler.train_on_ring(ring.elevation.to_radians())?;
     }
-    let settings = &settings.for_views(sampler.shows_parts(), sampler.given().is_some());
     let mut held_out = settings
         .early_stop
         .map(|stop| EarlyStopping::new(engine, &geometry, &sampler, settings, stop))
@@ -80,7 +80,7 @@ pub fn optimise(
     });
     let mut timing = StepTimer::new();
     let mut steps = 0;
-    while steps < settings.steps {
+    while steps < run.steps {
         engine.stop.check()?;
         timing.start();
         steps += 1;
@@ -89,6 +89,7 @@ pub fn optimise(
         if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
             let check;
             (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
+            run.extend_where_wrong(&check);
             progress(Progress::Check(check));
         }
         timing.lap(Stage::Check);
@@ -118,6 +119,10 @@ struct Run<'a> {
     scene: &'a Scene,
     geometry: Geometry<'a>,
     settings: &'a Settings,
+    /// Most steps, by the settings or as they were extended.
+    steps: usize,
+    /// What is done at the next look, where bits are wrong.
+    extension: Option<Extension>,
     loss: Loss<'a>,
     pool: ViewPool,
     optimiser: OptimizerState,
@@ -159,6 +164,8 @@ impl<'a> Run<'a> {
             scene,
             geometry,
             settings,
+            steps: settings.steps,
+            extension: settings.extension,
             loss: Loss::new(engine, settings, message),
             pool,
             optimiser,
@@ -234,7 +241,7 @@ impl<'a> Run<'a> {
         timing.lap(Stage::ShBackward);
         Ok(Step {
             step,
-            total: self.settings.steps,
+            total: self.steps,
             bit_accuracy: found.bit_accuracy,
             psnr_db,
             terms: found.terms,
@@ -242,11 +249,22 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Takes more steps, in which weak bits weigh more, where the first look that decides finds bits wrong. The rate then
+    /// follows the longer curve.
+    fn extend_where_wrong(&mut self, check: &Check) {
+        if let Some(extension) = self.extension.take_if(|extension| check.step >= extension.after)
+            && check.bit_accuracy < extension.below
+        {
+            self.steps *= extension.times as usize;
+            self.loss.set_temperature(extension.temperature);
+        }
+    }
+
     /// Factor on the learning rates: a half cosine from 1 to the final rate.
     fn rate(&self, step: usize) -> f32 {
         let s = self.settings;
         let last = s.optimizer.final_rate();
-        let turn = std::f32::consts::PI * (step - 1) as f32 / self.settings.steps as f32;
+        let turn = std::f32::consts::PI * (step - 1) as f32 / self.steps as f32;
         last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
     }
 }

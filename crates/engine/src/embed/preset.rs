@@ -6,7 +6,7 @@ use super::augment::Augmentation;
 use super::loss_weight_controller::{LossWeightControl, TargetRelaxation};
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgdOptions;
-use super::settings::{EarlyStop, LossWeights, Settings, Verify};
+use super::settings::{EarlyStop, Extension, LossWeights, Settings, Verify};
 use super::target::Target;
 use crate::error::{Error, Result};
 
@@ -74,6 +74,13 @@ impl Preset {
             seed: 0,
             steps: 240,
             times_of_parts: 2,
+            times_of_fine: 2,
+            extension: Some(Extension {
+                after: 100,
+                below: 0.97,
+                times: 2,
+                temperature: 4.0,
+            }),
             views_per_step: 8,
             fresh_per_step: 4,
             views: None,
@@ -152,6 +159,7 @@ impl Preset {
             Self::Standard => standard,
             Self::Draft => Settings {
                 steps: 80,
+                extension: None,
                 enlarged: 3.0,
                 pool_views: 100,
                 balance: Some(LossWeightControl {
@@ -197,6 +205,8 @@ impl Preset {
                 distortions: Ranges::default(),
                 steps: 1300,
                 times_of_parts: 1,
+                times_of_fine: 1,
+                extension: None,
                 views_per_step: 16,
                 fresh_per_step: 16,
                 size: 224,

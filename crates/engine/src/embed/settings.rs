@@ -58,6 +58,20 @@ pub struct EarlyStop {
     pub patience: usize,
 }
 
+/// What is done where bits stay wrong in the views of the early stop: more steps, in which weak bits weigh more.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Extension {
+    /// The first look after so many steps decides.
+    pub after: usize,
+    /// Mean bit accuracy below which they do.
+    pub below: f64,
+    /// What the number of steps is multiplied by.
+    pub times: u32,
+    /// [`LossWeights::temperature`] from then on.
+    pub temperature: f32,
+}
+
 /// How the marked file is verified.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -92,6 +106,13 @@ pub struct Settings {
     /// found, and not where cameras were given: what few of these show would be changed too much.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub times_of_parts: u32,
+    /// What the sides of views may be multiplied by, 1 or 2: more where the scene has splats so fine that views show other
+    /// colours than pictures do. They stand for the same pictures then.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub times_of_fine: u32,
+    /// What is done where bits stay wrong; `None` for nothing. It needs an early stop, which looks at held-out views.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extension: Option<Extension>,
     /// Views a step.
     pub views_per_step: usize,
     /// How many of them were never used before; the others are drawn from the pool. With 0 the first step's views are
@@ -180,22 +201,6 @@ impl Settings {
         Ok(settings)
     }
 
-    /// The settings for a scene of which every view shows another part, or each the whole; `given` says whether views are
-    /// among cameras that were given.
-    pub(super) fn for_views(&self, of_parts: bool, given: bool) -> Self {
-        let mut settings = *self;
-        if of_parts {
-            settings.steps *= self.times_of_parts as usize;
-        }
-        if let Optimizer::PreconditionedSgd(sgd) = &mut settings.optimizer
-            && of_parts
-            && !given
-        {
-            sgd.length *= self.times_of_parts as f32;
-        }
-        settings
-    }
-
     /// Where views are taken from, with these cameras, if there are any.
     pub fn viewpoints<'a>(&self, cameras: &'a [Camera]) -> Viewpoints<'a> {
         Viewpoints {
@@ -220,6 +225,13 @@ impl Settings {
         let count = |field, value: usize, most: usize| within(field, value as f64, 1.0, most as f64);
         count("steps", self.steps, 10_000_000)?;
         within("times_of_parts", f64::from(self.times_of_parts), 1.0, 100.0)?;
+        within("times_of_fine", f64::from(self.times_of_fine), 1.0, 2.0)?;
+        if let Some(extension) = &self.extension {
+            count("extension.after", extension.after, 10_000_000)?;
+            within("extension.below", extension.below, 0.0, 1.0)?;
+            count("extension.times", extension.times as usize, 100)?;
+            within("extension.temperature", f64::from(extension.temperature), 1e-3, 1e6)?;
+        }
         count("views_per_step", self.views_per_step, 1024)?;
         within(
             "fresh_per_step",
@@ -346,22 +358,5 @@ mod tests {
         assert!(reason(r#"{"size": 4}"#).contains("outside 16"));
         assert!(reason(r#"{"ring": {"elevation": 90}}"#).contains("90 is outside -80 to 80"));
         assert!(!serde_json::to_string(&standard).unwrap().contains("ring"));
-    }
-
-    #[test]
-    fn views_of_parts_take_more_and_longer_steps() {
-        let standard = Preset::Standard.settings();
-        assert_eq!(standard.for_views(false, false), standard);
-        let [parts, given] = [false, true].map(|given| standard.for_views(true, given));
-        assert_eq!((parts.steps, given.steps), (2 * standard.steps, 2 * standard.steps));
-        let length = |settings: &Settings| match settings.optimizer {
-            Optimizer::PreconditionedSgd(sgd) => sgd.length,
-            Optimizer::Adam(_) => f32::NAN,
-        };
-        assert_eq!(length(&parts), 2.0 * length(&standard));
-        assert_eq!(length(&given), length(&standard));
-        let paper = Preset::Paper.settings();
-        assert_eq!(paper.for_views(true, false), paper);
-        assert!(standard.overridden(r#"{"times_of_parts": 0}"#).is_err());
     }
 }

@@ -9,6 +9,7 @@ mod pictures;
 mod pooled;
 mod restore;
 mod suspect_kind;
+mod view_size;
 mod window;
 
 pub use blind::Candidate;
@@ -22,6 +23,8 @@ pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
 pub use restore::{read_given, read_rendered};
 pub use suspect_kind::SuspectKind;
+pub use view_size::size_for_scene;
+pub(crate) use view_size::sufficient_side;
 
 use crate::error::Result;
 use crate::picture::Picture;
@@ -33,7 +36,8 @@ use crate::view::{Split, ViewSampler};
 pub const DEFAULT_VIEWS: usize = 20;
 
 /// Side of views in pixels where nothing else is asked for: what the extractor takes in, between 128 and 512. The presets
-/// train at the shipped CLIP's size, and a mark is read best at the size it was trained at.
+/// train at the shipped CLIP's size, and a mark is read best at the size it was trained at. Scenes of fine splats take
+/// twice that ([`size_for_scene`]).
 pub fn default_size(engine: &Engine) -> u32 {
     engine.extractor.side().clamp(128, 512) as u32
 }

@@ -1,0 +1,100 @@
+//! How large a scene's views have to be drawn to show what larger pictures of it show.
+//!
+//! A view that stands for a larger picture ([`Geometry::prepare_averaged`]) takes every splat for even over a pixel. Where
+//! many fine splats share one, each then lets what is behind shine through, and the view has other colours than the
+//! picture has: a mark in these is not one in those.
+use super::{default_size, stands_for};
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::picture::Picture;
+use crate::quality::{Psnr, covered, mean_psnr, psnr_covered};
+use crate::splat::{CpuRasterizer, Geometry, Rasterizer, WeightCache, sh};
+use crate::view::{Split, ViewSampler};
+
+/// Held-out views that are compared.
+const VIEWS: u64 = 2;
+/// Views that are less like finer ones than this, over what the scene covers, are too coarse, dB. A mark has 33 dB there,
+/// but what many views have alike is not lost to it: at 160 px the guitar (24 to 30 dB) and the biker (28 to 30) lose, and
+/// playbot_31k (32 to 34) does not; playbot_125k has 30 to 31, plant 31 to 37, pod 45, donut 38, samples 34 to 47.
+const ALIKE_DB: f64 = 31.0;
+
+/// Side at which views of a scene are read where nothing else is asked for: [`default_size`], or twice that.
+///
+/// # Errors
+/// Those of [`sufficient_side`].
+pub fn size_for_scene(engine: &Engine, geometry: &Geometry<'_>, sampler: &ViewSampler) -> Result<u32> {
+    sufficient_side(geometry, sampler, default_size(engine))
+}
+
+/// `side`, or twice that where views of `side` pixels are too coarse for the scene. The same on every device.
+///
+/// # Errors
+/// A side or cameras out of range.
+pub(crate) fn sufficient_side(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u32) -> Result<u32> {
+    let draw = |index: u64, side: u32, ground: f32| -> Result<Picture> {
+        let camera = sampler.camera(Split::HeldOut, index, side);
+        let view = geometry.prepare_averaged(&camera, stands_for(side), WeightCache::None)?;
+        let colours = sh::colours(geometry.sh(), None, &view);
+        CpuRasterizer.render(&view, &colours, [ground; 3])
+    };
+    let mut differences: Vec<Psnr> = Vec::new();
+    for index in 0..VIEWS {
+        let coarse = draw(index, side, 1.0)?;
+        let mask = covered(&coarse, &draw(index, side, 0.0)?)?;
+        differences.extend(psnr_covered(&halved(&draw(index, 2 * side, 1.0)?), &coarse, &mask)?);
+    }
+    // Of a scene that covers nothing there is nothing to be seen.
+    let fine = match differences.is_empty() {
+        true => false,
+        false => mean_psnr(&differences)?.psnr_db.is_some_and(|db| db < ALIKE_DB),
+    };
+    Ok(if fine { 2 * side } else { side })
+}
+
+/// The picture averaged down to half its side.
+fn halved(picture: &Picture) -> Picture {
+    let (width, height) = (picture.width / 2, picture.height / 2);
+    let row = 3 * picture.width as usize;
+    let mut pixels = Vec::with_capacity(3 * (width * height) as usize);
+    for y in 0..height as usize {
+        for x in 0..width as usize {
+            let at = 2 * y * row + 6 * x;
+            let mean = |channel: usize| {
+                let of = |offset: usize| picture.pixels[at + offset + channel].clamp(0.0, 1.0);
+                (of(0) + of(3) + of(row) + of(row + 3)) / 4.0
+            };
+            pixels.extend([0, 1, 2].map(mean));
+        }
+    }
+    Picture { width, height, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::sample;
+
+    #[test]
+    fn four_pixels_become_one() {
+        let picture = Picture {
+            width: 4,
+            height: 2,
+            pixels: (0..8).flat_map(|i| [i as f32 / 8.0, 0.5, 2.0]).collect(),
+        };
+        let half = halved(&picture);
+        assert_eq!((half.width, half.height), (2, 1));
+        // Pixels 0, 1, 4, 5 and 2, 3, 6, 7; nothing is brighter than white.
+        assert_eq!(half.pixels, [2.5 / 8.0, 0.5, 1.0, 4.5 / 8.0, 0.5, 1.0]);
+    }
+
+    /// The same scene with splats a tenth as wide, and as many more of them as hide what is behind.
+    #[test]
+    fn scenes_of_fine_splats_need_larger_views() {
+        let side = |gaussians: usize| {
+            let scene = sample(gaussians, 0, 3).unwrap().gaussians;
+            let sampler = ViewSampler::new(&scene, 1).unwrap();
+            sufficient_side(&Geometry::new(&scene), &sampler, 40).unwrap()
+        };
+        assert_eq!([side(300), side(20_000)], [40, 80]);
+    }
+}
