@@ -252,11 +252,13 @@ impl<'a> Run<'a> {
     /// Takes more steps, in which weak bits weigh more, where the first look that decides finds bits wrong. The rate then
     /// follows the longer curve.
     fn extend_where_wrong(&mut self, check: &Check) {
-        if let Some(extension) = self.extension.take_if(|extension| check.step >= extension.after)
-            && check.bit_accuracy < extension.below
-        {
-            self.steps *= extension.times as usize;
-            self.loss.set_temperature(extension.temperature);
+        if let Some(extension) = self.extension.filter(|extension| check.step >= extension.after) {
+            self.extension = None;
+            if check.bit_accuracy < extension.below {
+                self.steps = self.steps.saturating_mul(extension.times as usize);
+                self.loss.set_temperature(extension.temperature);
+                self.extension = extension.next();
+            }
         }
     }
 

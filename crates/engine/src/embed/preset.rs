@@ -79,6 +79,7 @@ impl Preset {
                 after: 100,
                 below: 0.97,
                 times: 2,
+                most: 2,
                 temperature: 4.0,
             }),
             views_per_step: 8,

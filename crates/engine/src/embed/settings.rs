@@ -68,8 +68,23 @@ pub struct Extension {
     pub below: f64,
     /// What the number of steps is multiplied by.
     pub times: u32,
+    /// How often at most. The next time it is decided after `times` as many steps, for `times` as many wrong bits.
+    pub most: u32,
     /// [`LossWeights::temperature`] from then on.
     pub temperature: f32,
+}
+
+impl Extension {
+    /// What decides the next time, if there is one.
+    pub(super) fn next(self) -> Option<Self> {
+        let left = self.most.saturating_sub(1);
+        (left > 0).then(|| Self {
+            after: self.after.saturating_mul(self.times as usize),
+            below: 1.0 - (1.0 - self.below) * f64::from(self.times),
+            most: left,
+            ..self
+        })
+    }
 }
 
 /// How the marked file is verified.
@@ -230,6 +245,7 @@ impl Settings {
             count("extension.after", extension.after, 10_000_000)?;
             within("extension.below", extension.below, 0.0, 1.0)?;
             count("extension.times", extension.times as usize, 100)?;
+            count("extension.most", extension.most as usize, 10)?;
             within("extension.temperature", f64::from(extension.temperature), 1e-3, 1e6)?;
         }
         count("views_per_step", self.views_per_step, 1024)?;
