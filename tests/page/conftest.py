@@ -12,7 +12,12 @@ from service import Service, program
 
 CHROMIUM = os.environ.get("GUARDSPLAT_CHROMIUM", "/usr/bin/chromium")
 # No GPU is needed; root's browser has no sandbox of its own.
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-dev-shm-usage"]
+FLAGS = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+]
 
 
 @pytest.fixture(scope="session")
@@ -43,7 +48,9 @@ def token(service: Service) -> str:
 @pytest.fixture(scope="session")
 def key(service: Service, token: str) -> str:
     """A key that marks the scene well, always the same one."""
-    service.client(token, "key", "create", "--bits", 32, "--display-name", "studio", "--seed", 7)
+    service.client(
+        token, "key", "create", "--bits", 32, "--display-name", "studio", "--seed", 7
+    )
     return "studio (32 bits)"
 
 
@@ -64,15 +71,29 @@ def small(folder: Path) -> Path:
 @pytest.fixture
 def tab(browser: Browser) -> Iterator[Page]:
     """A tab that nothing may go wrong in unseen, and that may ask nobody but the server."""
-    context = browser.new_context(viewport={"width": 1000, "height": 900}, accept_downloads=True)
+    context = browser.new_context(
+        viewport={"width": 1000, "height": 900}, accept_downloads=True
+    )
     page = context.new_page()
     wrong: list[str] = []
     hosts: set[str] = set()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
-        "console", lambda message: wrong.append(message.text) if "Content Security Policy" in message.text else None
+        "console",
+        lambda message: (
+            wrong.append(message.text)
+            if "Content Security Policy" in message.text
+            else None
+        ),
     )
-    page.on("request", lambda request: hosts.add(request.url.split("/")[2]) if request.url.startswith("http") else None)
+    page.on(
+        "request",
+        lambda request: (
+            hosts.add(request.url.split("/")[2])
+            if request.url.startswith("http")
+            else None
+        ),
+    )
     yield page
     assert wrong == []
     assert len(hosts) <= 1, hosts

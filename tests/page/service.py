@@ -12,9 +12,18 @@ import time
 import uuid
 from pathlib import Path
 
-PROGRAMS = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")).resolve() / "release"
+PROGRAMS = (
+    Path(
+        os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")
+    ).resolve()
+    / "release"
+)
 # What the programs would take for settings is not of the tests.
-ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("GUARDSPLAT_")}
+ENVIRONMENT = {
+    name: value
+    for name, value in os.environ.items()
+    if not name.startswith("GUARDSPLAT_")
+}
 SCOPES = ("admin", "embed", "verify")
 
 
@@ -28,7 +37,9 @@ def program(name: str, *arguments: object, token: str | None = None) -> str:
     """Runs a program to its end, which must be a good one, and gives what it says."""
     command = [str(PROGRAMS / name), *map(str, arguments)]
     environment = ENVIRONMENT | ({"GUARDSPLAT_TOKEN": token} if token else {})
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment
+    )
     assert done.returncode == 0, f"{command}: {done.stderr}"
     return done.stdout.strip()
 
@@ -45,11 +56,24 @@ class Service:
         self.start()
 
     def start(self) -> None:
-        command = [str(PROGRAMS / "guardsplat-server"), "--data-dir", str(self.folder), "--access", "tokens"]
-        command += ["--listen", f"127.0.0.1:{self.api}", "--page-listen", f"127.0.0.1:{self.page}"]
+        command = [
+            str(PROGRAMS / "guardsplat-server"),
+            "--data-dir",
+            str(self.folder),
+            "--access",
+            "tokens",
+        ]
+        command += [
+            "--listen",
+            f"127.0.0.1:{self.api}",
+            "--page-listen",
+            f"127.0.0.1:{self.page}",
+        ]
         command += ["--worker-device", "cpu", *map(str, self.settings)]
         with self.log.open("ab") as log:
-            self.process = subprocess.Popen(command, stdout=log, stderr=log, env=ENVIRONMENT)
+            self.process = subprocess.Popen(
+                command, stdout=log, stderr=log, env=ENVIRONMENT
+            )
         for _ in range(600):
             assert self.process.poll() is None, self.log.read_text()
             with socket.socket() as probe:
@@ -65,14 +89,29 @@ class Service:
 
     def token(self, *scopes: str) -> str:
         given = [word for scope in scopes or SCOPES for word in ("--scope", scope)]
-        return program("guardsplat-server", "--data-dir", self.folder, "token", "create", "--project", "studio", *given)
+        return program(
+            "guardsplat-server",
+            "--data-dir",
+            self.folder,
+            "token",
+            "create",
+            "--project",
+            "studio",
+            *given,
+        )
 
     def revoke(self, token: str) -> None:
         name = f"tokens/{uuid.UUID(token.split('_')[1])}"
         program("guardsplat-server", "--data-dir", self.folder, "token", "revoke", name)
 
     def client(self, token: str, *arguments: object) -> str:
-        return program("guardsplat", "--server", f"http://127.0.0.1:{self.api}", *arguments, token=token)
+        return program(
+            "guardsplat",
+            "--server",
+            f"http://127.0.0.1:{self.api}",
+            *arguments,
+            token=token,
+        )
 
 
 class Way:
@@ -115,7 +154,9 @@ class Way:
                     for ready, _ in both.select(0.5):
                         try:
                             some = ready.fileobj.recv(1 << 16)
-                            if not some or self._breaks(len(some), ready.fileobj is browser):
+                            if not some or self._breaks(
+                                len(some), ready.fileobj is browser
+                            ):
                                 return
                             ready.data.sendall(some)
                         except OSError:
@@ -131,7 +172,10 @@ class Way:
                 return True
             if self.break_after is not None and self.sent >= self.break_after:
                 self.break_after = None
-            elif self.break_back_after is not None and self.received >= self.break_back_after:
+            elif (
+                self.break_back_after is not None
+                and self.received >= self.break_back_after
+            ):
                 self.break_back_after = None
             else:
                 return False

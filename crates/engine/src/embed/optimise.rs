@@ -27,6 +27,9 @@ use crate::view::{Camera, ViewSampler};
 /// Steps between two reports of the timing.
 const TIMED_STEPS: usize = 20;
 
+/// dB that held-out views may lack of the target without more steps: to hold them takes bits.
+const SHORT_DB: f64 = 0.5;
+
 /// The outcome of the loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimised {
@@ -89,7 +92,7 @@ pub fn optimise(
         if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
             let check;
             (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
-            run.extend_where_wrong(&check);
+            run.heed(&check);
             progress(Progress::Check(check));
         }
         timing.lap(Stage::Check);
@@ -249,12 +252,15 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Takes more steps, in which weak bits weigh more, where the first look that decides finds bits wrong. The rate then
-    /// follows the longer curve.
-    fn extend_where_wrong(&mut self, check: &Check) {
+    /// Heeds what held-out views showed. Where they show the mark more than they may, its PSNR is held higher. Where they
+    /// still do at the first look that decides, or have wrong bits, the run takes more steps, in which weak bits weigh more;
+    /// the rate then follows the longer curve.
+    fn heed(&mut self, check: &Check) {
+        let lacking = self.settings.target.psnr_db - check.psnr_db;
+        self.controller.held_out(lacking);
         if let Some(extension) = self.extension.filter(|extension| check.step >= extension.after) {
             self.extension = None;
-            if check.bit_accuracy < extension.below {
+            if check.bit_accuracy < extension.below || lacking > SHORT_DB {
                 self.steps = self.steps.saturating_mul(extension.times as usize);
                 self.loss.set_temperature(extension.temperature);
                 self.extension = extension.next();
