@@ -40,14 +40,15 @@ pub fn check(spec: &JobSpec, limit: u64) -> Result<()> {
     problems.finish()
 }
 
-/// Pixels that an embedding draws: the steps of its preset, each of so many views. The engine's presets have the numbers
-/// (`crates/engine/src/embed/preset.rs`), and the server knows nothing of the engine.
+/// Pixels that an embedding draws at most: the steps of its preset, as often as it may take more of them, twice that in
+/// rooms, each of so many views. The engine's presets have the numbers (`crates/engine/src/embed/preset.rs`), and the server
+/// knows nothing of the engine.
 fn of_embed(spec: &EmbedSpec) -> u64 {
     let views = match spec.preset() {
-        Preset::Unspecified | Preset::Standard => 240 * 8,
-        Preset::Draft => 80 * 8,
-        Preset::Robust => 320 * 8,
-        Preset::Thorough => 480 * 8,
+        Preset::Unspecified | Preset::Standard => 240 * 4 * 2 * 8,
+        Preset::Draft => 80 * 2 * 8,
+        Preset::Robust => 320 * 4 * 2 * 8,
+        Preset::Thorough => 480 * 2 * 2 * 8,
         Preset::Paper => 1300 * 16,
     };
     views * square(spec.size)

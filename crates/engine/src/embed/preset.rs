@@ -201,7 +201,12 @@ impl Preset {
                 }),
                 ..standard
             },
-            Self::Thorough => Settings { steps: 480, ..standard },
+            Self::Thorough => Settings {
+                steps: 480,
+                // To as many steps as of standard.
+                extension: standard.extension.map(|extension| Extension { most: 1, ..extension }),
+                ..standard
+            },
             Self::Paper => Settings {
                 distortions: Ranges::default(),
                 steps: 1300,
