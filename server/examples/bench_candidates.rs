@@ -152,6 +152,7 @@ async fn make_key(ledger: &dyn Ledger) -> Outcome<KeyId> {
         result: JobResult::CreateKey(KeyResult::default()),
         outputs: Vec::new(),
         key: Some(key),
+        credentials: None,
         fingerprint: [0; 32],
     };
     ledger.complete(job, &lease.token, completion, 0).await?;
