@@ -48,9 +48,7 @@ def token(service: Service) -> str:
 @pytest.fixture(scope="session")
 def key(service: Service, token: str) -> str:
     """A key that marks the scene well, always the same one."""
-    service.client(
-        token, "key", "create", "--bits", 32, "--display-name", "studio", "--seed", 7
-    )
+    service.client(token, "key", "create", "--bits", 32, "--display-name", "studio", "--seed", 7)
     return "studio (32 bits)"
 
 
@@ -71,28 +69,18 @@ def small(folder: Path) -> Path:
 @pytest.fixture
 def tab(browser: Browser) -> Iterator[Page]:
     """A tab that nothing may go wrong in unseen, and that may ask nobody but the server."""
-    context = browser.new_context(
-        viewport={"width": 1000, "height": 900}, accept_downloads=True
-    )
+    context = browser.new_context(viewport={"width": 1000, "height": 900}, accept_downloads=True)
     page = context.new_page()
     wrong: list[str] = []
     hosts: set[str] = set()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
         "console",
-        lambda message: (
-            wrong.append(message.text)
-            if "Content Security Policy" in message.text
-            else None
-        ),
+        lambda message: wrong.append(message.text) if "Content Security Policy" in message.text else None,
     )
     page.on(
         "request",
-        lambda request: (
-            hosts.add(request.url.split("/")[2])
-            if request.url.startswith("http")
-            else None
-        ),
+        lambda request: hosts.add(request.url.split("/")[2]) if request.url.startswith("http") else None,
     )
     yield page
     assert wrong == []

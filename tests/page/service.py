@@ -12,18 +12,9 @@ import time
 import uuid
 from pathlib import Path
 
-PROGRAMS = (
-    Path(
-        os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")
-    ).resolve()
-    / "release"
-)
+PROGRAMS = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parents[2] / "target")).resolve() / "release"
 # What the programs would take for settings is not of the tests.
-ENVIRONMENT = {
-    name: value
-    for name, value in os.environ.items()
-    if not name.startswith("GUARDSPLAT_")
-}
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("GUARDSPLAT_")}
 SCOPES = ("admin", "embed", "verify")
 
 
@@ -37,9 +28,7 @@ def program(name: str, *arguments: object, token: str | None = None) -> str:
     """Runs a program to its end, which must be a good one, and gives what it says."""
     command = [str(PROGRAMS / name), *map(str, arguments)]
     environment = ENVIRONMENT | ({"GUARDSPLAT_TOKEN": token} if token else {})
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env=environment
-    )
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, f"{command}: {done.stderr}"
     return done.stdout.strip()
 
@@ -71,9 +60,7 @@ class Service:
         ]
         command += ["--worker-device", "cpu", *map(str, self.settings)]
         with self.log.open("ab") as log:
-            self.process = subprocess.Popen(
-                command, stdout=log, stderr=log, env=ENVIRONMENT
-            )
+            self.process = subprocess.Popen(command, stdout=log, stderr=log, env=ENVIRONMENT)
         for _ in range(600):
             assert self.process.poll() is None, self.log.read_text()
             with socket.socket() as probe:
@@ -154,9 +141,7 @@ class Way:
                     for ready, _ in both.select(0.5):
                         try:
                             some = ready.fileobj.recv(1 << 16)
-                            if not some or self._breaks(
-                                len(some), ready.fileobj is browser
-                            ):
+                            if not some or self._breaks(len(some), ready.fileobj is browser):
                                 return
                             ready.data.sendall(some)
                         except OSError:
@@ -172,10 +157,7 @@ class Way:
                 return True
             if self.break_after is not None and self.sent >= self.break_after:
                 self.break_after = None
-            elif (
-                self.break_back_after is not None
-                and self.received >= self.break_back_after
-            ):
+            elif self.break_back_after is not None and self.received >= self.break_back_after:
                 self.break_back_after = None
             else:
                 return False

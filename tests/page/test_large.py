@@ -29,14 +29,8 @@ class Memory:
 
     def _watch(self) -> None:
         while True:
-            listed = subprocess.run(
-                ["ps", "-eo", "rss,args"], capture_output=True, text=True, check=False
-            ).stdout
-            tabs = [
-                int(line.split()[0]) << 10
-                for line in listed.splitlines()
-                if "--type=renderer" in line
-            ]
+            listed = subprocess.run(["ps", "-eo", "rss,args"], capture_output=True, text=True, check=False).stdout
+            tabs = [int(line.split()[0]) << 10 for line in listed.splitlines() if "--type=renderer" in line]
             self.most[self.phase] = max([self.most.get(self.phase, 0), *tabs])
             time.sleep(0.2)
 
@@ -45,9 +39,7 @@ class Memory:
     os.environ.get("GUARDSPLAT_PAGE") != "large",
     reason="takes minutes; GUARDSPLAT_PAGE=large",
 )
-def test_a_large_scene(
-    service: Service, token: str, key: str, folder: Path, tab: Page
-) -> None:
+def test_a_large_scene(service: Service, token: str, key: str, folder: Path, tab: Page) -> None:
     scene = folder / "large.ply"
     program("guardsplat-worker", "sample", scene, "--gaussians", 430_000, "--seed", 2)
     assert scene.stat().st_size > 100_000_000
@@ -65,9 +57,7 @@ def test_a_large_scene(
 
     phase("sending")
     tab.get_by_role("button", name="Mark the scene").click()
-    expect(tab.locator("#mark-job")).to_contain_text(
-        re.compile("Waiting|Preparing|Working"), timeout=LONG
-    )
+    expect(tab.locator("#mark-job")).to_contain_text(re.compile("Waiting|Preparing|Working"), timeout=LONG)
     phase("marking and fetching")
     result = tab.locator("#mark-result")
     turn = result.get_by_role("button", name="Turn it here")
@@ -79,7 +69,5 @@ def test_a_large_scene(
     phase("end")
     names, times = list(seconds), list(seconds.values())
     for name, begun, ended in zip(names, times, times[1:], strict=False):
-        print(
-            f"{name}: {ended - begun:.0f} s, {memory.most[name] / (1 << 20):.0f} MiB at most"
-        )
+        print(f"{name}: {ended - begun:.0f} s, {memory.most[name] / (1 << 20):.0f} MiB at most")
     assert max(memory.most.values()) < MOST

@@ -69,37 +69,25 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     assert size > 4 << 20
     way.break_after = before + (5 << 19)
     tab.get_by_role("button", name="Mark the scene").click()
-    expect(tab.locator("#mark-job")).to_contain_text(
-        "The server can't be reached. Trying again.", timeout=30_000
-    )
-    expect(tab.locator("#mark-job")).to_contain_text(
-        re.compile("Waiting|Preparing|Working"), timeout=60_000
-    )
+    expect(tab.locator("#mark-job")).to_contain_text("The server can't be reached. Trying again.", timeout=30_000)
+    expect(tab.locator("#mark-job")).to_contain_text(re.compile("Waiting|Preparing|Working"), timeout=60_000)
     assert way.broken == 1
     # It went on where it was: what was on its way went there twice, and nothing else.
-    assert way.sent - before < size + (2 << 20), (
-        f"{way.sent - before} bytes for a file of {size}"
-    )
+    assert way.sent - before < size + (2 << 20), f"{way.sent - before} bytes for a file of {size}"
     # So it does while the marked scene comes back.
     came = way.received
     way.break_back_after = came + (2 << 20)
 
     result = tab.locator("#mark-result")
-    expect(result.get_by_role("heading", name="The marked scene")).to_be_focused(
-        timeout=LONG
-    )
-    expect(result.locator("figcaption")).to_have_text(
-        ["Before", "After", "Difference, ten times"]
-    )
+    expect(result.get_by_role("heading", name="The marked scene")).to_be_focused(timeout=LONG)
+    expect(result.locator("figcaption")).to_have_text(["Before", "After", "Difference, ten times"])
     with tab.expect_download() as download:
         result.get_by_role("button", name="Download marked.ply").click()
     marked = folder / "marked.ply"
     download.value.save_as(marked)
     assert marked.stat().st_size == size
     assert way.broken == 2
-    assert way.received - came < size + (4 << 20), (
-        f"{way.received - came} bytes for a file of {size}"
-    )
+    assert way.received - came < size + (4 << 20), f"{way.received - came} bytes for a file of {size}"
     assert marked.read_bytes() != scene.read_bytes()
 
     result.get_by_role("button", name="Turn it here").click()
@@ -117,18 +105,14 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     expect(tab.locator("#verify-message")).to_have_value(MESSAGE)
     tab.get_by_role("button", name="Verify").click()
     found = tab.locator("#verify-result")
-    expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(
-        timeout=LONG
-    )
+    expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(timeout=LONG)
     expect(found).to_contain_text("of 32 bits agree")
     expect(found).to_contain_text("What it does not say")
 
     # Another message is not there.
     tab.locator("#verify-message").fill("00000000")
     tab.get_by_role("button", name="Verify").click()
-    expect(found.get_by_role("heading", name="The mark was not found")).to_be_visible(
-        timeout=LONG
-    )
+    expect(found.get_by_role("heading", name="The mark was not found")).to_be_visible(timeout=LONG)
 
     # What was done is under Jobs, with who did it.
     tab.get_by_role("link", name="Jobs").click()
@@ -148,9 +132,7 @@ def test_a_worker_is_seen_with_its_job_by_admins(
 ) -> None:
     name = key.split()[0]
     long = ("--preset", "thorough", "--display-name", "long")
-    job = service.client(
-        token, "embed", small, "--key", name, "--message", MESSAGE, "--no-wait", *long
-    ).split()[0]
+    job = service.client(token, "embed", small, "--key", name, "--message", MESSAGE, "--no-wait", *long).split()[0]
     sign_in(tab, address(service), token)
     tab.get_by_role("link", name="Jobs").click()
     workers = tab.get_by_role("list", name="Workers").get_by_role("listitem")
@@ -162,9 +144,7 @@ def test_a_worker_is_seen_with_its_job_by_admins(
             break
         tab.wait_for_timeout(500)
     expect(workers).to_contain_text(had)
-    tab.locator("#jobs-list > li").filter(has_text="long").get_by_role(
-        "button", name="Cancel"
-    ).click()
+    tab.locator("#jobs-list > li").filter(has_text="long").get_by_role("button", name="Cancel").click()
     # Whoever may not see workers sees the jobs all the same.
     other = tab.context.new_page()
     sign_in(other, address(service), service.token("embed"))
@@ -175,22 +155,16 @@ def test_a_worker_is_seen_with_its_job_by_admins(
     other.close()
 
 
-def test_an_owner_is_registered_and_found(
-    service: Service, token: str, small: Path, tab: Page, folder: Path
-) -> None:
+def test_an_owner_is_registered_and_found(service: Service, token: str, small: Path, tab: Page, folder: Path) -> None:
     # Always the same one, which marks the scene well.
-    service.client(
-        token, "key", "create", "--bits", 64, "--display-name", "originals", "--seed", 3
-    )
+    service.client(token, "key", "create", "--bits", 64, "--display-name", "originals", "--seed", 3)
     sign_in(tab, address(service), token)
     tab.locator("#mark-file").set_input_files(small)
     tab.get_by_label("A mark of its owner, which is registered now").check()
     expect(tab.locator("#mark-key option")).to_have_text(["originals (64 bits)"])
     mark = tab.get_by_role("button", name="Mark the scene")
     mark.click()
-    expect(tab.locator("#mark-form").get_by_role("alert")).to_contain_text(
-        "The owner has no name."
-    )
+    expect(tab.locator("#mark-form").get_by_role("alert")).to_contain_text("The owner has no name.")
 
     # A claim on what is not registered says so.
     tab.get_by_role("link", name="Verify").click()
@@ -199,9 +173,7 @@ def test_an_owner_is_registered_and_found(
     tab.get_by_label("It is any registered original of this key").check()
     tab.get_by_role("button", name="Verify").click()
     found = tab.locator("#verify-result")
-    expect(
-        found.get_by_role("heading", name="Nothing is registered to compare with")
-    ).to_be_focused(timeout=LONG)
+    expect(found.get_by_role("heading", name="Nothing is registered to compare with")).to_be_focused(timeout=LONG)
 
     tab.get_by_role("link", name="Mark").click()
     tab.get_by_label("Name of a new owner").fill("Studio Nord")
@@ -214,9 +186,7 @@ def test_an_owner_is_registered_and_found(
     tab.get_by_role("link", name="Verify").click()
     tab.locator("#verify-files").set_input_files(copy)
     tab.get_by_role("button", name="Verify").click()
-    expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(
-        timeout=LONG
-    )
+    expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(timeout=LONG)
     expect(found).to_contain_text("small.ply (number 1), of Studio Nord")
     keep(found, "verdict")
     for name in ("evidence.html", "evidence.json"):
@@ -237,9 +207,7 @@ def test_a_key_is_made(service: Service, token: str, tab: Page) -> None:
     expect(tab.locator("#mark-key option:checked")).to_have_text("short (16 bits)")
 
 
-def test_mistakes_say_what_to_do(
-    service: Service, token: str, key: str, tab: Page, folder: Path
-) -> None:
+def test_mistakes_say_what_to_do(service: Service, token: str, key: str, tab: Page, folder: Path) -> None:
     sign_in(tab, address(service), token)
     alert = tab.locator("#mark-form").get_by_role("alert")
     mark = tab.get_by_role("button", name="Mark the scene")
@@ -253,9 +221,7 @@ def test_mistakes_say_what_to_do(
     tab.get_by_role("button", name="Draw one").click()
     expect(tab.locator("#mark-message")).to_have_value(re.compile("^[0-9a-f]{8}$"))
     mark.click()
-    expect(alert).to_contain_text(
-        re.compile("(PLY|scene|letter)", re.IGNORECASE), timeout=LONG
-    )
+    expect(alert).to_contain_text(re.compile("(PLY|scene|letter)", re.IGNORECASE), timeout=LONG)
     expect(mark).to_be_enabled()
     empty = folder / "empty.ply"
     empty.touch()
@@ -265,9 +231,7 @@ def test_mistakes_say_what_to_do(
 
 
 def test_a_full_queue_and_a_server_that_goes_away(tab: Page, folder: Path) -> None:
-    service = Service(
-        folder / "full", "--embedded-worker", "false", "--max-queued-jobs", 1
-    )
+    service = Service(folder / "full", "--embedded-worker", "false", "--max-queued-jobs", 1)
     try:
         token = service.token()
         sign_in(tab, address(service), token)
@@ -285,16 +249,12 @@ def test_a_full_queue_and_a_server_that_goes_away(tab: Page, folder: Path) -> No
         other.close()
 
         service.stop()
-        expect(panel).to_contain_text(
-            "The server can't be reached. Trying again.", timeout=20_000
-        )
+        expect(panel).to_contain_text("The server can't be reached. Trying again.", timeout=20_000)
         service.start()
         expect(panel).not_to_contain_text("can't be reached", timeout=30_000)
         expect(panel).to_contain_text("Waiting. It is next.")
         panel.get_by_role("button", name="Stop").click()
-        expect(tab.locator("#mark-form").get_by_role("alert")).to_contain_text(
-            "The job was cancelled.", timeout=20_000
-        )
+        expect(tab.locator("#mark-form").get_by_role("alert")).to_contain_text("The job was cancelled.", timeout=20_000)
         tab.get_by_role("link", name="Jobs").click()
         tab.get_by_label("Show").select_option("All")
         expect(tab.locator("#jobs-list > li")).to_contain_text("Cancelled.")
@@ -326,17 +286,9 @@ def test_nothing_keeps_people_out(
     found = []
 
     def check(what: str) -> None:
-        result = page.evaluate(
-            "() => axe.run(document, { resultTypes: ['violations'] })"
-        )
-        bad = [
-            one
-            for one in result["violations"]
-            if one["impact"] in ("serious", "critical")
-        ]
-        found.extend(
-            f"{what}: {one['id']} {one['nodes'][0]['html'][:120]}" for one in bad
-        )
+        result = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+        bad = [one for one in result["violations"] if one["impact"] in ("serious", "critical")]
+        found.extend(f"{what}: {one['id']} {one['nodes'][0]['html'][:120]}" for one in bad)
         wide = page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
         if wide > 0:
             found.append(f"{what} is {wide} pixels too wide")
