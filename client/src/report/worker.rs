@@ -2,7 +2,7 @@
 use guardsplat_proto::v1::Worker;
 use serde::Serialize;
 
-use super::text::time;
+use super::text::{some, time};
 use crate::output::printable;
 
 const GIB: f64 = (1_u64 << 30) as f64;
@@ -25,7 +25,7 @@ pub struct WorkerReport {
 
 impl From<&Worker> for WorkerReport {
     fn from(worker: &Worker) -> Self {
-        let job = Some(worker.job.clone()).filter(|job| !job.is_empty());
+        let job = some(&worker.job);
         Self {
             name: worker.name.clone(),
             device: worker.device.clone(),

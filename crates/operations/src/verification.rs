@@ -75,6 +75,7 @@ fn read_scenes(
     let (mut logits, mut ignored) = (Logits::new(), Vec::new());
     let total = count(suspect, views);
     for path in &suspect.scenes {
+        // A scene of fine splats is drawn at twice the side, and is not read yet.
         let largest = views.size.unwrap_or_else(|| 2 * default_size(engine));
         let rest = MemoryRequirements {
             models: engine.model_bytes(false),

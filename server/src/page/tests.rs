@@ -3,7 +3,6 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use futures::StreamExt as _;
-use guardsplat_proto::v1::EmbedSpec;
 use http_body_util::{BodyExt as _, Full, StreamBody};
 use hyper::body::{Bytes, Frame};
 use reqwest::{Client, Method, Response, StatusCode};
@@ -17,7 +16,7 @@ use crate::access::{self, Need, Scope};
 use crate::grpc::guard::Guard;
 use crate::grpc::listener::{ConnectionLimits, HANDSHAKE, ListenerOptions, Protocol, serve};
 use crate::grpc::tests::calls::paths;
-use crate::grpc::tests::credentials::{SIDECAR, VALUES, delete, marked};
+use crate::grpc::tests::credentials::{SIDECAR, VALUES, delete, marked, raw_spec};
 use crate::grpc::tests::harness::Server;
 use crate::settings::Settings;
 
@@ -269,14 +268,7 @@ fn manifests(answer: (StatusCode, Bytes)) -> Vec<String> {
 async fn credentials_are_resolved_for_their_project_and_nobody_else() {
     // Workers and jobs come by an open door; the page has one of its own.
     let server = Server::start().await;
-    let key = server.key(32, b"the key file").await;
-    let scene = server.upload("scene.ply", b"a scene").await.name;
-    let spec = |message: &str| EmbedSpec {
-        scene: scene.clone(),
-        key: key.clone(),
-        message: message.into(),
-        ..EmbedSpec::default()
-    };
+    let spec = raw_spec(&server).await;
     let first = marked(&server, spec("c0ffee42"), "urn:c2pa:1").await;
     marked(&server, spec("c0ffee42"), "urn:c2pa:2").await;
     let (url, client) = (page(&server).await, Client::new());

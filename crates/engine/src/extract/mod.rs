@@ -23,8 +23,8 @@ pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
 pub use restore::{read_given, read_rendered};
 pub use suspect_kind::SuspectKind;
-pub use view_size::size_for_scene;
 pub(crate) use view_size::sufficient_side;
+pub use view_size::{likeness_to_finer, size_for_scene};
 
 use crate::error::Result;
 use crate::picture::Picture;

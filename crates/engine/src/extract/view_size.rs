@@ -31,6 +31,16 @@ pub fn size_for_scene(engine: &Engine, geometry: &Geometry<'_>, sampler: &ViewSa
 /// # Errors
 /// A side or cameras out of range.
 pub(crate) fn sufficient_side(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u32) -> Result<u32> {
+    let likeness = likeness_to_finer(geometry, sampler, side)?;
+    Ok(if likeness < ALIKE_DB { 2 * side } else { side })
+}
+
+/// How alike views of `side` pixels are to those of twice the side, averaged down: PSNR over what the scene covers, dB.
+/// Infinite where there is no difference, or nothing to be seen.
+///
+/// # Errors
+/// A side or cameras out of range.
+pub fn likeness_to_finer(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u32) -> Result<f64> {
     let draw = |index: u64, side: u32, ground: f32| -> Result<Picture> {
         let camera = sampler.camera(Split::HeldOut, index, side);
         let view = geometry.prepare_averaged(&camera, stands_for(side), WeightCache::None)?;
@@ -43,12 +53,10 @@ pub(crate) fn sufficient_side(geometry: &Geometry<'_>, sampler: &ViewSampler, si
         let mask = covered(&coarse, &draw(index, side, 0.0)?)?;
         differences.extend(psnr_covered(&halved(&draw(index, 2 * side, 1.0)?), &coarse, &mask)?);
     }
-    // Of a scene that covers nothing there is nothing to be seen.
-    let fine = match differences.is_empty() {
-        true => false,
-        false => mean_psnr(&differences)?.psnr_db.is_some_and(|db| db < ALIKE_DB),
-    };
-    Ok(if fine { 2 * side } else { side })
+    if differences.is_empty() {
+        return Ok(f64::INFINITY);
+    }
+    Ok(mean_psnr(&differences)?.psnr_db.unwrap_or(f64::INFINITY))
 }
 
 /// The picture averaged down to half its side.
@@ -87,7 +95,7 @@ mod tests {
         assert_eq!(half.pixels, [2.5 / 8.0, 0.5, 1.0, 4.5 / 8.0, 0.5, 1.0]);
     }
 
-    /// The same scene with splats a tenth as wide, and as many more of them as hide what is behind.
+    /// Samples of more Gaussians have smaller ones.
     #[test]
     fn scenes_of_fine_splats_need_larger_views() {
         let side = |gaussians: usize| {

@@ -47,6 +47,18 @@ async fn submit(server: &Server, spec: EmbedSpec) -> (String, String) {
     (job, token)
 }
 
+/// Makes specs of a scene and a key of 32 bits that are on the server, with any message.
+pub(crate) async fn raw_spec(server: &Server) -> impl Fn(&str) -> EmbedSpec {
+    let key = server.key(32, b"the key file").await;
+    let scene = server.upload("scene.ply", b"a scene").await.name;
+    move |message| EmbedSpec {
+        scene: scene.clone(),
+        key: key.clone(),
+        message: message.into(),
+        ..EmbedSpec::default()
+    }
+}
+
 /// Has a scene marked with credentials.
 pub(crate) async fn marked(server: &Server, spec: EmbedSpec, manifest: &str) -> Credentials {
     let asset = !spec.asset.is_empty();
@@ -122,14 +134,8 @@ async fn a_claim_that_matches_names_the_credentials_of_its_mark() {
 #[tokio::test]
 async fn a_raw_message_that_matches_names_them_too() {
     let server = Server::start().await;
-    let key = server.key(32, b"the key file").await;
-    let scene = server.upload("scene.ply", b"a scene").await.name;
-    let spec = |message: &str| EmbedSpec {
-        scene: scene.clone(),
-        key: key.clone(),
-        message: message.into(),
-        ..EmbedSpec::default()
-    };
+    let spec = raw_spec(&server).await;
+    let EmbedSpec { scene, key, .. } = spec("");
     let made = marked(&server, spec("0xC0FFEE42"), "urn:c2pa:1").await;
     for (message, verdict, credentials) in [
         ("c0ffee42", Verdict::Match, vec![made.clone()]),

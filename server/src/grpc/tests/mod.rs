@@ -40,4 +40,5 @@ mod transfers;
 mod transport;
 mod watch;
 mod worker;
+mod workers;
 mod zombie;

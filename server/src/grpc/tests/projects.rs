@@ -22,14 +22,14 @@ use crate::service::clock;
 const ALL: [Scope; 3] = [Embed, Verify, Admin];
 
 /// A project with one of everything.
-struct Project {
-    token: String,
+pub(super) struct Project {
+    pub token: String,
     artifact: String,
     key: String,
     owner: String,
     asset: String,
     commitment: String,
-    job: String,
+    pub job: String,
     token_name: String,
     hook: String,
     delivery: String,
@@ -39,7 +39,7 @@ struct Project {
 const SCENE: &[u8] = b"a scene";
 
 impl Project {
-    async fn new(server: &Server, name: &str, worker: &str) -> Self {
+    pub async fn new(server: &Server, name: &str, worker: &str) -> Self {
         let token = server.token(name, &ALL).await;
         let channel = server.channel.clone();
         let mut jobs = JobServiceClient::new(channel.clone());
@@ -237,7 +237,7 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
         "RequeueJob" => named!(RequeueJobRequest, job),
         "ListJobAttempts" => named!(ListJobAttemptsRequest, job),
         "WatchJob" => named!(WatchJobRequest, job, cursor: String::new()),
-        // What they have of others is in a test of its own, below.
+        // What they have of others: workers.rs.
         "ListWorkers" => NamesNothing,
         "ListJobs" => Own(Vec::new(), own.job.clone()),
         "AppendUpload" => {
@@ -393,29 +393,6 @@ async fn workers_read_what_running_jobs_need_and_nothing_else() {
     assert_eq!(not_found(download().await), studio.artifact);
 }
 
-/// Workers are everybody's, their jobs are not.
-#[tokio::test]
-async fn workers_are_seen_and_what_they_have_of_others_is_not() {
-    let server = Server::with_tokens().await;
-    let worker = server.token("operator", &[Worker]).await;
-    let studio = Project::new(&server, "studio", &worker).await;
-    let other = server.token("other", &[Admin]).await;
-    let seen = async |token: &str| {
-        let request = asking(token, ListWorkersRequest {});
-        let answer = JobServiceClient::new(server.channel.clone())
-            .list_workers(request)
-            .await;
-        answer.unwrap().into_inner().workers.remove(0)
-    };
-    let idle = seen(&other).await;
-    assert_eq!((idle.name.as_str(), idle.busy, idle.start_time), ("w", false, None));
-    server.take_as(&worker).await;
-    let (own, theirs) = (seen(&studio.token).await, seen(&other).await);
-    assert_eq!((own.busy, &own.job, own.attempt), (true, &studio.job, 1));
-    assert_eq!((theirs.busy, theirs.job.as_str(), theirs.attempt), (true, "", 0));
-    assert!(own.start_time.is_some() && own.seen_time.is_some());
-}
-
 /// `CreateJob` and `CancelJob` need the scope of the job's kind.
 #[tokio::test]
 async fn jobs_need_the_scope_of_their_kind() {
@@ -499,7 +476,7 @@ async fn request_ids_are_a_project_s_own() {
 
 impl Server {
     /// Has a worker take the next job, which must be there.
-    async fn take_as(&self, worker: &str) -> (Job, String) {
+    pub async fn take_as(&self, worker: &str) -> (Job, String) {
         let request = LeaseJobRequest {
             worker: "w".into(),
             wait: None,
