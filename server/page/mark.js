@@ -3,10 +3,11 @@ import { KeyState, Preset } from "./vendor/api.js";
 import { all, keys, patiently, registry, SOON, uuid } from "./calls.js";
 import { alertIn, by, bytes, choices, droppable, element, fill, save } from "./elements.js";
 import { explain, Mistake } from "./errors.js";
+import { canShow } from "./formats.js";
 import { Panel, run } from "./jobs.js";
 import { download, upload } from "./transfer.js";
 import { table } from "./verdict.js";
-import { canShow, show } from "./viewer.js";
+import { show } from "./viewer.js";
 
 const PRESETS = {
     draft: Preset.DRAFT,

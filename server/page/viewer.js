@@ -1,22 +1,16 @@
 // Turns a scene: three.js and Spark draw it, the mouse, a finger, keys or buttons turn it, and pictures can be taken of it.
 import { announce, element } from "./elements.js";
 import { Mistake } from "./errors.js";
+import { parts } from "./formats.js";
 
-/** Formats that the viewer reads, by how their names end. */
-const TYPES = { ply: "ply", spz: "spz", splat: "splat", sog: "pcsogszip" };
 /** It is drawn for so long after something changed: sorting takes a while. */
 const AWAKE = 1500;
 const STEP = Math.PI / 18;
 const FIELD_OF_VIEW = 45;
 
-/** Whether the viewer can show a file, by its name. */
-export function canShow(name) {
-    return name.split(".").pop().toLowerCase() in TYPES;
-}
-
 /** Shows a scene file in `box`. `taken` gets each picture that is taken, as a PNG file. */
 export async function show(box, file, taken) {
-    const { Box3, Color, OrbitControls, PerspectiveCamera, Scene, SparkRenderer, SplatMesh, Vector3, WebGLRenderer } =
+    const { Box3, Color, Group, OrbitControls, PerspectiveCamera, Scene, SparkRenderer, SplatMesh, Vector3, WebGLRenderer } =
         await import("./vendor/splats.js");
     const canvas = element("canvas", {
         tabIndex: 0,
@@ -40,20 +34,22 @@ export async function show(box, file, taken) {
     const scene = new Scene();
     // As the reference rasteriser draws them, whose pictures marks are made for.
     scene.add(new SparkRenderer({ renderer, preBlurAmount: 0.3, blurAmount: 0, maxStdDev: 3 }));
-    const mesh = new SplatMesh({
-        fileBytes: new Uint8Array(await file.arrayBuffer()),
-        fileType: TYPES[file.name.split(".").pop().toLowerCase()],
-    });
+    const group = new Group();
     // Scenes of captures have y downwards.
-    mesh.quaternion.set(1, 0, 0, 0);
-    scene.add(mesh);
+    group.quaternion.set(1, 0, 0, 0);
+    scene.add(group);
     try {
-        await mesh.initialized;
+        for (const { type, bytes, matrix } of await parts(file)) {
+            const mesh = new SplatMesh({ fileBytes: bytes, fileType: type });
+            matrix?.decompose(mesh.position, mesh.quaternion, mesh.scale);
+            group.add(mesh);
+        }
+        await Promise.all(group.children.map((mesh) => mesh.initialized));
     } catch {
         throw new Mistake("The viewer can't read this kind of file.", "The scene itself is good: download it, or turn it in another viewer.");
     }
 
-    const { centre, radius } = extent(mesh, Vector3, Box3);
+    const { centre, radius } = extent(group, Vector3, Box3);
     const camera = new PerspectiveCamera(FIELD_OF_VIEW, 4 / 3, radius / 100, radius * 100);
     const distance = (0.85 * radius) / Math.sin(((FIELD_OF_VIEW / 2) * Math.PI) / 180);
     camera.position.copy(centre).add(new Vector3(0.5, 0.35, 0.8).normalize().multiplyScalar(distance));
@@ -144,19 +140,23 @@ export async function show(box, file, taken) {
         watcher.disconnect();
         cancelAnimationFrame(asked);
         controls.dispose();
-        mesh.dispose();
+        for (const mesh of group.children) mesh.dispose();
         renderer.dispose();
         box.replaceChildren();
     };
 }
 
 /** Where most of a scene is: a few Gaussians far out are left out, as captures have them. */
-function extent(mesh, Vector3, Box3) {
+function extent(group, Vector3, Box3) {
     const points = [];
-    const every = Math.max(1, Math.floor(mesh.packedSplats.numSplats / 20_000));
-    mesh.packedSplats.forEachSplat((index, center) => {
-        if (index % every === 0) points.push(center.clone());
-    });
+    const count = group.children.reduce((sum, mesh) => sum + mesh.packedSplats.numSplats, 0);
+    const every = Math.max(1, Math.floor(count / 20_000));
+    group.updateMatrixWorld();
+    for (const mesh of group.children) {
+        mesh.packedSplats.forEachSplat((index, center) => {
+            if (index % every === 0) points.push(center.clone().applyMatrix4(mesh.matrixWorld));
+        });
+    }
     if (points.length === 0) throw new Mistake("The scene is empty.");
     const middle = (values) => values.sort((a, b) => a - b)[values.length >> 1];
     const median = new Vector3(...["x", "y", "z"].map((axis) => middle(points.map((point) => point[axis]))));
@@ -166,6 +166,5 @@ function extent(mesh, Vector3, Box3) {
     const centre = box.getCenter(new Vector3());
     const radii = most.map((point) => point.distanceTo(centre)).sort((a, b) => a - b);
     const radius = radii[Math.floor(0.98 * (radii.length - 1))] || 1;
-    mesh.updateMatrixWorld();
-    return { centre: centre.applyMatrix4(mesh.matrixWorld), radius };
+    return { centre, radius };
 }

@@ -34,7 +34,7 @@ bundle() {
 }
 bundle api
 bundle splats
-for package in @bufbuild/protobuf @connectrpc/connect @connectrpc/connect-web @noble/hashes @sparkjsdev/spark fflate three; do
+for package in @bufbuild/protobuf @connectrpc/connect @connectrpc/connect-web @noble/hashes @sparkjsdev/spark fflate three zstddec; do
     version=$(node -p "require('./node_modules/$package/package.json').version")
     license=$(node -p "require('./node_modules/$package/package.json').license")
     echo "== $package $version ($license)"
