@@ -19,11 +19,18 @@ pub struct ShippedClip {
     whole: Option<&'static str>,
 }
 
+/// Weights by the order of [`ShippedClip::ALL`]. Statics: of a constant the program would hold a copy for each use.
+static WEIGHTS: [&[u8]; 3] = [
+    include_bytes!("../../models/guardsplat-2/model.safetensors"),
+    include_bytes!("../../models/guardsplat-short/model.safetensors"),
+    include_bytes!("../../models/guardsplat/image.safetensors"),
+];
+
 /// The newest for messages of any length.
 const NEWEST: ShippedClip = ShippedClip {
     name: "guardsplat-2",
     config: include_str!("../../models/guardsplat-2/config.json"),
-    weights: include_bytes!("../../models/guardsplat-2/model.safetensors"),
+    weights: WEIGHTS[0],
     whole: None,
 };
 
@@ -31,7 +38,7 @@ const NEWEST: ShippedClip = ShippedClip {
 const SHORT: ShippedClip = ShippedClip {
     name: "guardsplat-short",
     config: include_str!("../../models/guardsplat-short/config.json"),
-    weights: include_bytes!("../../models/guardsplat-short/model.safetensors"),
+    weights: WEIGHTS[1],
     whole: None,
 };
 
@@ -42,7 +49,7 @@ const SHORT_BITS: usize = 16;
 const FIRST: ShippedClip = ShippedClip {
     name: "guardsplat",
     config: include_str!("../../models/guardsplat/config.json"),
-    weights: include_bytes!("../../models/guardsplat/image.safetensors"),
+    weights: WEIGHTS[2],
     whole: Some("e24e926482d51d0867cb74de92595c5155954c00dcedf253004cf53148bf04c5"),
 };
 
