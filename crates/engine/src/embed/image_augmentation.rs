@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{Int, Tensor, TensorData};
 use guardsplat_distortion::{DistortionKind, Draw, Layer};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::settings::Settings;
@@ -25,6 +26,8 @@ pub(super) struct ImageAugmentation {
     layer: Layer,
     /// Side of the pictures that are distorted.
     side: usize,
+    /// Pictures of a step that are distorted; `None` for all.
+    some: Option<usize>,
 }
 
 impl ImageAugmentation {
@@ -37,7 +40,21 @@ impl ImageAugmentation {
         Self {
             layer,
             side: settings.distorted_size.max(settings.size) as usize,
+            some: settings.distorted_views,
         }
+    }
+
+    /// What is done to each of so many pictures.
+    fn draws(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<Draw> {
+        let mut draws = self.layer.draw(count, rng);
+        if let Some(some) = self.some.filter(|some| *some < count) {
+            // The views that a step has drawn anew come first: a window that begins anywhere treats all alike.
+            let first = rng.random_range(0..count);
+            draws.rotate_left(first);
+            draws[some..].fill(Draw::Clean);
+            draws.rotate_right(first);
+        }
+        draws
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]`, each as it is or distorted; differentiable.
@@ -48,7 +65,7 @@ impl ImageAugmentation {
         if self.layer.robust_to.of_pictures().next().is_none() {
             return engine.logits(pictures);
         }
-        let draws = self.layer.draw(pictures.dims()[0], rng);
+        let draws = self.draws(pictures.dims()[0], rng);
         // One kind after the other, so that no picture is put into another order while it is large.
         let mut alike: BTreeMap<Option<DistortionKind>, Vec<usize>> = BTreeMap::new();
         for (position, draw) in draws.iter().enumerate() {
@@ -172,11 +189,32 @@ mod tests {
     }
 
     #[test]
+    fn no_more_views_are_distorted_than_the_settings_say_and_all_have_their_turn() {
+        let settings = Settings {
+            robust_to: "jpeg,noise".parse().unwrap(),
+            distorted_views: Some(2),
+            ..Preset::Standard.settings()
+        };
+        let shown = ImageAugmentation::new(&settings, &engine());
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut times = [0; 8];
+        for _ in 0..100 {
+            let draws = shown.draws(8, &mut rng);
+            let distorted: Vec<usize> = (0..8).filter(|&i| draws[i] != Draw::Clean).collect();
+            assert!(distorted.len() <= 2, "{draws:?}");
+            distorted.iter().for_each(|&i| times[i] += 1);
+        }
+        // Two of eight views, two of three draws: a sixth of the steps.
+        assert!(times.iter().all(|&n| (5..35).contains(&n)), "{times:?}");
+    }
+
+    #[test]
     fn pictures_keep_their_order_and_those_that_nothing_is_done_to_their_bytes() {
         let engine = engine();
         let settings = Settings {
             robust_to: "jpeg,brightness".parse().unwrap(),
             distorted_size: 320,
+            distorted_views: None,
             ..Preset::Standard.settings()
         };
         let shown = ImageAugmentation::new(&settings, &engine);

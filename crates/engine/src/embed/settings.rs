@@ -162,6 +162,10 @@ pub struct Settings {
     /// Views of a step that LPIPS looks at, the next ones at every step; its time is nearly all of a step's. `None` for all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lpips_views: Option<usize>,
+    /// Views of a step that the distortions of pictures may be done to, others each step: they take most of its time.
+    /// `None` for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distorted_views: Option<usize>,
     /// The optimiser. In JSON `{"optimizer": {"adam": {..}}}` or `{"optimizer": {"preconditioned_sgd": {..}}}`; it is
     /// written as the fields `adam` and `descent`, its old names.
     #[serde(flatten)]
@@ -257,6 +261,9 @@ impl Settings {
         )?;
         if let Some(views) = self.lpips_views {
             within("lpips_views", views as f64, 1.0, self.views_per_step as f64)?;
+        }
+        if let Some(views) = self.distorted_views {
+            within("distorted_views", views as f64, 1.0, 1e6)?;
         }
         if let Some(views) = self.views {
             within("views", views as f64, self.views_per_step as f64, 1e6)?;
