@@ -9,7 +9,7 @@ use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
 use crate::scene::Gaussians;
 use crate::splat::{Changes, Geometry};
-use crate::view::{Split, ViewSampler};
+use crate::view::{Camera, Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed.
 pub(super) struct EarlyStopping {
@@ -30,20 +30,15 @@ impl EarlyStopping {
     ) -> Result<Self> {
         let first = settings.verify.views as u64;
         let size = settings.verify.size.unwrap_or_else(|| default_size(engine));
-        let indices: Vec<u64> = (first..first + stop.views as u64).collect();
-        let views = engine.each(&indices, |&index| {
-            let camera = sampler.camera(Split::HeldOut, index, size);
-            let mut view = PooledView::new(
-                engine,
-                geometry,
-                &camera,
-                stands_for(size),
-                settings.half_weights,
-                [1.0; 3],
-            )?;
+        let indices = first..first + stop.views as u64;
+        let cameras: Vec<Camera> = indices
+            .map(|index| sampler.camera(Split::HeldOut, index, size))
+            .collect();
+        let (times, half) = (stands_for(size), settings.half_weights);
+        let mut views = PooledView::of_cameras(engine, geometry, &cameras, times, half, [1.0; 3])?;
+        for view in &mut views {
             view.reference = view.reference.to_8_bit();
-            Ok(view)
-        })?;
+        }
         Ok(Self { stop, views, passed: 0 })
     }
 
@@ -62,8 +57,8 @@ impl EarlyStopping {
         step: usize,
     ) -> Result<(Check, bool)> {
         let colours = PooledView::colours(&self.views, &gaussians.sh, Some(changes));
-        let drawn: Vec<(&PooledView, Vec<f32>)> = self.views.iter().zip(colours).collect();
-        let pictures: Vec<Picture> = engine.each(&drawn, |(v, colours)| Ok(v.draw(engine, colours)?.to_8_bit()))?;
+        let pictures = PooledView::draw_all(engine, &self.views, &colours)?;
+        let pictures: Vec<Picture> = pictures.iter().map(Picture::to_8_bit).collect();
         let psnrs = self
             .views
             .iter()

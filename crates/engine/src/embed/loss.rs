@@ -16,6 +16,7 @@ use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
 use crate::quality::{Likeness, LikenessWeights, Ssim, batch, likeness_with_gradient, unbatch};
+use crate::splat::{Drawing, GpuRasterizer, PreparedView};
 
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {
@@ -30,10 +31,30 @@ pub(super) struct Loss<'a> {
 pub(super) struct Evaluated {
     /// Its terms; the offset penalty is added elsewhere.
     pub terms: LossTerms,
-    /// Gradient to each picture, laid out as its pixels.
-    pub gradients: Vec<Picture>,
     /// Share of right bits in the augmented views.
     pub bit_accuracy: f64,
+    /// Mean PSNR of clamped pictures, dB; infinite where all are identical.
+    pub psnr_db: f64,
+}
+
+/// What is computed of a batch as a graph.
+struct Graph {
+    total: Tensor<1>,
+    /// L1 and 1 - SSIM, where they are part of the graph.
+    likeness: Option<[Tensor<1>; 2]>,
+    lpips: Option<Tensor<1>>,
+    message: Tensor<1>,
+    logits: Tensor<2>,
+}
+
+impl Graph {
+    /// All numbers but `total`, for one transfer: the likeness first, the logits last.
+    fn numbers(&self) -> Tensor<1> {
+        let terms = self.likeness.iter().flatten().chain(&self.lpips).chain([&self.message]);
+        let mut numbers: Vec<Tensor<1>> = terms.cloned().collect();
+        numbers.push(self.logits.clone().flatten(0, 1));
+        Tensor::cat(numbers, 0).inner()
+    }
 }
 
 impl<'a> Loss<'a> {
@@ -53,7 +74,7 @@ impl<'a> Loss<'a> {
         self.settings.lambda.temperature = temperature;
     }
 
-    /// Loss and gradient of `pictures` against `references`, with terms multiplied by `factors`.
+    /// Loss of `pictures` against `references`, with terms multiplied by `factors`, and its gradient to each picture.
     ///
     /// # Errors
     /// [`Error::NotFinite`] with the term, or a failing device.
@@ -64,62 +85,153 @@ impl<'a> Loss<'a> {
         references: &[&Picture],
         factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
-    ) -> Result<Evaluated> {
+    ) -> Result<(Evaluated, Vec<Picture>)> {
         let device = &self.engine.compute.device;
         let lambda = &self.settings.lambda;
         let weight = lambda.reconstruction * factors.reconstruction;
-        let views = pictures.len();
         let leaf = batch(pictures, &device.clone().autodiff())?.require_grad();
-        // What a file can hold; beyond it nothing is seen, so there is no gradient either.
-        let marked = leaf.clone().clamp(0.0, 1.0);
-        let original = || Ok::<_, Error>(Tensor::from_inner(batch(references, device)?.clamp(0.0, 1.0)));
+        let weights = LikenessWeights {
+            l1: weight * lambda.l1,
+            l2: weight * lambda.l2,
+            ssim: -weight * lambda.ssim * factors.ssim,
+        };
+        let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
+        let (likeness, likeness_gradients) = likeness_with_gradient(&pairs, weights);
+        let original = || batch(references, device);
+        let graph = self.graph(step, leaf.clone(), original, false, factors, rng)?;
+        let numbers = self.engine.to_host(graph.numbers())?;
+        let evaluated = self.evaluated(
+            step,
+            &numbers,
+            Some(mean_terms(&likeness)),
+            mean_psnr(references, pictures),
+        )?;
 
+        let gradient = self.gradient(&graph.total, &leaf)?;
+        let mut gradients = unbatch(gradient)?;
+        gradients
+            .par_iter_mut()
+            .zip(&likeness_gradients)
+            .for_each(|(gradient, likeness)| {
+                let both = gradient.pixels.iter_mut().zip(likeness);
+                both.for_each(|(sum, term)| *sum += term);
+            });
+        let of_view = |gradient: &Picture| gradient.pixels.iter().map(|g| g.abs()).sum::<f32>();
+        let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
+        finite(step, "gradient", sums.iter().sum())?;
+        Ok((evaluated, gradients))
+    }
+
+    /// [`Loss::evaluate`] of pictures that are drawn on the device and stay there; the gradients are those to the colours.
+    /// The host waits once.
+    ///
+    /// # Errors
+    /// Those of [`Loss::evaluate`] and of the renderer.
+    pub fn evaluate_on_device(
+        &self,
+        step: usize,
+        rasterizer: &GpuRasterizer,
+        drawings: &[Drawing<'_>],
+        references: &[&Picture],
+        factors: LossWeightFactors,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(Evaluated, Vec<Vec<f32>>)> {
+        let views = drawings.len();
+        let pictures = rasterizer.draw(drawings)?;
+        let original = batch(references, &self.engine.compute.device)?;
+        let difference = original.clone().clamp(0.0, 1.0) - pictures.clone().clamp(0.0, 1.0);
+        let [_, channels, height, width] = difference.dims();
+        let squares = difference.square().reshape([views, channels * height * width]);
+        let mse = squares.mean_dim(1).flatten(0, 1);
+        let leaf = Tensor::from_inner(pictures).require_grad();
+        let graph = self.graph(step, leaf.clone(), || Ok(original), true, factors, rng)?;
+        let gradient = self.gradient(&graph.total, &leaf)?;
+        let prepared: Vec<&PreparedView> = drawings.iter().map(|drawing| drawing.view).collect();
+        let numbers = Tensor::cat(vec![mse, graph.numbers()], 0);
+        let (gradients, numbers) = rasterizer.draw_backward(&prepared, gradient, numbers)?;
+
+        let psnrs = numbers[..views].iter().map(|mse| -10.0 * f64::from(*mse).log10());
+        let evaluated = self.evaluated(step, &numbers[views..], None, psnrs.sum::<f64>() / views as f64)?;
+        let of_view = |gradient: &Vec<f32>| gradient.iter().map(|g| g.abs()).sum::<f32>();
+        let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
+        finite(step, "gradient", sums.iter().sum())?;
+        Ok((evaluated, gradients))
+    }
+
+    /// The loss of `pictures` as a graph, with L1, L2 and SSIM if `with_likeness`. `original` is asked for where something is
+    /// compared with it.
+    fn graph(
+        &self,
+        step: usize,
+        pictures: Tensor<4>,
+        original: impl FnOnce() -> Result<Tensor<4>>,
+        with_likeness: bool,
+        factors: LossWeightFactors,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Graph> {
+        let lambda = &self.settings.lambda;
+        let weight = lambda.reconstruction * factors.reconstruction;
+        let views = pictures.dims()[0];
+        // What a file can hold; beyond it nothing is seen, so there is no gradient either.
+        let marked = pictures.clamp(0.0, 1.0);
+        let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
+        let original = match with_likeness || lpips.is_some() {
+            true => Some(Tensor::from_inner(original()?.clamp(0.0, 1.0))),
+            false => None,
+        };
+        let mut likeness = None;
+        let mut distance = None;
         let mut total = Vec::new();
-        let mut parts = Vec::new();
-        let by_hand = if self.engine.on_cpu() {
-            let weights = LikenessWeights {
-                l1: weight * lambda.l1,
-                l2: weight * lambda.l2,
-                ssim: -weight * lambda.ssim * factors.ssim,
-            };
-            let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
-            Some(likeness_with_gradient(&pairs, weights))
-        } else {
-            let original = original()?;
+        if let Some(original) = original.clone().filter(|_| with_likeness) {
             let difference = marked.clone() - original.clone();
             let l1 = difference.clone().abs().mean();
             let l2 = difference.square().mean();
             let ssim = -self.ssim.mean(original, marked.clone()) + 1.0;
             let terms = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * (lambda.ssim * factors.ssim);
             total.push(terms * weight);
-            parts.extend([l1, ssim]);
-            None
-        };
-        let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
-        if let Some(lpips) = lpips {
-            let (original, marked) = (self.some(step, original()?), self.some(step, marked.clone()));
-            let distance = lpips.per_view(original, marked)?.mean();
-            total.push(distance.clone() * (lambda.lpips * weight));
-            parts.push(distance);
+            likeness = Some([l1, ssim]);
+        }
+        if let Some((lpips, original)) = lpips.zip(original) {
+            let (original, marked) = (self.some(step, original), self.some(step, marked.clone()));
+            let of_views = lpips.per_view(original, marked)?.mean();
+            total.push(of_views.clone() * (lambda.lpips * weight));
+            distance = Some(of_views);
         }
         let seen = self.settings.augmentation.apply(marked, rng);
         let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
-        let targets = Tensor::<2>::from_data(targets, device);
+        let targets = Tensor::<2>::from_data(targets, &self.engine.compute.device);
         let softened = logits.clone() / lambda.temperature;
         let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
-        parts.push(message.clone());
-        let total = total.into_iter().fold(message * lambda.message, |sum, term| sum + term);
+        let start = message.clone() * lambda.message;
+        Ok(Graph {
+            total: total.into_iter().fold(start, |sum, term| sum + term),
+            likeness,
+            lpips: distance,
+            message,
+            logits,
+        })
+    }
 
-        // One transfer for all terms.
-        let mut values = self.engine.to_host(Tensor::cat(parts, 0).inner())?;
-        let message = values.pop().unwrap_or(f32::NAN);
-        let lpips = lpips.and_then(|_| values.pop());
-        let [l1, ssim] = match &by_hand {
-            Some((views, _)) => mean_terms(views),
-            None => [values[0], values[1]],
-        };
+    /// The gradient to the pictures, which are the graph's leaf.
+    fn gradient(&self, total: &Tensor<1>, leaf: &Tensor<4>) -> Result<Tensor<4>> {
+        let gradients = total.clone().backward();
+        leaf.grad(&gradients).ok_or_else(|| Error::Device {
+            device: self.engine.compute.name.clone(),
+            reason: "the loss has no gradient to the pictures".into(),
+        })
+    }
+
+    /// What [`Graph::numbers`] say; `likeness` is L1 and 1 - SSIM where the graph has them not.
+    fn evaluated(&self, step: usize, numbers: &[f32], likeness: Option<[f32; 2]>, psnr_db: f64) -> Result<Evaluated> {
+        let bits = self.targets.len();
+        let mut numbers = numbers.iter().copied();
+        let mut next = || numbers.next().unwrap_or(f32::NAN);
+        let [l1, ssim] = likeness.unwrap_or_else(|| [next(), next()]);
+        let lpips = self.settings.lambda.lpips > 0.0 && self.engine.has_lpips();
+        let lpips = lpips.then(&mut next);
+        let message = next();
         let terms = LossTerms {
             l1,
             ssim,
@@ -128,32 +240,17 @@ impl<'a> Loss<'a> {
             offset: 0.0,
         };
         check_finite(step, &terms)?;
-
-        let gradients = total.backward();
-        let gradient = leaf.grad(&gradients).ok_or_else(|| Error::Device {
-            device: self.engine.compute.name.clone(),
-            reason: "the loss has no gradient to the pictures".into(),
-        })?;
-        let mut gradients = unbatch(gradient)?;
-        if let Some((_, likeness)) = by_hand {
-            gradients.par_iter_mut().zip(likeness).for_each(|(gradient, likeness)| {
-                let both = gradient.pixels.iter_mut().zip(likeness);
-                both.for_each(|(sum, term)| *sum += term);
-            });
-        }
-        let of_view = |gradient: &Picture| gradient.pixels.iter().map(|g| g.abs()).sum::<f32>();
-        let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
-        finite(step, "gradient", sums.iter().sum())?;
-        let logits = self.engine.to_host(logits.inner())?;
+        let logits: Vec<f32> = numbers.collect();
         let right = logits
             .iter()
             .zip(self.targets.iter().cycle())
             .filter(|(logit, target)| (**logit > 0.0) == (**target > 0.5))
             .count();
+        debug_assert!(logits.len().is_multiple_of(bits));
         Ok(Evaluated {
             terms,
-            gradients,
             bit_accuracy: right as f64 / logits.len() as f64,
+            psnr_db,
         })
     }
 
@@ -173,6 +270,20 @@ impl<'a> Loss<'a> {
 fn mean_terms(views: &[Likeness]) -> [f32; 2] {
     let mean = |of: fn(&Likeness) -> f64| views.iter().map(of).sum::<f64>() / views.len() as f64;
     [mean(|view| view.l1) as f32, (1.0 - mean(|view| view.ssim)) as f32]
+}
+
+/// Mean PSNR of clamped pictures, infinite where all are identical.
+fn mean_psnr(references: &[&Picture], pictures: &[&Picture]) -> f64 {
+    let of = |(a, b): (&&Picture, &&Picture)| {
+        let squares = a.pixels.iter().zip(&b.pixels).map(|(a, b)| {
+            let difference = a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0);
+            f64::from(difference * difference)
+        });
+        let mse = squares.sum::<f64>() / a.pixels.len() as f64;
+        -10.0 * mse.log10()
+    };
+    let views: Vec<f64> = references.par_iter().zip(pictures).map(of).collect();
+    views.iter().sum::<f64>() / pictures.len() as f64
 }
 
 fn check_finite(step: usize, terms: &LossTerms) -> Result<()> {

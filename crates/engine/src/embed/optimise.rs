@@ -1,9 +1,10 @@
 //! The loop: offsets on the colours of frozen Gaussians, until the message is read from views never used.
+use std::panic::resume_unwind;
 use std::sync::Arc;
+use std::thread;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::adam::{Adam, Penalty};
 use super::early_stopping::EarlyStopping;
@@ -21,7 +22,7 @@ use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
-use crate::splat::{Geometry, Learnable, sh};
+use crate::splat::{Drawing, Geometry, Learnable, PreparedView, sh};
 use crate::view::{Camera, ViewSampler};
 
 /// Steps between two reports of the timing.
@@ -120,7 +121,7 @@ enum OptimizerState {
 struct Run<'a> {
     engine: &'a Engine,
     scene: &'a Scene,
-    geometry: Geometry<'a>,
+    geometry: Arc<Geometry<'a>>,
     settings: &'a Settings,
     /// Most steps, by the settings or as they were extended.
     steps: usize,
@@ -165,7 +166,7 @@ impl<'a> Run<'a> {
         let run = Self {
             engine,
             scene,
-            geometry,
+            geometry: Arc::new(geometry),
             settings,
             steps: settings.steps,
             extension: settings.extension,
@@ -184,7 +185,20 @@ impl<'a> Run<'a> {
     fn step(&mut self, step: usize, timing: &mut StepTimer) -> Result<Step> {
         let views = self.pool.batch(self.engine, &self.geometry)?;
         timing.lap(Stage::Prepare);
-        let mut figures = self.differentiate(step, &views, timing)?;
+        let mut figures = if step < self.steps {
+            // What the next step is to draw does not depend on this one.
+            let (engine, geometry, upcoming) = (self.engine, self.geometry.clone(), self.pool.upcoming());
+            let (figures, prepared) = thread::scope(|scope| {
+                let prepared = scope.spawn(|| upcoming.prepare(engine, &geometry));
+                let figures = self.differentiate(step, &views, timing);
+                (figures, prepared.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            });
+            timing.lap(Stage::Prepare);
+            self.pool.prepared(prepared?);
+            figures?
+        } else {
+            self.differentiate(step, &views, timing)?
+        };
 
         let lambda = &self.settings.lambda;
         let penalty = Penalty {
@@ -217,21 +231,29 @@ impl<'a> Run<'a> {
         let changes = self.learned.changes();
         let colours = PooledView::colours(views, &scene.sh, Some(changes));
         timing.lap(Stage::Colours);
-        let drawn: Vec<(&PooledView, &Vec<f32>)> = views.iter().map(AsRef::as_ref).zip(&colours).collect();
-        let pictures = engine.each(&drawn, |(v, colours)| v.draw(engine, colours))?;
-        timing.lap(Stage::Render);
-
         let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
-        let pictures: Vec<&Picture> = pictures.iter().collect();
         let factors = self.controller.factors();
         let rng = &mut self.augmentation;
-        let found = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
-        let psnr_db = mean_psnr(&references, &pictures);
-        timing.lap(Stage::Loss);
-
-        let drawn: Vec<(&PooledView, &Picture)> = views.iter().map(AsRef::as_ref).zip(&found.gradients).collect();
-        let gradients = engine.each(&drawn, |(v, gradient)| v.backward(engine, gradient))?;
-        timing.lap(Stage::Backward);
+        let (found, gradients) = match engine.rasterizer()?.on_device() {
+            Some(rasterizer) => {
+                let drawings: Vec<Drawing<'_>> = views.iter().zip(&colours).map(|(v, c)| v.drawing(c)).collect();
+                let (loss, drawings) = (&self.loss, &drawings);
+                let found = loss.evaluate_on_device(step, rasterizer, drawings, &references, factors, rng)?;
+                timing.lap(Stage::Loss);
+                found
+            }
+            None => {
+                let pictures = PooledView::draw_all(engine, views, &colours)?;
+                timing.lap(Stage::Render);
+                let pictures: Vec<&Picture> = pictures.iter().collect();
+                let (found, gradients) = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
+                timing.lap(Stage::Loss);
+                let prepared: Vec<&PreparedView> = views.iter().map(|v| &v.view).collect();
+                let gradients = engine.rasterizer()?.backward_all(&prepared, &gradients)?;
+                timing.lap(Stage::Backward);
+                (found, gradients)
+            }
+        };
         let of_views = views.iter().zip(&colours).zip(&gradients);
         let of_views: Vec<sh::ColourGradient<'_>> = of_views
             .map(|((v, colours), gradient)| sh::ColourGradient {
@@ -246,7 +268,7 @@ impl<'a> Run<'a> {
             step,
             total: self.steps,
             bit_accuracy: found.bit_accuracy,
-            psnr_db,
+            psnr_db: found.psnr_db,
             terms: found.terms,
             balance: factors.reconstruction,
         })
@@ -275,20 +297,6 @@ impl<'a> Run<'a> {
         let turn = std::f32::consts::PI * (step - 1) as f32 / self.steps as f32;
         last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
     }
-}
-
-/// Mean PSNR of clamped pictures, infinite where all are identical.
-fn mean_psnr(references: &[&Picture], pictures: &[&Picture]) -> f64 {
-    let of = |(a, b): (&&Picture, &&Picture)| {
-        let squares = a.pixels.iter().zip(&b.pixels).map(|(a, b)| {
-            let difference = a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0);
-            f64::from(difference * difference)
-        });
-        let mse = squares.sum::<f64>() / a.pixels.len() as f64;
-        -10.0 * mse.log10()
-    };
-    let views: Vec<f64> = references.par_iter().zip(pictures).map(of).collect();
-    views.iter().sum::<f64>() / pictures.len() as f64
 }
 
 #[cfg(test)]

@@ -35,17 +35,10 @@ pub fn measure_view(
     cameras: &[Camera],
 ) -> Result<ViewSize> {
     let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
-    let camera = sampler.camera(Split::Training, 0, settings.size);
-    let view = PooledView::new(
-        engine,
-        &Geometry::new(gaussians),
-        &camera,
-        1.0,
-        settings.half_weights,
-        [1.0; 3],
-    )?
-    .view;
-    Ok(view_size(&view))
+    let cameras = [sampler.camera(Split::Training, 0, settings.size)];
+    let (geometry, half) = (Geometry::new(gaussians), settings.half_weights);
+    let views = PooledView::of_cameras(engine, &geometry, &cameras, 1.0, half, [1.0; 3])?;
+    Ok(view_size(&views[0].view))
 }
 
 /// Measures the same view as the CPU keeps it, without an engine.

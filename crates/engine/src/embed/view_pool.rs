@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::scene_augmentation::SceneAugmentation;
 use super::settings::Settings;
@@ -17,7 +18,7 @@ use crate::extract::Engine;
 use crate::picture::Picture;
 use crate::quality::cover::{COVERED, share};
 use crate::scene::Sh;
-use crate::splat::{Changes, Geometry, PreparedView, sh};
+use crate::splat::{Changes, Drawing, Geometry, PreparedView, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
@@ -36,27 +37,43 @@ pub(super) struct PooledView {
 }
 
 impl PooledView {
-    /// `camera` has the size of the picture, which stands for one `times` as large, averaged down; `half` keeps what is
-    /// drawn with in half precision.
-    pub fn new(
+    /// The views of `cameras`, each of which has the size of the picture and stands for one `times` as large, averaged down;
+    /// `half` keeps what is drawn with in half precision.
+    ///
+    /// # Errors
+    /// Those of [`Geometry::prepare`] and of the renderer; [`Error::Stopped`](crate::Error::Stopped).
+    pub fn of_cameras(
         engine: &Engine,
         geometry: &Geometry<'_>,
-        camera: &Camera,
+        cameras: &[Camera],
         times: f32,
         half: bool,
         background: [f32; 3],
-    ) -> Result<Self> {
+    ) -> Result<Vec<Self>> {
         let how = TrainingView {
             times,
             half,
             background,
             augmentation: SceneAugmentation::None,
         };
-        Self::altered(engine, geometry, camera, how)
+        let prepare = |camera| Self::prepared(engine, geometry, camera, &how);
+        let views = cameras.par_iter().map(prepare).collect::<Result<_>>()?;
+        Self::with_references(engine, geometry, views)
     }
 
-    /// As [`PooledView::new`], of a scene to which something happened.
-    fn altered(engine: &Engine, geometry: &Geometry<'_>, camera: &Camera, how: TrainingView) -> Result<Self> {
+    /// Draws what views look like unmarked.
+    fn with_references(engine: &Engine, geometry: &Geometry<'_>, mut views: Vec<Self>) -> Result<Vec<Self>> {
+        let colours = Self::colours(&views, geometry.sh(), None);
+        let references = Self::draw_all(engine, &views, &colours)?;
+        for (view, reference) in views.iter_mut().zip(references) {
+            view.reference = reference;
+        }
+        Ok(views)
+    }
+
+    /// A view without its unmarked picture, of a scene to which something happened.
+    fn prepared(engine: &Engine, geometry: &Geometry<'_>, camera: &Camera, how: &TrainingView) -> Result<Self> {
+        engine.stop.check()?;
         let pruned = how.augmentation.pruned(geometry);
         let shown = pruned.as_ref().unwrap_or(geometry);
         let cache = engine.weight_cache(camera.width, how.half);
@@ -65,20 +82,16 @@ impl PooledView {
             view.degree = view.degree.min(degree);
         }
         let noise = how.augmentation.noise(&view, geometry.sh().degree);
-        let empty = Picture {
-            width: 0,
-            height: 0,
-            pixels: Vec::new(),
-        };
-        let mut pooled = Self {
+        Ok(Self {
             view,
             background: how.background,
             noise,
-            reference: empty,
-        };
-        let colours = Self::colours(&[&pooled], geometry.sh(), None);
-        pooled.reference = pooled.draw(engine, &colours[0])?;
-        Ok(pooled)
+            reference: Picture {
+                width: 0,
+                height: 0,
+                pixels: Vec::new(),
+            },
+        })
     }
 
     /// Colours of the visible Gaussians of each view, with changes to the scene's.
@@ -93,24 +106,47 @@ impl PooledView {
         all
     }
 
-    /// The picture with these colours of the visible Gaussians.
-    pub fn draw(&self, engine: &Engine, colours: &[f32]) -> Result<Picture> {
-        engine.rasterizer()?.render(&self.view, colours, self.background)
+    /// What there is to draw with these colours of the visible Gaussians.
+    pub fn drawing<'a>(&'a self, colours: &'a [f32]) -> Drawing<'a> {
+        Drawing {
+            view: &self.view,
+            colours,
+            background: self.background,
+        }
     }
 
-    /// Takes a gradient to the picture back to these colours.
-    pub fn backward(&self, engine: &Engine, gradient: &Picture) -> Result<Vec<f32>> {
-        engine.rasterizer()?.backward(&self.view, &gradient.pixels)
+    /// The pictures of views with these colours.
+    ///
+    /// # Errors
+    /// Those of the renderer; [`Error::Stopped`](crate::Error::Stopped).
+    pub fn draw_all<V: Borrow<Self>>(engine: &Engine, views: &[V], colours: &[Vec<f32>]) -> Result<Vec<Picture>> {
+        engine.stop.check()?;
+        let pairs = views.iter().zip(colours);
+        let drawings: Vec<Drawing<'_>> = pairs.map(|(view, colours)| view.borrow().drawing(colours)).collect();
+        engine.rasterizer()?.render_all(&drawings)
     }
 
-    /// Of each visible Gaussian three times the sum over pixels of its weight times the cover of the pixel; and the share
-    /// of pixels that are covered.
-    fn energies(&self, engine: &Engine) -> Result<(Vec<f32>, f64)> {
+    /// Of each visible Gaussian of each view three times the sum over pixels of its weight times the cover of the pixel; and
+    /// the share of pixels that are covered.
+    fn energies<V: Borrow<Self>>(engine: &Engine, views: &[V]) -> Result<Vec<(Vec<f32>, f64)>> {
         let rasterizer = engine.rasterizer()?;
-        let ones = vec![1.0; 3 * self.view.visible.len()];
-        let cover = rasterizer.render(&self.view, &ones, [0.0; 3])?;
-        let mask: Vec<bool> = cover.pixels.chunks_exact(3).map(|p| p[0] >= COVERED).collect();
-        Ok((rasterizer.backward(&self.view, &cover.pixels)?, share(&mask)))
+        let views: Vec<&PreparedView> = views.iter().map(|view| &view.borrow().view).collect();
+        let ones: Vec<Vec<f32>> = views.iter().map(|view| vec![1.0; 3 * view.visible.len()]).collect();
+        let pairs = views.iter().zip(&ones);
+        let drawings: Vec<Drawing<'_>> = pairs
+            .map(|(view, colours)| Drawing {
+                view,
+                colours,
+                background: [0.0; 3],
+            })
+            .collect();
+        let covers = rasterizer.render_all(&drawings)?;
+        let share = |cover: &Picture| {
+            let mask: Vec<bool> = cover.pixels.chunks_exact(3).map(|p| p[0] >= COVERED).collect();
+            share(&mask)
+        };
+        let energies = rasterizer.backward_all(&views, &covers)?;
+        Ok(energies.into_iter().zip(covers.iter().map(share)).collect())
     }
 
     fn bytes(&self) -> usize {
@@ -119,6 +155,7 @@ impl PooledView {
 }
 
 /// How a training view is rendered and augmented.
+#[derive(Clone, Copy)]
 struct TrainingView {
     times: f32,
     half: bool,
@@ -126,13 +163,65 @@ struct TrainingView {
     augmentation: SceneAugmentation,
 }
 
-/// Training views, kept within a number and a budget of bytes.
-pub(super) struct ViewPool {
+/// Makes training views: each follows from its number alone.
+struct ViewMaker {
     sampler: ViewSampler,
     settings: Settings,
+}
+
+/// Training views, kept within a number and a budget of bytes.
+pub(super) struct ViewPool {
+    maker: Arc<ViewMaker>,
+    settings: Settings,
     next: u64,
+    /// The next views, where they were prepared before their step.
+    ahead: Vec<PooledView>,
     kept: VecDeque<Arc<PooledView>>,
     picks: ChaCha8Rng,
+}
+
+/// The views of the next step, to be prepared while the one before is computed.
+pub(super) struct Upcoming {
+    maker: Arc<ViewMaker>,
+    numbers: Vec<u64>,
+}
+
+impl ViewMaker {
+    /// Views by their numbers, without their unmarked pictures, side by side.
+    fn prepare(&self, engine: &Engine, geometry: &Geometry<'_>, numbers: &[u64]) -> Result<Vec<PooledView>> {
+        let prepare = |&number: &u64| {
+            let camera = self.sampler.camera(Split::Training, number, self.settings.size);
+            let how = self.chosen(number, geometry.sh().degree);
+            PooledView::prepared(engine, geometry, &camera, &how)
+        };
+        numbers.par_iter().map(prepare).collect()
+    }
+
+    /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
+    /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand.
+    fn chosen(&self, index: u64, degree: usize) -> TrainingView {
+        let s = &self.settings;
+        let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(1));
+        rng.set_stream(index);
+        let black = rng.random::<f32>() < s.black_backgrounds;
+        let times = 1.0 + (s.enlarged - 1.0) * rng.random::<f32>();
+        TrainingView {
+            times,
+            half: s.half_weights,
+            background: if black { [0.0; 3] } else { [1.0; 3] },
+            augmentation: SceneAugmentation::draw(s.robust_to, degree, s.seed, index),
+        }
+    }
+}
+
+impl Upcoming {
+    /// Prepares them; [`ViewPool::prepared`] takes them.
+    ///
+    /// # Errors
+    /// Those of [`Geometry::prepare`]; [`Error::Stopped`](crate::Error::Stopped).
+    pub fn prepare(&self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Vec<PooledView>> {
+        self.maker.prepare(engine, geometry, &self.numbers)
+    }
 }
 
 /// Which Gaussians training views show.
@@ -161,9 +250,13 @@ impl ViewPool {
         let mut picks = ChaCha8Rng::seed_from_u64(settings.seed);
         picks.set_stream(u64::MAX);
         Self {
-            sampler,
+            maker: Arc::new(ViewMaker {
+                sampler,
+                settings: *settings,
+            }),
             settings: *settings,
             next: 0,
+            ahead: Vec::new(),
             kept: VecDeque::new(),
             picks,
         }
@@ -184,7 +277,7 @@ impl ViewPool {
                 *seen = true;
             }
             count += new;
-            for (view, (energy, share)) in made.iter().zip(engine.each(&made, |view| view.energies(engine))?) {
+            for (view, (energy, share)) in made.iter().zip(PooledView::energies(engine, &made)?) {
                 covered += share;
                 for (row, energy) in view.view.visible.iter().zip(energy.chunks_exact(3)) {
                     energies[*row as usize] += energy[0];
@@ -204,14 +297,32 @@ impl ViewPool {
         }
     }
 
-    /// The views of the next step. There are more fresh ones than the settings say while the pool does not hold enough
-    /// others, and none once there were as many as the settings allow.
-    pub fn batch(&mut self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Vec<Arc<PooledView>>> {
+    /// How many views of the next step are fresh: more than the settings say while the pool does not hold enough others, and
+    /// none once there were as many as the settings allow.
+    fn fresh(&self) -> usize {
         let s = &self.settings;
         let enough = s.views.is_some_and(|views| self.kept.len() >= views);
         let wanted = if enough { 0 } else { s.fresh_per_step };
-        let old = (s.views_per_step - wanted).min(self.kept.len());
-        let fresh = s.views_per_step - old;
+        s.views_per_step - (s.views_per_step - wanted).min(self.kept.len())
+    }
+
+    /// What can be prepared of the step after the one whose views were last taken.
+    pub fn upcoming(&self) -> Upcoming {
+        Upcoming {
+            maker: self.maker.clone(),
+            numbers: self.numbers(self.fresh()),
+        }
+    }
+
+    /// Takes the views that [`ViewPool::upcoming`] told of.
+    pub fn prepared(&mut self, views: Vec<PooledView>) {
+        self.ahead = views;
+    }
+
+    /// The views of the next step.
+    pub fn batch(&mut self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Vec<Arc<PooledView>>> {
+        let fresh = self.fresh();
+        let old = self.settings.views_per_step - fresh;
         let made = self.make(engine, geometry, fresh)?;
         let mut batch = made.clone();
         // A partial shuffle of the numbers of the kept views: all are distinct.
@@ -225,17 +336,22 @@ impl ViewPool {
         Ok(batch)
     }
 
-    /// The next views; beyond the number that the settings allow it begins again with those that did not fit in memory.
-    fn make(&mut self, engine: &Engine, geometry: &Geometry<'_>, count: usize) -> Result<Vec<Arc<PooledView>>> {
+    /// Numbers of the next views; beyond the number that the settings allow they begin again with those that did not fit in
+    /// memory.
+    fn numbers(&self, count: usize) -> Vec<u64> {
         let all = self.settings.views.map_or(u64::MAX, |views| views as u64);
-        let wanted: Vec<u64> = (self.next..self.next + count as u64).map(|i| i % all).collect();
-        let made = engine.each(&wanted, |&index| {
-            let camera = self.sampler.camera(Split::Training, index, self.settings.size);
-            let how = self.chosen(index, geometry.sh().degree);
-            Ok(Arc::new(PooledView::altered(engine, geometry, &camera, how)?))
-        })?;
+        (self.next..self.next + count as u64).map(|i| i % all).collect()
+    }
+
+    /// The next views, drawn.
+    fn make(&mut self, engine: &Engine, geometry: &Geometry<'_>, count: usize) -> Result<Vec<Arc<PooledView>>> {
+        let mut views = std::mem::take(&mut self.ahead);
+        if views.len() != count {
+            views = self.maker.prepare(engine, geometry, &self.numbers(count))?;
+        }
         self.next += count as u64;
-        Ok(made)
+        let views = PooledView::with_references(engine, geometry, views)?;
+        Ok(views.into_iter().map(Arc::new).collect())
     }
 
     /// Keeps views, and lets the oldest go that are too many or too large.
@@ -249,22 +365,6 @@ impl ViewPool {
                 break;
             };
             bytes -= oldest.bytes();
-        }
-    }
-
-    /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
-    /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand.
-    fn chosen(&self, index: u64, degree: usize) -> TrainingView {
-        let s = &self.settings;
-        let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(1));
-        rng.set_stream(index);
-        let black = rng.random::<f32>() < s.black_backgrounds;
-        let times = 1.0 + (s.enlarged - 1.0) * rng.random::<f32>();
-        TrainingView {
-            times,
-            half: s.half_weights,
-            background: if black { [0.0; 3] } else { [1.0; 3] },
-            augmentation: SceneAugmentation::draw(s.robust_to, degree, s.seed, index),
         }
     }
 }

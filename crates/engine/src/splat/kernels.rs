@@ -2,6 +2,7 @@
 //!
 //! One cube of 16 x 16 units a tile, one unit a pixel. They use nothing that lavapipe lacks: no subgroup operations, no
 //! float atomics, under 24 KiB of shared memory. Every sum has a fixed order, so results repeat to the byte.
+//! Views of a batch share a buffer of pictures and one of gradients to them, in which a view begins at `first_pixel`.
 // The launch functions that the macro makes carry no documentation.
 #![allow(missing_docs)]
 use cubecl::prelude::*;
@@ -31,14 +32,15 @@ fn alpha_at(dx: f32, dy: f32, inverse_x: f32, slope: f32, inverse_y: f32, opacit
     min(opacity * f32::exp(max(power, -80.0f32)), ALPHA_MAX)
 }
 
-/// Draws a tile: `picture` (`[height][width][3]`) from the tile's list, front to back.
+/// Draws a tile: `pictures` (`[views][3][height][width]`) from the tile's list, front to back.
 #[cube(launch)]
 pub fn composite(
     splats: &[f32],
     start: &[u32],
     list: &[u32],
     colours: &[f32],
-    picture: &mut [f32],
+    pictures: &mut [f32],
+    first_pixel: u32,
     width: u32,
     height: u32,
     red: f32,
@@ -112,14 +114,16 @@ pub fn composite(
         base += PIXELS;
     }
     if inside {
-        let out = ((y * width + x) * 3) as usize;
-        picture[out] = r + transmittance * red;
-        picture[out + 1] = g + transmittance * green;
-        picture[out + 2] = b + transmittance * blue;
+        let area = (width * height) as usize;
+        let out = (first_pixel + y * width + x) as usize;
+        pictures[out] = r + transmittance * red;
+        pictures[out + area] = g + transmittance * green;
+        pictures[out + 2 * area] = b + transmittance * blue;
     }
 }
 
-/// Gradient of a tile to the colours of its splats: `slots` (`[pairs][3]`) gets `sum_pixels weight * gradient`.
+/// Gradient of a tile to the colours of its splats: `slots` (`[pairs][3]`) gets `sum_pixels weight * gradient`, of
+/// gradients to pictures `[views][3][height][width]`.
 ///
 /// The units recompute their weights front to back for [`BATCH`] splats at a time and leave them in shared memory;
 /// then [`SUMMERS`] units a splat each sum 16 pixels, and one unit a splat sums those.
@@ -130,6 +134,7 @@ pub fn splat_gradients(
     list: &[u32],
     gradient: &[f32],
     slots: &mut [f32],
+    first_pixel: u32,
     width: u32,
     height: u32,
 ) {
@@ -150,9 +155,10 @@ pub fn splat_gradients(
         pixels[unit * 3 + c] = 0.0f32;
     }
     if inside {
-        let at = ((y * width + x) * 3) as usize;
+        let area = (width * height) as usize;
+        let at = (first_pixel + y * width + x) as usize;
         for c in 0..3usize {
-            pixels[unit * 3 + c] = gradient[at + c];
+            pixels[unit * 3 + c] = gradient[at + c * area];
         }
     }
     let mut open = inside;
