@@ -19,18 +19,19 @@ pub struct ShippedClip {
     whole: Option<&'static str>,
 }
 
-/// Weights by the order of [`ShippedClip::ALL`]. Statics: of a constant the program would hold a copy for each use.
-static WEIGHTS: [&[u8]; 3] = [
-    include_bytes!("../../models/guardsplat-2/model.safetensors"),
-    include_bytes!("../../models/guardsplat-short/model.safetensors"),
-    include_bytes!("../../models/guardsplat/image.safetensors"),
-];
+// Statics: of a constant the program would hold a copy for each use.
+static NEWEST_WEIGHTS: [u8; include_bytes!("../../models/guardsplat-2/model.safetensors").len()] =
+    *include_bytes!("../../models/guardsplat-2/model.safetensors");
+static SHORT_WEIGHTS: [u8; include_bytes!("../../models/guardsplat-short/model.safetensors").len()] =
+    *include_bytes!("../../models/guardsplat-short/model.safetensors");
+static FIRST_WEIGHTS: [u8; include_bytes!("../../models/guardsplat/image.safetensors").len()] =
+    *include_bytes!("../../models/guardsplat/image.safetensors");
 
 /// The newest for messages of any length.
 const NEWEST: ShippedClip = ShippedClip {
     name: "guardsplat-2",
     config: include_str!("../../models/guardsplat-2/config.json"),
-    weights: WEIGHTS[0],
+    weights: &NEWEST_WEIGHTS,
     whole: None,
 };
 
@@ -38,7 +39,7 @@ const NEWEST: ShippedClip = ShippedClip {
 const SHORT: ShippedClip = ShippedClip {
     name: "guardsplat-short",
     config: include_str!("../../models/guardsplat-short/config.json"),
-    weights: WEIGHTS[1],
+    weights: &SHORT_WEIGHTS,
     whole: None,
 };
 
@@ -49,7 +50,7 @@ const SHORT_BITS: usize = 16;
 const FIRST: ShippedClip = ShippedClip {
     name: "guardsplat",
     config: include_str!("../../models/guardsplat/config.json"),
-    weights: WEIGHTS[2],
+    weights: &FIRST_WEIGHTS,
     whole: Some("e24e926482d51d0867cb74de92595c5155954c00dcedf253004cf53148bf04c5"),
 };
 

@@ -1,8 +1,8 @@
 //! The part of the loss that is computed on pictures: reconstruction and message, and its gradient to the pictures.
 //!
 //! `reconstruction * (l1 * L1 + l2 * L2 + ssim * (1 - SSIM) + lpips * LPIPS) + message * t BCE(logits / t)`, means over the views
-//! of a step. On the CPU likeness and its gradient are computed by loops of our own, and only what reads the message, and
-//! LPIPS, is a graph.
+//! of a step. Likeness and its gradient are computed by loops and kernels of our own; only what reads the message, and LPIPS,
+//! is a graph.
 use burn::tensor::{Int, Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
-use crate::quality::{Likeness, LikenessWeights, Ssim, batch, likeness_with_gradient, unbatch};
+use crate::quality::{Likeness, LikenessOnDevice, LikenessWeights, batch, likeness_with_gradient, unbatch};
 use crate::splat::{Drawing, GpuRasterizer, PreparedView};
 
 /// What is fixed for a run.
@@ -24,7 +24,6 @@ pub(super) struct Loss<'a> {
     settings: Settings,
     image_augmentation: ImageAugmentation,
     targets: Vec<f32>,
-    ssim: Ssim,
 }
 
 /// The loss of a batch of views.
@@ -40,17 +39,15 @@ pub(super) struct Evaluated {
 /// What is computed of a batch as a graph.
 struct Graph {
     total: Tensor<1>,
-    /// L1 and 1 - SSIM, where they are part of the graph.
-    likeness: Option<[Tensor<1>; 2]>,
     lpips: Option<Tensor<1>>,
     message: Tensor<1>,
     logits: Tensor<2>,
 }
 
 impl Graph {
-    /// All numbers but `total`, for one transfer: the likeness first, the logits last.
+    /// All numbers but `total`, for one transfer, the logits last.
     fn numbers(&self) -> Tensor<1> {
-        let terms = self.likeness.iter().flatten().chain(&self.lpips).chain([&self.message]);
+        let terms = self.lpips.iter().chain([&self.message]);
         let mut numbers: Vec<Tensor<1>> = terms.cloned().collect();
         numbers.push(self.logits.clone().flatten(0, 1));
         Tensor::cat(numbers, 0).inner()
@@ -59,13 +56,11 @@ impl Graph {
 
 impl<'a> Loss<'a> {
     pub fn new(engine: &'a Engine, settings: &Settings, message: &Message) -> Self {
-        let side = settings.size as usize;
         Self {
             engine,
             settings: *settings,
             image_augmentation: ImageAugmentation::new(settings, engine),
             targets: message.targets().collect(),
-            ssim: Ssim::new(side, side, &engine.compute.device),
         }
     }
 
@@ -87,25 +82,13 @@ impl<'a> Loss<'a> {
         rng: &mut ChaCha8Rng,
     ) -> Result<(Evaluated, Vec<Picture>)> {
         let device = &self.engine.compute.device;
-        let lambda = &self.settings.lambda;
-        let weight = lambda.reconstruction * factors.reconstruction;
         let leaf = batch(pictures, &device.clone().autodiff())?.require_grad();
-        let weights = LikenessWeights {
-            l1: weight * lambda.l1,
-            l2: weight * lambda.l2,
-            ssim: -weight * lambda.ssim * factors.ssim,
-        };
         let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
-        let (likeness, likeness_gradients) = likeness_with_gradient(&pairs, weights);
+        let (likeness, likeness_gradients) = likeness_with_gradient(&pairs, self.likeness_weights(factors));
         let original = || batch(references, device);
-        let graph = self.graph(step, leaf.clone(), original, false, factors, rng)?;
+        let graph = self.graph(step, leaf.clone(), original, factors, rng)?;
         let numbers = self.engine.to_host(graph.numbers())?;
-        let evaluated = self.evaluated(
-            step,
-            &numbers,
-            Some(mean_terms(&likeness)),
-            mean_psnr(references, pictures),
-        )?;
+        let evaluated = self.evaluated(step, &numbers, mean_terms(&likeness), mean_psnr(references, pictures))?;
 
         let gradient = self.gradient(&graph.total, &leaf)?;
         let mut gradients = unbatch(gradient)?;
@@ -139,33 +122,43 @@ impl<'a> Loss<'a> {
         let views = drawings.len();
         let pictures = rasterizer.draw(drawings)?;
         let original = batch(references, &self.engine.compute.device)?;
-        let difference = original.clone().clamp(0.0, 1.0) - pictures.clone().clamp(0.0, 1.0);
-        let [_, channels, height, width] = difference.dims();
-        let squares = difference.square().reshape([views, channels * height * width]);
-        let mse = squares.mean_dim(1).flatten(0, 1);
+        let weights = self.likeness_weights(factors);
+        let likeness = LikenessOnDevice::new(original.clone(), pictures.clone(), weights)?;
         let leaf = Tensor::from_inner(pictures).require_grad();
-        let graph = self.graph(step, leaf.clone(), || Ok(original), true, factors, rng)?;
-        let gradient = self.gradient(&graph.total, &leaf)?;
+        let graph = self.graph(step, leaf.clone(), || Ok(original), factors, rng)?;
+        let gradient = self.gradient(&graph.total, &leaf)? + likeness.gradient;
         let prepared: Vec<&PreparedView> = drawings.iter().map(|drawing| drawing.view).collect();
-        let numbers = Tensor::cat(vec![mse, graph.numbers()], 0);
+        let numbers = Tensor::cat(vec![likeness.means.flatten(0, 1), graph.numbers()], 0);
         let (gradients, numbers) = rasterizer.draw_backward(&prepared, gradient, numbers)?;
 
-        let psnrs = numbers[..views].iter().map(|mse| -10.0 * f64::from(*mse).log10());
-        let evaluated = self.evaluated(step, &numbers[views..], None, psnrs.sum::<f64>() / views as f64)?;
+        let mean = |of: &[f32]| of.iter().sum::<f32>() / views as f32;
+        let (likeness, numbers) = numbers.split_at(3 * views);
+        let [ssim, l1, mse] = [0, 1, 2].map(|part| &likeness[part * views..][..views]);
+        let psnrs = mse.iter().map(|mse| -10.0 * f64::from(*mse).log10());
+        let terms = [mean(l1), 1.0 - mean(ssim)];
+        let evaluated = self.evaluated(step, numbers, terms, psnrs.sum::<f64>() / views as f64)?;
         let of_view = |gradient: &Vec<f32>| gradient.iter().map(|g| g.abs()).sum::<f32>();
         let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
         finite(step, "gradient", sums.iter().sum())?;
         Ok((evaluated, gradients))
     }
 
-    /// The loss of `pictures` as a graph, with L1, L2 and SSIM if `with_likeness`. `original` is asked for where something is
-    /// compared with it.
+    fn likeness_weights(&self, factors: LossWeightFactors) -> LikenessWeights {
+        let lambda = &self.settings.lambda;
+        let weight = lambda.reconstruction * factors.reconstruction;
+        LikenessWeights {
+            l1: weight * lambda.l1,
+            l2: weight * lambda.l2,
+            ssim: -weight * lambda.ssim * factors.ssim,
+        }
+    }
+
+    /// The loss of `pictures` as a graph, without what is computed by hand. `original` is asked for where LPIPS is.
     fn graph(
         &self,
         step: usize,
         pictures: Tensor<4>,
         original: impl FnOnce() -> Result<Tensor<4>>,
-        with_likeness: bool,
         factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
     ) -> Result<Graph> {
@@ -175,28 +168,13 @@ impl<'a> Loss<'a> {
         // What a file can hold; beyond it nothing is seen, so there is no gradient either.
         let marked = pictures.clamp(0.0, 1.0);
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
-        let original = match with_likeness || lpips.is_some() {
-            true => Some(Tensor::from_inner(original()?.clamp(0.0, 1.0))),
-            false => None,
+        let lpips = match lpips {
+            Some(lpips) => {
+                let original = self.some(step, Tensor::from_inner(original()?.clamp(0.0, 1.0)));
+                Some(lpips.per_view(original, self.some(step, marked.clone()))?.mean())
+            }
+            None => None,
         };
-        let mut likeness = None;
-        let mut distance = None;
-        let mut total = Vec::new();
-        if let Some(original) = original.clone().filter(|_| with_likeness) {
-            let difference = marked.clone() - original.clone();
-            let l1 = difference.clone().abs().mean();
-            let l2 = difference.square().mean();
-            let ssim = -self.ssim.mean(original, marked.clone()) + 1.0;
-            let terms = l1.clone() * lambda.l1 + l2 * lambda.l2 + ssim.clone() * (lambda.ssim * factors.ssim);
-            total.push(terms * weight);
-            likeness = Some([l1, ssim]);
-        }
-        if let Some((lpips, original)) = lpips.zip(original) {
-            let (original, marked) = (self.some(step, original), self.some(step, marked.clone()));
-            let of_views = lpips.per_view(original, marked)?.mean();
-            total.push(of_views.clone() * (lambda.lpips * weight));
-            distance = Some(of_views);
-        }
         let seen = self.settings.augmentation.apply(marked, rng);
         let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
         let bits = self.targets.len();
@@ -204,11 +182,13 @@ impl<'a> Loss<'a> {
         let targets = Tensor::<2>::from_data(targets, &self.engine.compute.device);
         let softened = logits.clone() / lambda.temperature;
         let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
-        let start = message.clone() * lambda.message;
+        let mut total = message.clone() * lambda.message;
+        if let Some(distance) = &lpips {
+            total = total + distance.clone() * (lambda.lpips * weight);
+        }
         Ok(Graph {
-            total: total.into_iter().fold(start, |sum, term| sum + term),
-            likeness,
-            lpips: distance,
+            total,
+            lpips,
             message,
             logits,
         })
@@ -223,12 +203,10 @@ impl<'a> Loss<'a> {
         })
     }
 
-    /// What [`Graph::numbers`] say; `likeness` is L1 and 1 - SSIM where the graph has them not.
-    fn evaluated(&self, step: usize, numbers: &[f32], likeness: Option<[f32; 2]>, psnr_db: f64) -> Result<Evaluated> {
-        let bits = self.targets.len();
+    /// What [`Graph::numbers`] say, beside L1 and 1 - SSIM.
+    fn evaluated(&self, step: usize, numbers: &[f32], [l1, ssim]: [f32; 2], psnr_db: f64) -> Result<Evaluated> {
         let mut numbers = numbers.iter().copied();
         let mut next = || numbers.next().unwrap_or(f32::NAN);
-        let [l1, ssim] = likeness.unwrap_or_else(|| [next(), next()]);
         let lpips = self.settings.lambda.lpips > 0.0 && self.engine.has_lpips();
         let lpips = lpips.then(&mut next);
         let message = next();
@@ -246,7 +224,6 @@ impl<'a> Loss<'a> {
             .zip(self.targets.iter().cycle())
             .filter(|(logit, target)| (**logit > 0.0) == (**target > 0.5))
             .count();
-        debug_assert!(logits.len().is_multiple_of(bits));
         Ok(Evaluated {
             terms,
             bit_accuracy: right as f64 / logits.len() as f64,

@@ -1,0 +1,322 @@
+//! Likeness and its gradient on a card: CubeCL kernels that do what [`super::likeness`] does on the CPU.
+//!
+//! A unit a pixel of a plane. The window is separable, so what is averaged is averaged along rows first.
+// The launch functions that the macro makes carry no documentation.
+#![allow(missing_docs)]
+use burn::backend::Cube;
+use burn::tensor::{DType, Shape, Tensor};
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::prelude::*;
+use cubecl::server::Handle;
+
+use super::likeness::LikenessWeights;
+use super::ssim::{C1, C2};
+use super::window::{RADIUS, weight};
+use crate::error::{Error, Result};
+
+/// Units of a cube.
+const CUBE: u32 = 256;
+/// Cubes a dimension that every device allows.
+const MAX_CUBES: u32 = 65_535;
+
+/// Averages along rows of x, y, x squared, y squared and x y: `across` is `[5][planes][height][width]`.
+#[cube(launch)]
+fn moments_along_rows(x: &[f32], y: &[f32], taps: &[f32], across: &mut [f32], width: u32) {
+    let at = ABSOLUTE_POS;
+    let count = x.len();
+    if at < count {
+        let width = width as usize;
+        let column = at % width;
+        let mut mx = 0.0f32;
+        let mut my = 0.0f32;
+        let mut xx = 0.0f32;
+        let mut yy = 0.0f32;
+        let mut xy = 0.0f32;
+        for tap in 0..2 * RADIUS + 1 {
+            // The window's part beyond the border counts as zeros.
+            if column + tap >= RADIUS && column + tap < width + RADIUS {
+                let near = at + tap - RADIUS;
+                let a = f32::clamp(x[near], 0.0f32, 1.0f32);
+                let b = f32::clamp(y[near], 0.0f32, 1.0f32);
+                let share = taps[tap];
+                mx += share * a;
+                my += share * b;
+                xx += share * a * a;
+                yy += share * b * b;
+                xy += share * a * b;
+            }
+        }
+        across[at] = mx;
+        across[count + at] = my;
+        across[2 * count + at] = xx;
+        across[3 * count + at] = yy;
+        across[4 * count + at] = xy;
+    }
+}
+
+/// SSIM of each pixel to the first part of `values` (`[3][planes][height][width]`), and its derivatives by the window's means
+/// of y, of y squared and of x y: `slopes`, of the same shape.
+#[cube(launch)]
+fn similarity(across: &[f32], taps: &[f32], values: &mut [f32], slopes: &mut [f32], width: u32, height: u32) {
+    let at = ABSOLUTE_POS;
+    let count = values.len() / 3;
+    if at < count {
+        let width = width as usize;
+        let height = height as usize;
+        let row = at / width % height;
+        let mut x = 0.0f32;
+        let mut y = 0.0f32;
+        let mut xx = 0.0f32;
+        let mut yy = 0.0f32;
+        let mut xy = 0.0f32;
+        for tap in 0..2 * RADIUS + 1 {
+            if row + tap >= RADIUS && row + tap < height + RADIUS {
+                let near = at + tap * width - RADIUS * width;
+                let share = taps[tap];
+                x += share * across[near];
+                y += share * across[count + near];
+                xx += share * across[2 * count + near];
+                yy += share * across[3 * count + near];
+                xy += share * across[4 * count + near];
+            }
+        }
+        let same = x * y;
+        let squares = x * x + y * y;
+        let a = 2.0f32 * same + C1;
+        let b = squares + C1;
+        let c = 2.0f32 * (xy - same) + C2;
+        let d = xx + yy - squares + C2;
+        let scale = 1.0f32 / (b * d);
+        let value = a * c * scale;
+        values[at] = value;
+        slopes[at] = 2.0f32 * (x * (c - a) * scale + y * value * (b - d) * scale);
+        slopes[count + at] = -value * b * scale;
+        slopes[2 * count + at] = 2.0f32 * a * scale;
+    }
+}
+
+/// Averages along rows of three planes for each of `slopes`.
+#[cube(launch)]
+fn slopes_along_rows(slopes: &[f32], taps: &[f32], across: &mut [f32], width: u32) {
+    let at = ABSOLUTE_POS;
+    if at < slopes.len() {
+        let width = width as usize;
+        let column = at % width;
+        let mut sum = 0.0f32;
+        for tap in 0..2 * RADIUS + 1 {
+            if column + tap >= RADIUS && column + tap < width + RADIUS {
+                sum += taps[tap] * slopes[at + tap - RADIUS];
+            }
+        }
+        across[at] = sum;
+    }
+}
+
+/// The gradient to each value of y, 0 where it is beyond what a file can hold; absolute and squared differences to the second
+/// and third part of `values`.
+#[cube(launch)]
+fn to_marked(
+    x: &[f32],
+    y: &[f32],
+    across: &[f32],
+    taps: &[f32],
+    values: &mut [f32],
+    gradient: &mut [f32],
+    width: u32,
+    height: u32,
+    of_l1: f32,
+    of_l2: f32,
+    of_ssim: f32,
+) {
+    let at = ABSOLUTE_POS;
+    let count = x.len();
+    if at < count {
+        let width = width as usize;
+        let height = height as usize;
+        let row = at / width % height;
+        let mut by_mean = 0.0f32;
+        let mut by_square = 0.0f32;
+        let mut by_product = 0.0f32;
+        for tap in 0..2 * RADIUS + 1 {
+            if row + tap >= RADIUS && row + tap < height + RADIUS {
+                let near = at + tap * width - RADIUS * width;
+                let share = taps[tap];
+                by_mean += share * across[near];
+                by_square += share * across[count + near];
+                by_product += share * across[2 * count + near];
+            }
+        }
+        let a = f32::clamp(x[at], 0.0f32, 1.0f32);
+        let b = f32::clamp(y[at], 0.0f32, 1.0f32);
+        let difference = b - a;
+        let mut sign = 0.0f32;
+        if difference > 0.0f32 {
+            sign = 1.0f32;
+        }
+        if difference < 0.0f32 {
+            sign = -1.0f32;
+        }
+        let similarity = by_mean + 2.0f32 * b * by_square + a * by_product;
+        let mut slope = of_ssim * similarity + 2.0f32 * of_l2 * difference + of_l1 * sign;
+        if y[at] < 0.0f32 || y[at] > 1.0f32 {
+            slope = 0.0f32;
+        }
+        gradient[at] = slope;
+        values[count + at] = f32::abs(difference);
+        values[2 * count + at] = difference * difference;
+    }
+}
+
+/// Likeness of pictures on a card, and its gradient.
+pub(crate) struct LikenessOnDevice {
+    /// Means over pixels and colours of SSIM, of absolute and of squared differences, `[3, views]`.
+    pub means: Tensor<2>,
+    /// Of the weighted terms' mean over views to the marked pictures, `[views, 3, height, width]`.
+    pub gradient: Tensor<4>,
+}
+
+impl LikenessOnDevice {
+    /// Of pictures `[views, 3, height, width]` of one size, which are clamped to [0, 1]. Nothing is waited for.
+    ///
+    /// # Errors
+    /// Tensors that are not on a card.
+    pub fn new(original: Tensor<4>, marked: Tensor<4>, weights: LikenessWeights) -> Result<Self> {
+        let [views, channels, height, width] = marked.dims();
+        let count = views * channels * height * width;
+        let [x, y] = [primitive(original)?, primitive(marked)?];
+        let client = y.client.clone();
+        let taps: Vec<f32> = (0..2 * RADIUS + 1)
+            .map(|tap| weight(tap.abs_diff(RADIUS)) as f32)
+            .collect();
+        let taps = client.create_from_slice(bytemuck::cast_slice(&taps));
+        let [across, values, slopes] = [5, 3, 3].map(|parts| client.empty(4 * parts * count));
+        let gradient = client.empty(4 * count);
+        let (w, h) = (width as u32, height as u32);
+        let scale = 1.0 / count as f32;
+        let taps = || argument(&taps, 2 * RADIUS + 1);
+        let pictures = || (argument(&x.handle, count), argument(&y.handle, count));
+
+        let (of_x, of_y) = pictures();
+        let (cubes, dim) = grid(count);
+        let moments = argument(&across, 5 * count);
+        moments_along_rows::launch(&client, cubes, dim, of_x, of_y, taps(), moments, w);
+        let (cubes, dim) = grid(count);
+        let [of_across, of_values, of_slopes] = [(&across, 5), (&values, 3), (&slopes, 3)].map(parts(count));
+        similarity::launch(&client, cubes, dim, of_across, taps(), of_values, of_slopes, w, h);
+        let (cubes, dim) = grid(3 * count);
+        let [of_slopes, of_across] = [(&slopes, 3), (&across, 3)].map(parts(count));
+        slopes_along_rows::launch(&client, cubes, dim, of_slopes, taps(), of_across, w);
+        let (of_x, of_y) = pictures();
+        let (cubes, dim) = grid(count);
+        let [of_across, of_values, of_gradient] = [(&across, 3), (&values, 3), (&gradient, 1)].map(parts(count));
+        to_marked::launch(
+            &client,
+            cubes,
+            dim,
+            of_x,
+            of_y,
+            of_across,
+            taps(),
+            of_values,
+            of_gradient,
+            w,
+            h,
+            scale * weights.l1,
+            scale * weights.l2,
+            scale * weights.ssim,
+        );
+        let values = tensor::<3>(&y, values, [3, views, channels * height * width]);
+        Ok(Self {
+            means: values.mean_dim(2).reshape([3, views]),
+            gradient: tensor(&y, gradient, [views, channels, height, width]),
+        })
+    }
+}
+
+fn primitive(tensor: Tensor<4>) -> Result<CubeTensor> {
+    let tensor = tensor.try_into_primitive::<Cube>().map_err(|e| Error::Device {
+        device: "pictures".into(),
+        reason: format!("{e:?}"),
+    })?;
+    Ok(into_contiguous(tensor))
+}
+
+/// A tensor of `handle`, where `like` is.
+fn tensor<const D: usize>(like: &CubeTensor, handle: Handle, shape: [usize; D]) -> Tensor<D> {
+    let shape = Shape::from(shape.to_vec());
+    let (client, device) = (like.client.clone(), like.device.clone());
+    Tensor::from_primitive::<Cube>(CubeTensor::new_contiguous(client, device, shape, handle, DType::F32))
+}
+
+/// Kernel arguments of so many parts of `count` numbers.
+fn parts(count: usize) -> impl Fn((&Handle, usize)) -> BufferArg {
+    move |(handle, parts)| argument(handle, parts * count)
+}
+
+/// A kernel argument: `len` elements of `handle`.
+#[allow(unsafe_code)]
+fn argument(handle: &Handle, len: usize) -> BufferArg {
+    // SAFETY: buffers are at least as long as every caller says, and the kernels stay within what is said.
+    unsafe { BufferArg::from_raw_parts(handle.clone(), len) }
+}
+
+/// One unit for each of `units`.
+fn grid(units: usize) -> (CubeCount, CubeDim) {
+    let cubes = (units as u32).div_ceil(CUBE);
+    let columns = cubes.clamp(1, MAX_CUBES);
+    (
+        CubeCount::Static(columns, cubes.div_ceil(columns).max(1), 1),
+        CubeDim::new_1d(CUBE),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{DeviceChoice, open};
+    use crate::picture::Picture;
+    use crate::quality::{batch, likeness_with_gradient, unbatch};
+
+    #[test]
+    fn a_card_and_the_cpu_agree() {
+        let device = match open(DeviceChoice::Wgpu) {
+            Ok(compute) => compute.device,
+            Err(error) => {
+                assert!(std::env::var_os("CI").is_none(), "{error}");
+                eprintln!("skipped: {error}");
+                return;
+            }
+        };
+        let picture = |seed: u32| Picture {
+            width: 37,
+            height: 21,
+            pixels: (0..3 * 37 * 21)
+                .map(|i: u32| ((i * 7 + seed * 13) % 29) as f32 / 26.0 - 0.05)
+                .collect(),
+        };
+        let pictures: Vec<Picture> = (1..5).map(picture).collect();
+        let [x, y] = [[&pictures[0], &pictures[1]], [&pictures[2], &pictures[3]]];
+        let weights = LikenessWeights {
+            l1: 0.3,
+            l2: 5.0,
+            ssim: -2.0,
+        };
+        let pairs = [(x[0], y[0]), (x[1], y[1])];
+        let (want, gradients) = likeness_with_gradient(&pairs, weights);
+        let found = LikenessOnDevice::new(batch(&x, &device).unwrap(), batch(&y, &device).unwrap(), weights).unwrap();
+        let means = found.means.try_into_vec_as::<f32>().unwrap();
+        for (view, want) in want.iter().enumerate() {
+            assert!((f64::from(means[view]) - want.ssim).abs() < 1e-5);
+            assert!((f64::from(means[2 + view]) - want.l1).abs() < 1e-6);
+            assert!(means[4 + view] > 0.0);
+        }
+        let found = unbatch(found.gradient).unwrap();
+        let largest = gradients.iter().flatten().fold(0.0_f32, |m, v| m.max(v.abs()));
+        for (found, want) in found.iter().zip(&gradients) {
+            let off = found.pixels.iter().zip(want).map(|(a, b)| (a - b).abs());
+            let off = off.fold(0.0_f32, f32::max);
+            assert!(largest > 0.0 && off < 1e-4 * largest, "{off} of {largest}");
+        }
+    }
+}
