@@ -354,5 +354,4 @@ fn short_messages_are_read_in_changed_pictures_though_they_never_match() {
     let read = environment.json(verify, 3);
     assert_eq!(read["verdict"], "inconclusive");
     assert!(read["matched_bits"].as_u64().unwrap() >= 15, "{read}");
-    assert!(read["framings"].as_u64().unwrap() > 1, "{read}");
 }
