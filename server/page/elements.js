@@ -37,6 +37,25 @@ export function fill(select, options, nothing) {
     if (options.some(([value]) => value === before)) select.value = before;
 }
 
+/** Gives a button back after work, and the keyboard to it where that is nowhere else by now. */
+export function release(button) {
+    button.disabled = false;
+    if (document.activeElement === document.body) button.focus({ preventScroll: true });
+}
+
+/** Keeps files that are dropped beside their place from being opened instead of the page, with all that goes on there. */
+export function keepPage() {
+    const files = (event) => event.dataTransfer?.types.includes("Files") && !event.defaultPrevented;
+    addEventListener("dragover", (event) => {
+        if (!files(event)) return;
+        event.preventDefault();
+        event.dataTransfer.dropEffect = "none";
+    });
+    addEventListener("drop", (event) => {
+        if (files(event)) event.preventDefault();
+    });
+}
+
 /** Lets files be dropped on a label with an input. */
 export function droppable(label, input) {
     const over = (is) => (event) => {

@@ -1,6 +1,6 @@
 // The page: signing in and out, and which of its parts is seen.
 import { keys, SOON } from "./calls.js";
-import { alertIn, announce, by } from "./elements.js";
+import { alertIn, announce, by, keepPage } from "./elements.js";
 import { explain, isSignedOut } from "./errors.js";
 import * as mark from "./mark.js";
 import * as operate from "./operate.js";
@@ -66,6 +66,7 @@ mark.connect(async (picture, claim) => {
 });
 verify.connect();
 operate.connect();
+keepPage();
 addEventListener("hashchange", () => go(location.hash.slice(1)));
 go(location.hash.slice(1), { focus: false });
 alertIn(by("sign-in-form").querySelector(".alert"), found());

@@ -1,7 +1,7 @@
 // Marking: a scene goes up, a job marks it, and the marked scene is there to look at, to check and to keep.
 import { KeyState, Preset } from "./vendor/api.js";
 import { all, keys, patiently, registry, SOON, uuid } from "./calls.js";
-import { alertIn, by, bytes, choices, droppable, element, fill, save } from "./elements.js";
+import { alertIn, by, bytes, choices, droppable, element, fill, release, save } from "./elements.js";
 import { explain, Mistake } from "./errors.js";
 import { canShow } from "./formats.js";
 import { Panel, run } from "./jobs.js";
@@ -101,8 +101,8 @@ async function makeKey() {
     } catch (error) {
         alertIn(alert(), explain(error));
     } finally {
-        by("key-make").disabled = false;
         panel.end();
+        release(by("key-make"));
     }
 }
 
@@ -167,7 +167,7 @@ async function submit(event, checkPicture) {
         alertIn(alert(), explain(error));
     } finally {
         panel?.end();
-        send.disabled = false;
+        release(send);
     }
 }
 
@@ -218,6 +218,7 @@ async function present(box, { made, marked, comparison }, checkPicture) {
         turn.disabled = true;
         try {
             closeViewer = await show(stage, marked, taken);
+            stage.querySelector("canvas").focus();
         } catch (error) {
             alertIn(trouble, explain(error));
         }

@@ -1,9 +1,11 @@
-// Jobs of the project: the queue, what failed and why; and the workers with what they have.
+// Jobs of the project: the queue, what failed and why, what came of the others; and the workers with what they have.
 import { Outcome, State } from "./vendor/api.js";
 import { jobs, patiently, SOON } from "./calls.js";
-import { alertIn, announce, by, bytes, element, moment } from "./elements.js";
+import { alertIn, announce, by, bytes, element, moment, release } from "./elements.js";
 import { explain, reason } from "./errors.js";
 import { isOver, standing } from "./jobs.js";
+import { keepArtifact } from "./mark.js";
+import { recall } from "./verify.js";
 
 const STATES = { open: [State.QUEUED, State.RUNNING], failed: [State.FAILED], all: [] };
 const KINDS = { embed: "Marking", verify: "Verifying", createKey: "Making a key" };
@@ -21,7 +23,9 @@ function act(text, does) {
         } catch (error) {
             alertIn(by("jobs-alert"), explain(error));
         }
-        button.disabled = false;
+        // One whose list was made anew is gone.
+        if (button.isConnected) release(button);
+        else if (document.activeElement === document.body) by("jobs-title").focus();
     });
     return button;
 }
@@ -45,6 +49,7 @@ async function attempts(job, box) {
 function item(job) {
     const kind = KINDS[job.spec.case] ?? "Job";
     const list = element("ul");
+    const found = element("div", { className: "result", hidden: true });
     const row = element("div", { className: "row" }, act("Attempts", () => attempts(job, list)));
     if (!isOver(job)) {
         row.append(act("Cancel", async () => {
@@ -58,6 +63,9 @@ function item(job) {
             await open();
         }));
     }
+    const { scene, verdict } = job.result.value ?? {};
+    if (scene) row.append(act("Download the marked scene", () => keepArtifact(scene, by("jobs-alert"))));
+    if (verdict) row.append(act("Show the verdict", () => recall(job, found)));
     return element(
         "li",
         {},
@@ -67,6 +75,7 @@ function item(job) {
         element("p", { className: "hint" }, `${job.name.replace("jobs/", "")}, asked for ${moment(job.createTime)}`),
         row,
         list,
+        found,
     );
 }
 

@@ -1,5 +1,5 @@
 // Verifying: pictures or a scene go up, a job reads them, and the verdict is told with what it rests on.
-import { alertIn, announce, by, bytes, choices, droppable, element, fill } from "./elements.js";
+import { alertIn, announce, by, bytes, choices, droppable, element, fill, release } from "./elements.js";
 import { explain, Mistake } from "./errors.js";
 import { Panel, run } from "./jobs.js";
 import { inventory, keepArtifact, message, titleOfAsset, titleOfKey } from "./mark.js";
@@ -98,7 +98,7 @@ async function submit(event) {
         alertIn(alert(), explain(error));
     } finally {
         panel?.end();
-        send.disabled = false;
+        release(send);
     }
 }
 
@@ -128,6 +128,21 @@ function present(box, result, asked) {
     const head = box.querySelector("h2");
     head.focus();
     announce(head.textContent);
+}
+
+/** Tells in `box` what a job found that is over. */
+export async function recall(job, box) {
+    known = await inventory();
+    const { key, message, asset, owner } = job.spec.value;
+    const title = (list, name, words) => {
+        const found = list.find((one) => one.name === name);
+        return found ? words(found) : name;
+    };
+    let claim = "It is any registered original of this key";
+    if (message) claim = `It says the message ${message}`;
+    if (asset) claim = `It is the original ${title(known.assets, asset, titleOfAsset)}`;
+    if (owner) claim = `It is one of the originals of ${title(known.owners, owner, ({ displayName }) => displayName)}`;
+    present(box, job.result.value, { files: job.displayName, key: title(known.keys, key, titleOfKey), claim });
 }
 
 /** Connects the form, once. */

@@ -92,8 +92,7 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
 
     result.get_by_role("button", name="Turn it here").click()
     canvas = result.get_by_role("application")
-    canvas.wait_for()
-    canvas.focus()
+    expect(canvas).to_be_focused(timeout=LONG)
     for pressed in ["ArrowRight", "ArrowRight", "ArrowUp", "+"]:
         tab.keyboard.press(pressed)
     result.get_by_role("button", name="Take a picture").click()
@@ -120,6 +119,15 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     marking = tab.locator("#jobs-list > li").filter(has_text="Marking: sample.ply")
     marking.get_by_role("button", name="Attempts").click()
     expect(marking).to_contain_text(re.compile(r"Attempt 1, .*, worker .*: succeeded"))
+    # What came of it is there too, for who closed the page meanwhile.
+    with tab.expect_download() as download:
+        marking.get_by_role("button", name="Download the marked scene").click()
+    assert download.value.path().read_bytes() == marked.read_bytes()
+    verified = tab.locator("#jobs-list > li").filter(has_text="Verifying: marked-1.png").first
+    verified.get_by_role("button", name="Show the verdict").click()
+    expect(verified.get_by_role("heading", name="The mark was not found")).to_be_focused()
+    expect(verified).to_contain_text("It says the message 00000000")
+    expect(verified).to_contain_text(key)
     # And who could do more.
     workers = tab.get_by_role("list", name="Workers").get_by_role("listitem")
     expect(workers).to_have_count(1)
@@ -222,12 +230,32 @@ def test_mistakes_say_what_to_do(service: Service, token: str, key: str, tab: Pa
     expect(tab.locator("#mark-message")).to_have_value(re.compile("^[0-9a-f]{8}$"))
     mark.click()
     expect(alert).to_contain_text(re.compile("(PLY|scene|letter)", re.IGNORECASE), timeout=LONG)
-    expect(mark).to_be_enabled()
+    expect(mark).to_be_focused()
     empty = folder / "empty.ply"
     empty.touch()
     tab.locator("#mark-file").set_input_files(empty)
     mark.click()
     expect(alert).to_contain_text("empty.ply is empty.")
+
+
+def test_files_are_dropped(service: Service, token: str, tab: Page) -> None:
+    """On their places, and nowhere else: a browser would open them instead of the page."""
+    sign_in(tab, address(service), token)
+    drop = """([place, type, name]) => {
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(new File(["ply"], name));
+        const event = new DragEvent(type, { bubbles: true, cancelable: true, dataTransfer });
+        document.querySelector(place).dispatchEvent(event);
+        return event.defaultPrevented;
+    }"""
+    for place, name in [("#mark-drop", "scene.ply"), ("#verify-drop", "picture.png")]:
+        assert tab.evaluate(drop, [place, "drop", name])
+    assert tab.evaluate("() => document.getElementById('mark-file').files[0].name") == "scene.ply"
+    tab.get_by_role("link", name="Verify").click()
+    expect(tab.locator("#verify-list")).to_contain_text("picture.png")
+    for what in ("dragover", "drop"):
+        assert tab.evaluate(drop, ["footer", what, "beside.ply"])
+    assert tab.evaluate("() => document.getElementById('mark-file').files[0].name") == "scene.ply"
 
 
 def test_a_full_queue_and_a_server_that_goes_away(tab: Page, folder: Path) -> None:
@@ -269,6 +297,7 @@ def test_nothing_keeps_people_out(
     service: Service,
     token: str,
     key: str,
+    small: Path,
     scheme: str,
     width: int,
     height: int,
@@ -301,6 +330,23 @@ def test_nothing_keeps_people_out(
     for choice in ("message", "register", "asset"):
         page.locator(f'input[name="mark-what"][value="{choice}"]').check()
         check(f"mark {choice}")
+    # What is there while something goes on, after it failed, and the viewer.
+    page.locator("#mark-file").set_input_files(small)
+    page.evaluate(
+        """async () => {
+            const [{ Panel }, { alertIn }, { show }] = await Promise.all(
+                ["jobs", "elements", "viewer"].map((name) => import(`/${name}.js`)),
+            );
+            const panel = new Panel(document.getElementById("mark-job"));
+            panel.show("Sending", 0.5);
+            panel.note("The server can't be reached. Trying again.");
+            alertIn(document.querySelector("#mark-form .alert"), { what: "The scene is empty.", todo: "Choose another." });
+            const box = document.getElementById("mark-result");
+            box.hidden = false;
+            await show(box, document.getElementById("mark-file").files[0], () => {});
+        }"""
+    )
+    check("mark with all there is")
     page.get_by_role("link", name="Verify").click()
     page.get_by_role("heading", name="Verify").wait_for()
     check("verify")
@@ -321,6 +367,10 @@ def test_nothing_keeps_people_out(
     page.get_by_role("heading", name="Jobs").wait_for()
     page.get_by_label("Show").select_option("All")
     expect(page.locator("#jobs-list > li").first).to_be_visible()
+    for button in ("Attempts", "Show the verdict"):
+        if page.get_by_role("button", name=button).count() > 0:
+            page.get_by_role("button", name=button).first.click()
+            page.wait_for_timeout(500)
     check("jobs")
     context.close()
     assert found == []
