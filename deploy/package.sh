@@ -3,6 +3,8 @@
 # from an empty root. cargo-deb is built once, pinned, and kept below target/.
 #
 #     deploy/package.sh
+#
+# The packages' maintainer is whoever builds them: DEBFULLNAME and DEBEMAIL, as for Debian's own tools.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source deploy/setup.sh
@@ -12,6 +14,8 @@ target=$PWD/target
 tools=$target/cargo-deb-$VERSION
 programs=(guardsplat guardsplat-server guardsplat-worker guardsplat-credentials)
 crates=(guardsplat-client guardsplat-server guardsplat-worker)
+
+maintainer="${DEBFULLNAME:-$(id -un)} <${DEBEMAIL:-$(id -un)@$(uname -n)}>"
 
 setup
 command -v dpkg-deb >/dev/null || { echo "package: dpkg-deb was not found; this is for Debian and Ubuntu" >&2; exit 1; }
@@ -32,7 +36,7 @@ for program in "${programs[@]}"; do
 done
 for crate in "${crates[@]}"; do
     CARGO_TARGET_DIR=$target "$tools/bin/cargo-deb" deb --quiet --locked --no-build --package "$crate" \
-        --output "$target/debian/"
+        --maintainer "$maintainer" --output "$target/debian/"
 done
 
 # From here on as whoever is given the packages.
@@ -40,6 +44,8 @@ root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
 for package in "$target"/debian/*.deb; do
     dpkg-deb --extract "$package" "$root"
+    told=$(dpkg-deb --field "$package" Maintainer)
+    [ "$told" = "$maintainer" ] || { echo "package: $package names $told, not $maintainer" >&2; exit 1; }
 done
 for program in "${programs[@]}"; do
     "$root/usr/bin/$program" --version
