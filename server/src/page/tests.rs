@@ -40,6 +40,12 @@ async fn page(server: &Server) -> String {
     url
 }
 
+/// A client that knows nothing but HTTP. It takes the process's provider of cryptography, though nothing here is encrypted.
+fn client() -> Client {
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    Client::new()
+}
+
 /// Makes a call with an empty message.
 async fn call(client: &Client, url: &str, kind: &str, token: Option<&str>) -> Response {
     let mut request = client.post(url).header("content-type", kind).body(vec![0; 5]);
@@ -67,7 +73,7 @@ fn nothing_listens_for_browsers_by_itself() {
 #[tokio::test]
 async fn every_call_is_denied_without_a_token_that_is_good_for_it() {
     let server = Server::with_tokens().await;
-    let (url, client) = (page(&server).await, Client::new());
+    let (url, client) = (page(&server).await, client());
     let expired = server.token_until("studio", &Scope::ALL, Some(1)).await;
     let mut tried = 0;
     for path in paths() {
@@ -125,7 +131,7 @@ async fn every_call_is_denied_without_a_token_that_is_good_for_it() {
 #[tokio::test]
 async fn other_origins_are_told_nothing() {
     let server = Server::with_tokens().await;
-    let (url, client) = (page(&server).await, Client::new());
+    let (url, client) = (page(&server).await, client());
     for path in ["/", "/guardsplat.v1.JobService/ListJobs"] {
         let asked = client
             .request(Method::OPTIONS, format!("{url}{path}"))
@@ -147,7 +153,7 @@ async fn other_origins_are_told_nothing() {
 #[tokio::test]
 async fn files_come_with_their_headers_and_nothing_else_is_there() {
     let server = Server::with_tokens().await;
-    let (url, client) = (page(&server).await, Client::new());
+    let (url, client) = (page(&server).await, client());
     for file in FILES {
         let at = format!("{url}{}", file.path);
         let answer = client.get(&at).send().await.unwrap();
@@ -271,7 +277,7 @@ async fn credentials_are_resolved_for_their_project_and_nobody_else() {
     let spec = raw_spec(&server).await;
     let first = marked(&server, spec("c0ffee42"), "urn:c2pa:1").await;
     marked(&server, spec("c0ffee42"), "urn:c2pa:2").await;
-    let (url, client) = (page(&server).await, Client::new());
+    let (url, client) = (page(&server).await, client());
     let own = server.token(access::DEFAULT_PROJECT, &[Scope::Verify]).await;
     let other = server.token("other", &[Scope::Embed, Scope::Verify]).await;
     let value = VALUES[0].replace('/', "%2F");
