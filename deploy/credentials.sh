@@ -14,6 +14,7 @@ own=(--release --locked --manifest-path credentials/Cargo.toml --target-dir "$ta
 cargo build --quiet "${own[@]}"
 [ "${1:-}" != build ] || exit 0
 cargo fmt --check --manifest-path credentials/Cargo.toml
+cargo clippy --quiet "${own[@]}" --all-targets -- -D warnings
 cargo test --quiet "${own[@]}"
 
 # Without Python, or without PyPI, the second reader is left out, unless CI is set.

@@ -21,7 +21,7 @@ pub enum Error {
     Manifest(#[source] c2pa::Error),
     /// Certificate and key don't sign.
     #[error("signing with {with}: {source}")]
-    Signing { with: String, source: c2pa::Error },
+    Signing { with: String, source: Box<c2pa::Error> },
     /// Nobody can be answered.
     #[error("{0}")]
     Serve(String),

@@ -75,6 +75,9 @@ impl Certificate {
             Some(path) => format!("{} ({:?})", path.display(), self.algorithm).to_lowercase(),
             None => "a test certificate".into(),
         };
-        Error::Signing { with, source }
+        Error::Signing {
+            with,
+            source: Box::new(source),
+        }
     }
 }
