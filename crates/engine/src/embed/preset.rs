@@ -164,7 +164,6 @@ impl Preset {
             Self::Draft => Settings {
                 steps: 80,
                 extension: None,
-                enlarged: 3.0,
                 pool_views: 100,
                 balance: Some(LossWeightControl {
                     target_psnr_db: 39.4,
@@ -252,6 +251,7 @@ impl Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extract::stands_for;
 
     #[test]
     fn presets_keep_to_their_limits_and_stand_dropped_bands() {
@@ -262,6 +262,21 @@ mod tests {
             assert_eq!(
                 settings.robust_to.contains(DistortionKind::ShTruncation),
                 preset != Preset::Paper
+            );
+        }
+    }
+
+    /// Where splats are finer than a pixel, a mark of views for smaller pictures is not read in larger ones.
+    #[test]
+    fn marks_are_made_in_views_for_pictures_as_large_as_they_are_read_in() {
+        for preset in Preset::ALL.into_iter().filter(|preset| *preset != Preset::Paper) {
+            let settings = preset.settings();
+            let read = stands_for(settings.size);
+            assert!(
+                settings.enlarged >= read,
+                "{}: {} {read}",
+                preset.name(),
+                settings.enlarged
             );
         }
     }
