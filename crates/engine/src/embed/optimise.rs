@@ -347,7 +347,7 @@ mod tests {
         let scene = sample(300, 2, 3).unwrap();
         let message = Message::parse("6", 4).unwrap();
         let mut settings = Preset::Draft.settings();
-        (settings.views_per_step, settings.size) = (2, 40);
+        (settings.views_per_step, settings.size, settings.enlarged) = (2, 40, 1.0);
         let l = &mut settings.lambda;
         (l.l1, l.l2, l.ssim) = (0.8, 0.0, 0.2);
         settings.augmentation = Augmentation {

@@ -163,7 +163,13 @@ impl Preset {
             Self::Standard => standard,
             Self::Draft => Settings {
                 steps: 80,
-                extension: None,
+                // Hard scenes would be refused otherwise, and still take less than with standard.
+                extension: standard.extension.map(|extension| Extension {
+                    after: 50,
+                    below: 0.95,
+                    most: 1,
+                    ..extension
+                }),
                 pool_views: 100,
                 balance: Some(LossWeightControl {
                     target_psnr_db: 39.4,
