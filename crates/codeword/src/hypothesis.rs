@@ -30,13 +30,20 @@ pub enum PhotometricCorrection {
     /// Something that left its background neither black nor white, such as noise: what is seen of it is made white.
     WhiteBackground,
     /// Its channels were multiplied, and with them a background that had been white and tells by how much. What it can't tell,
-    /// since it was cut at white, is this: factors of red, green and blue.
+    /// since it was cut at white, is this: factors of red, green and blue. In a picture without such a background each stands
+    /// for another one ([`tint_without_ground`]).
     WhiteBalance([f32; 3]),
     /// Its tones were changed, and with them its background.
     Tone(Tone),
     /// Whatever was done to its tones, and whichever part of it shows the scene, was estimated from the picture and the
     /// key alone. The message that is claimed has no say in it, so however many were looked at, one is paid for.
     Estimated,
+}
+
+/// What a channel is taken to have been multiplied by where no background tells, for a factor of
+/// [`PhotometricCorrection::WhiteBalance`]: 0.96, 1 and 1.04 for the three that are tried, 1, 1.025 and 1.05.
+pub fn tint_without_ground(factor: f32) -> f32 {
+    1.0 + 1.6 * (factor - 1.025)
 }
 
 /// Something that was done to all pixels of a picture alike.
@@ -101,14 +108,10 @@ impl fmt::Display for Hypothesis {
     }
 }
 
-fn white_balance(beyond: [f32; 3]) -> String {
-    let mut words = "white balance undone".to_owned();
-    for (channel, factor) in ["red", "green", "blue"].into_iter().zip(beyond) {
-        if factor != 1.0 {
-            words += &format!(", {channel} x {factor:.2}");
-        }
-    }
-    words
+fn white_balance(factors: [f32; 3]) -> String {
+    let told = |factors: [f32; 3]| factors.map(|factor| format!("{factor:.2}")).join(", ");
+    let (beyond, tints) = (told(factors), told(factors.map(tint_without_ground)));
+    format!("white balance undone: red, green, blue x {beyond} beyond a white ground, x {tints} without one")
 }
 
 impl fmt::Display for Tone {

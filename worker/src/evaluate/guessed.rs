@@ -1,76 +1,71 @@
 //! What is read of a picture whose tones may have been changed, without counting matches that were searched for.
 //!
-//! A claim takes the guess at what was done under which most bits match, and counts every guess in its p-value. The share
-//! of right bits under that guess would be too good: it was searched for. So each bit is read under the guess that all
-//! *other* bits prefer; no bit has a say in how it is read.
-use guardsplat_codeword::Message;
+//! A claim takes the reading of which chance is the least likely, each paid for by its share. The share of right bits under
+//! that reading would be too good: it was searched for. So each bit is read as a claim about all *other* bits would; no bit
+//! has a say in how it is read.
+use guardsplat_codeword::{Hypothesis, Message, chance, shares};
 
-/// How much better than the picture as it is a guess must match: 1 is all bits against half of them.
-const BETTER: f64 = 0.25;
+use crate::error::Result;
 
-/// Logits of a picture, each bit under the guess that the others prefer. `guesses` has the logits of every guess, nothing
-/// done first.
-pub(super) fn cross_chosen(guesses: &[Vec<f32>], message: &Message) -> Vec<f32> {
-    let all: Vec<Agreement> = guesses.iter().map(|logits| Agreement::of(logits, message)).collect();
-    let read = message.bits().enumerate().map(|(bit, right)| {
-        let scores = guesses
-            .iter()
-            .zip(&all)
-            .map(|(logits, all)| all.without(logits[bit], right));
-        guesses[best(scores)][bit]
+/// Logits of what was read under each hypothesis, each bit under the one that a claim about the others would take.
+///
+/// # Errors
+/// Messages of more bits than claims have.
+pub(super) fn cross_chosen(read: &[(Hypothesis, Vec<f32>)], message: &Message) -> Result<Vec<f32>> {
+    let others = message.len() as u32 - 1;
+    let by_chance = match others {
+        0 => vec![1.0],
+        n => (0..=n)
+            .map(|matches| chance::tail(n, matches))
+            .collect::<Result<_, _>>()?,
+    };
+    let hypotheses: Vec<Hypothesis> = read.iter().map(|(hypothesis, _)| *hypothesis).collect();
+    let tries = shares(&hypotheses);
+    let right: Vec<Vec<bool>> = read.iter().map(|(_, logits)| right(logits, message)).collect();
+    let all: Vec<usize> = right
+        .iter()
+        .map(|bits| bits.iter().filter(|bit| **bit).count())
+        .collect();
+    let chosen = (0..message.len()).map(|bit| {
+        let p_value = |place: usize| by_chance[all[place] - usize::from(right[place][bit])] * tries[place] as f64;
+        // The first of equal ones.
+        let better = |best: usize, place: usize| if p_value(place) < p_value(best) { place } else { best };
+        read[(0..read.len()).fold(0, better)].1[bit]
     });
-    read.collect()
+    Ok(chosen.collect())
 }
 
-/// The place of the best score, where the first is preferred.
-fn best(scores: impl Iterator<Item = f64>) -> usize {
-    let (mut best, mut bar) = (0, f64::NEG_INFINITY);
-    for (index, score) in scores.enumerate() {
-        if index == 0 {
-            bar = score + BETTER;
-        } else if score > bar {
-            (best, bar) = (index, score);
-        }
-    }
-    best
-}
-
-/// Right logits less wrong ones, and all of them.
-struct Agreement {
-    signed: f64,
-    all: f64,
-}
-
-impl Agreement {
-    fn of(logits: &[f32], message: &Message) -> Self {
-        let pairs = || logits.iter().zip(message.bits());
-        Self {
-            signed: pairs().map(|(logit, right)| signed(*logit, right)).sum(),
-            all: logits.iter().map(|v| f64::from(v.abs())).sum(),
-        }
-    }
-
-    /// The share without one bit: 1 when all others are right, about 0 by chance.
-    fn without(&self, logit: f32, right: bool) -> f64 {
-        let all = self.all - f64::from(logit.abs());
-        if all > 0.0 {
-            (self.signed - signed(logit, right)) / all
-        } else {
-            0.0
-        }
-    }
-}
-
-fn signed(logit: f32, right: bool) -> f64 {
-    f64::from(if right { logit } else { -logit })
+/// Whether each bit is right; one that is undecided isn't.
+fn right(logits: &[f32], message: &Message) -> Vec<bool> {
+    let pairs = logits.iter().zip(message.bits());
+    pairs
+        .map(|(logit, bit)| if bit { *logit > 0.0 } else { *logit < 0.0 })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use guardsplat_codeword::{PhotometricCorrection, Tone};
+
     use super::*;
 
     fn message() -> Message {
         Message::parse("c0de", 16).unwrap()
+    }
+
+    /// Readings under as many hypotheses, the first as given and all others guesses.
+    fn under_guesses(readings: Vec<Vec<f32>>) -> Vec<(Hypothesis, Vec<f32>)> {
+        let guess = |i: usize| Hypothesis {
+            correction: PhotometricCorrection::Tone(Tone::Brightness(1.0 + i as f32 / 100.0)),
+            ..Hypothesis::default()
+        };
+        let hypothesis = |i: usize| if i == 0 { Hypothesis::default() } else { guess(i) };
+        let numbered = readings.into_iter().enumerate();
+        numbered.map(|(i, logits)| (hypothesis(i), logits)).collect()
+    }
+
+    fn chosen(readings: Vec<Vec<f32>>) -> Vec<f32> {
+        cross_chosen(&under_guesses(readings), &message()).unwrap()
     }
 
     /// Logits of size 1 of which the first `wrong` are wrong.
@@ -80,17 +75,36 @@ mod tests {
         right.iter().enumerate().map(wrong).collect()
     }
 
-    fn right(logits: &[f32]) -> usize {
-        let read = guardsplat_codeword::Reading::from_logits(logits).unwrap();
-        read.matches(&message()).unwrap() as usize
+    fn matches(logits: &[f32]) -> usize {
+        right(logits, &message()).into_iter().filter(|right| *right).count()
     }
 
     #[test]
     fn the_right_guess_is_found_and_nothing_done_is_preferred() {
-        let found = cross_chosen(&[logits(8), logits(7), logits(0), logits(9)], &message());
-        assert_eq!(right(&found), 16);
+        let found = chosen(vec![logits(8), logits(7), logits(0), logits(9)]);
+        assert_eq!(matches(&found), 16);
         // One bit better is no reason to believe that something was done.
-        assert_eq!(cross_chosen(&[logits(1), logits(0)], &message()), logits(1));
+        assert_eq!(chosen(vec![logits(1), logits(0)]), logits(1));
+        // Many guesses pay more than one.
+        let many = |wrong: usize| {
+            let mut readings = vec![logits(2)];
+            readings.extend(std::iter::repeat_n(logits(8), 500));
+            readings.push(logits(wrong));
+            matches(&chosen(readings))
+        };
+        assert_eq!(many(0), 14);
+        assert_eq!(matches(&chosen(vec![logits(2), logits(8), logits(0)])), 16);
+    }
+
+    #[test]
+    fn an_undecided_bit_is_no_match_and_a_message_of_one_bit_is_read_as_given() {
+        assert_eq!(
+            right(&[0.0, f32::NAN, -1.0], &Message::parse("0", 3).unwrap()),
+            [false, false, true]
+        );
+        let one = Message::parse("1", 1).unwrap();
+        let read = under_guesses(vec![vec![-1.0], vec![1.0]]);
+        assert_eq!(cross_chosen(&read, &one).unwrap(), [-1.0]);
     }
 
     #[test]
@@ -102,8 +116,8 @@ mod tests {
             let guesses: Vec<Vec<f32>> = (0..60)
                 .map(|_| (0..16).map(|_| rng.random_range(-1.0..1.0)).collect())
                 .collect();
-            crossed += right(&cross_chosen(&guesses, &message()));
-            searched += guesses.iter().map(|g| right(g)).max().unwrap();
+            searched += guesses.iter().map(|g| matches(g)).max().unwrap();
+            crossed += matches(&chosen(guesses));
         }
         let share = |matches: usize| matches as f64 / f64::from(16 * pictures);
         // 6,400 coins: a deviation is 0.006.

@@ -40,9 +40,9 @@ impl ViewReadings<'_> {
     }
 }
 
-/// Logits of pictures together, each bit under what the others prefer of all that a claim would try.
+/// Logits of pictures together, each bit under the hypothesis that a claim about the others would take.
 fn together(engine: &Engine, pictures: &[PictureLogits], message: &Message) -> Result<Vec<f32>> {
-    let read = hypotheses(engine, pictures)?;
-    let guesses: Vec<Vec<f32>> = read.into_iter().map(|(_, logits)| logits.summed).collect();
-    Ok(cross_chosen(&guesses, message))
+    let read = hypotheses(engine, pictures)?.into_iter();
+    let read: Vec<_> = read.map(|(hypothesis, logits)| (hypothesis, logits.summed)).collect();
+    cross_chosen(&read, message)
 }

@@ -220,15 +220,18 @@ mod tests {
                 kind: Kind::WhiteBalance.into(),
                 factor: 1.0,
                 red,
-                green: 1.0,
-                blue: 1.04,
+                green: 1.025,
+                blue: 1.05,
             }),
             ..reading(0, false, false)
         };
-        let readings = [reading(0, false, false), balanced(1.0), balanced(1.02)];
+        let readings = [reading(0, false, false), balanced(1.0), balanced(1.05)];
         let names: Vec<_> = checked(&readings, 64).unwrap().into_iter().map(|f| f.name).collect();
-        assert_eq!(names[1], "white balance undone, blue x 1.04");
-        assert_eq!(names[2], "white balance undone, red x 1.02, blue x 1.04");
+        let told = |beyond: &str, tints: &str| {
+            format!("white balance undone: red, green, blue x {beyond} beyond a white ground, x {tints} without one")
+        };
+        assert_eq!(names[1], told("1.00, 1.02, 1.05", "0.96, 1.00, 1.04"));
+        assert_eq!(names[2], told("1.05, 1.02, 1.05", "1.04, 1.00, 1.04"));
         assert!(checked(&[balanced(1.0), balanced(1.0)], 64).is_err() && checked(&[balanced(0.0)], 64).is_err());
         let mut brightness = brightened(0.9);
         brightness.undone.as_mut().unwrap().red = 1.0;

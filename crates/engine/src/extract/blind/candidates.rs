@@ -148,12 +148,25 @@ impl<'a> Search<'a> {
         (scores[best] > scores[0]).then_some(best)
     }
 
-    /// The best candidates, best first.
+    /// The best candidates that lie apart, best first, and last what was read first: the whole as it is, or what is within
+    /// its borders.
     pub fn best(mut self) -> Vec<Candidate> {
+        let as_it_is = self.found.first().cloned();
         self.found.sort_by(|a, b| b.score.total_cmp(&a.score));
-        self.found.dedup_by(|a, b| a.part == b.part && a.change == b.change);
-        self.found.truncate(joint::MOST);
-        self.found
+        let apart = |a: &Candidate, b: &Candidate| a.part != b.part || search::apart(&a.change, &b.change);
+        let mut best: Vec<Candidate> = Vec::with_capacity(joint::MOST);
+        for candidate in self.found {
+            if best.len() + 1 >= joint::MOST {
+                break;
+            }
+            if best.iter().all(|other| apart(other, &candidate)) {
+                best.push(candidate);
+            }
+        }
+        let known = |as_it_is: &Candidate| best.iter().any(|other| !apart(other, as_it_is));
+        let missing = as_it_is.filter(|as_it_is| !known(as_it_is));
+        best.extend(missing);
+        best
     }
 
     fn add(&mut self, part: Part, found: Vec<Read>) {

@@ -1,15 +1,58 @@
 //! Which candidates of several pictures of one scene are right: those that carry the same message.
-use super::{BlindReading, Candidate, score};
+use super::{BlindReading, Candidate, score, search};
 
 /// Most candidates of a picture that are looked at.
 pub(super) const MOST: usize = 24;
 /// How often every picture may change its mind.
 const ROUNDS: usize = 3;
+/// Pictures whose candidates are tried for all pictures, and how many of each.
+const LEADERS: (usize, usize) = (8, 6);
 
-/// The chosen candidate of each picture, `None` of one that has none. Each begins with its own best, and then takes what
-/// makes the sum over all pictures look most like a mark, whatever that says.
+/// A choice of one candidate a picture, by their places.
+struct Choice {
+    places: Vec<usize>,
+    score: f64,
+}
+
+/// The chosen candidate of each picture, `None` of one that has none.
+///
+/// The sum over all pictures is to look most like a mark, whatever that says. Pictures often share what was done to them,
+/// and one picture alone may mislead: so a choice begins with each picture's own best, and others with what comes nearest
+/// to one change in all pictures. From there each picture in turn takes what makes the sum look best.
 pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Option<&'a Candidate>> {
-    let mut places = vec![0; pictures.len()];
+    let own = climbed(pictures, vec![0; pictures.len()]);
+    let (leaders, of_each) = if pictures.len() > 1 { LEADERS } else { (0, 0) };
+    let shared = pictures
+        .iter()
+        .take(leaders)
+        .flat_map(|leader| leader.candidates.iter().take(of_each).chain(leader.candidates.last()))
+        .map(|candidate| climbed(pictures, nearest(pictures, candidate)));
+    // The first of equal ones.
+    let best = shared.fold(own, |best, now| if now.score > best.score { now } else { best });
+    pictures
+        .iter()
+        .zip(best.places)
+        .map(|(picture, place)| picture.candidates.get(place))
+        .collect()
+}
+
+/// The candidate of each picture that is nearest to one of some picture.
+fn nearest(pictures: &[&BlindReading], to: &Candidate) -> Vec<usize> {
+    let distance = |candidate: &Candidate| {
+        let part = if candidate.part == to.part { 0.0 } else { 1.0 };
+        search::distance(&candidate.change, &to.change) + part
+    };
+    let place = |picture: &&BlindReading| {
+        let distances = picture.candidates.iter().map(distance).enumerate();
+        distances
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(0, |(place, _)| place)
+    };
+    pictures.iter().map(place).collect()
+}
+
+/// From these places each picture takes what makes the sum of all look most like a mark, until none does any more.
+fn climbed(pictures: &[&BlindReading], mut places: Vec<usize>) -> Choice {
     let mut sum = vec![0.0_f32; pictures.iter().map(|picture| picture.bits).max().unwrap_or(0)];
     let add = |sum: &mut [f32], picture: usize, place: usize, sign: f32| {
         let candidate = pictures[picture].candidates.get(place);
@@ -17,7 +60,9 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
             *sum += sign * v;
         }
     };
-    (0..pictures.len()).for_each(|picture| add(&mut sum, picture, 0, 1.0));
+    // What a candidate costs by itself.
+    let cost = |candidate: &Candidate| (score::of_logits(&candidate.logits) - candidate.score) / pictures.len() as f64;
+    (0..pictures.len()).for_each(|picture| add(&mut sum, picture, places[picture], 1.0));
     let rounds = if pictures.len() > 1 { ROUNDS } else { 0 };
     for _ in 0..rounds {
         let before = places.clone();
@@ -25,8 +70,7 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
             add(&mut sum, picture, places[picture], -1.0);
             let scored = read.candidates.iter().enumerate().map(|(place, candidate)| {
                 let with: Vec<f32> = sum.iter().zip(&candidate.logits).map(|(a, b)| a + b).collect();
-                let own = (candidate.score - score::of_logits(&candidate.logits)) / pictures.len() as f64;
-                (place, score::of_logits(&with) + own)
+                (place, score::of_logits(&with) - cost(candidate))
             });
             // The first of equal ones.
             let best = scored.fold(
@@ -40,9 +84,12 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
             break;
         }
     }
-    pictures
+    let costs = pictures
         .iter()
-        .zip(places)
-        .map(|(picture, place)| picture.candidates.get(place))
-        .collect()
+        .zip(&places)
+        .filter_map(|(picture, place)| picture.candidates.get(*place));
+    Choice {
+        score: score::of_logits(&sum) - costs.map(cost).sum::<f64>(),
+        places,
+    }
 }

@@ -9,7 +9,7 @@ use crate::extract::photometric::ToneChange;
 const SMALL: f32 = 0.1;
 /// What the largest change of a coordinate must gain to be believed, in logarithms of the size of logits. The size of
 /// logits is largest a little beside the truth, and most people change one thing or nothing.
-const COST: f64 = 0.06;
+const COST: f64 = 0.2;
 /// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
 /// times reaches two to three.
 const CLEAR: f64 = 3.0;

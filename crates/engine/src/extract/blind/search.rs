@@ -110,11 +110,15 @@ pub(super) fn tried(read: &mut Reader<'_>, changes: &[ToneChange]) -> Result<Vec
     Ok(scored.collect())
 }
 
+/// How far two changes are from each other, in steps of sweeps.
+pub(super) fn distance(a: &ToneChange, b: &ToneChange) -> f32 {
+    let pairs = a.logs.iter().zip(b.logs).zip(STEPS);
+    pairs.map(|((a, b), step)| ((a - b) / step).powi(2)).sum::<f32>().sqrt()
+}
+
 /// Whether two changes are so far from each other that a refinement of one would not find the other.
 pub(super) fn apart(a: &ToneChange, b: &ToneChange) -> bool {
-    let pairs = a.logs.iter().zip(b.logs).zip(STEPS);
-    let squares: f32 = pairs.map(|((a, b), step)| ((a - b) / step).powi(2)).sum();
-    squares > APART * APART
+    distance(a, b) > APART
 }
 
 /// All that is read on the way from a start to where no step is better.

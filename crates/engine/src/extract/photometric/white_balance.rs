@@ -1,4 +1,7 @@
-//! White balance: a ground that had been white tells what was done to each channel, up to what lies beyond white.
+//! White balance: a ground that had been white tells what was done to each channel, up to what lies beyond white. Where
+//! there is none, small tints are guessed.
+use guardsplat_codeword::tint_without_ground;
+
 use super::ground;
 use crate::picture::Picture;
 
@@ -13,14 +16,16 @@ pub(super) fn all() -> impl Iterator<Item = [f32; 3]> {
     each().flat_map(move |red| each().flat_map(move |green| each().map(move |blue| [red, green, blue])))
 }
 
-/// What the channels of a picture were multiplied by, `beyond` those whose ground is white; `None` where it shows no ground
-/// that may have been white.
+/// What the channels of a picture were multiplied by, `beyond` those whose ground is white; `None` where nothing was. A
+/// picture without a ground that may have been white has a tint, which `beyond` stands for.
 pub(super) fn gains(picture: &Picture, beyond: [f32; 3]) -> Option<[f32; 3]> {
-    let ground = ground::seen(picture).filter(|ground| ground.iter().all(|v| *v >= BRIGHT))?;
-    Some(std::array::from_fn(|c| match ground::is_white(ground[c]) {
-        true => beyond[c],
-        false => ground[c],
-    }))
+    let ground = ground::seen(picture).filter(|ground| ground.iter().all(|v| *v >= BRIGHT));
+    let gains = std::array::from_fn(|c| match ground {
+        Some(ground) if ground::is_white(ground[c]) => beyond[c],
+        Some(ground) => ground[c],
+        None => tint_without_ground(beyond[c]),
+    });
+    (gains != [1.0; 3]).then_some(gains)
 }
 
 /// The picture before its channels were multiplied by these, values cut to [0, 1].
@@ -57,7 +62,7 @@ mod tests {
         let beyond = [1.05, 1.025, 1.0];
         assert_eq!(gains(&on([0.9, 0.85, 1.0]), beyond), Some([0.9, 0.85, 1.0]));
         assert_eq!(gains(&on([1.0, 1.0, 0.95]), beyond), Some([1.05, 1.025, 0.95]));
-        assert_eq!(gains(&on([0.2; 3]), beyond), None);
+        assert_eq!(gains(&on([1.0; 3]), [1.0; 3]), None);
         let scene = on([1.0; 3]);
         let tinted = Picture {
             pixels: scene
@@ -72,6 +77,26 @@ mod tests {
         let before = undone(gains(&tinted, [1.0; 3]).unwrap(), &tinted);
         for (a, b) in before.pixels.iter().zip(&scene.pixels) {
             assert!((a - b).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn without_a_ground_that_had_been_white_small_tints_are_guessed() {
+        let dark = on([0.2; 3]);
+        let near = |beyond: [f32; 3], expected: [f32; 3]| {
+            let found = gains(&dark, beyond).unwrap();
+            assert!(
+                found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6),
+                "{found:?}"
+            );
+        };
+        near([1.05, 1.025, 1.0], [1.04, 1.0, 0.96]);
+        near([1.0; 3], [0.96; 3]);
+        assert_eq!(gains(&dark, [1.025; 3]), None);
+        // Tints of 6 % either way are within 2 % of a guess.
+        for tint in [0.94, 0.97, 1.0, 1.03, 1.06] {
+            let nearest = BEYOND.map(|beyond| (tint_without_ground(beyond) / tint - 1.0).abs());
+            assert!(nearest.into_iter().fold(1.0, f32::min) < 0.022, "{tint}");
         }
     }
 }
