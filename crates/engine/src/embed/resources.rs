@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::extract::{Engine, cpu_weight_cache};
 use crate::memory::{EmbeddingWorkload, MemoryRequirements, ModelBytes, SceneSize, ViewSize, embedding_requirements};
 use crate::scene::Gaussians;
-use crate::splat::{Geometry, PreparedView, prepare};
+use crate::splat::{Geometry, PreparedView};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Predicts the most memory that an embedding with these settings has in use at once.
@@ -24,7 +24,11 @@ pub fn predict_memory(scene: SceneSize, view: ViewSize, settings: &Settings, mod
     embedding_requirements(scene, view, &work, models)
 }
 
-/// Measures one training view that stands for a picture of its own size: those of larger ones have narrower splats.
+/// Training views that are measured: views differ, and so does what they take with the size of the picture that they stand
+/// for. Fine splats hide less of what is behind.
+const MEASURED_VIEWS: u64 = 3;
+
+/// Measures some training views, which stand for pictures of their own size up to the largest.
 ///
 /// # Errors
 /// An empty scene, a failing device.
@@ -34,22 +38,46 @@ pub fn measure_view(
     settings: &Settings,
     cameras: &[Camera],
 ) -> Result<ViewSize> {
-    let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
-    let cameras = [sampler.camera(Split::Training, 0, settings.size)];
-    let (geometry, half) = (Geometry::new(gaussians), settings.half_weights);
-    let views = PooledView::of_cameras(engine, &geometry, &cameras, 1.0, half, [1.0; 3])?;
-    Ok(view_size(&views[0].view))
+    let geometry = Geometry::new(gaussians);
+    measured(gaussians, settings, cameras, |camera, times| {
+        let camera = std::slice::from_ref(camera);
+        let views = PooledView::of_cameras(engine, &geometry, camera, times, settings.half_weights, [1.0; 3])?;
+        Ok(view_size(&views[0].view))
+    })
 }
 
-/// Measures the same view as the CPU keeps it, without an engine.
+/// Measures the same views as the CPU keeps them, without an engine.
 ///
 /// # Errors
 /// An empty scene.
 pub fn measure_view_on_cpu(gaussians: &Gaussians, settings: &Settings, cameras: &[Camera]) -> Result<ViewSize> {
+    let geometry = Geometry::new(gaussians);
+    let cache = cpu_weight_cache(settings.size, settings.half_weights);
+    measured(gaussians, settings, cameras, |camera, times| {
+        Ok(view_size(&geometry.prepare_averaged(camera, times, cache)?))
+    })
+}
+
+/// The mean size of views that stand for pictures so many times as large.
+fn measured(
+    gaussians: &Gaussians,
+    settings: &Settings,
+    cameras: &[Camera],
+    size: impl Fn(&Camera, f32) -> Result<ViewSize>,
+) -> Result<ViewSize> {
     let sampler = ViewSampler::seen_from(gaussians, settings.seed, settings.viewpoints(cameras))?;
-    let camera = sampler.camera(Split::Training, 0, settings.size);
-    let cache = cpu_weight_cache(camera.width, settings.half_weights);
-    Ok(view_size(&prepare(gaussians, &camera, cache)?))
+    let mut mean = ViewSize {
+        visible: 0.0,
+        pixel: 0.0,
+    };
+    for view in 0..MEASURED_VIEWS {
+        let share = view as f32 / (MEASURED_VIEWS - 1) as f32;
+        let camera = sampler.camera(Split::Training, view, settings.size);
+        let found = size(&camera, 1.0 + share * (settings.enlarged - 1.0))?;
+        mean.visible += found.visible / MEASURED_VIEWS as f64;
+        mean.pixel += found.pixel / MEASURED_VIEWS as f64;
+    }
+    Ok(mean)
 }
 
 fn view_size(view: &PreparedView) -> ViewSize {

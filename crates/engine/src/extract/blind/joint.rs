@@ -93,3 +93,71 @@ fn climbed(pictures: &[&BlindReading], mut places: Vec<usize>) -> Choice {
         places,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::extract::blind::Part;
+    use crate::extract::photometric::ToneChange;
+
+    const BITS: usize = 32;
+
+    fn brightened(log: f32) -> ToneChange {
+        ToneChange {
+            logs: [log, log, log, 0.0, 0.0, 0.0],
+        }
+    }
+
+    fn candidate(change: ToneChange, logits: Vec<f32>) -> Candidate {
+        Candidate {
+            part: Part::Whole,
+            white: true,
+            change,
+            score: score::of_logits(&logits),
+            logits,
+        }
+    }
+
+    /// Of each picture some wrong candidates look better than the right one, which is no picture's best.
+    #[test]
+    fn what_was_done_to_all_pictures_is_found_where_each_alone_misleads() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut signs = || -> Vec<f32> { (0..BITS).map(|_| if rng.random() { 1.0 } else { -1.0 }).collect() };
+        let message = signs();
+        let pictures: Vec<BlindReading> = (0..5)
+            .map(|picture| {
+                let wrong = (1..8).map(|i| {
+                    let logits = signs().into_iter().map(|v| 1.4 * v).collect();
+                    candidate(brightened(-0.1 * i as f32 - 0.01 * picture as f32), logits)
+                });
+                let mut candidates: Vec<Candidate> = wrong.collect();
+                candidates.push(candidate(brightened(0.05), message.clone()));
+                BlindReading {
+                    bits: BITS,
+                    candidates,
+                    is_clear: false,
+                }
+            })
+            .collect();
+        let pictures: Vec<&BlindReading> = pictures.iter().collect();
+        let own = climbed(&pictures, vec![0; 5]);
+        assert!(
+            own.places.iter().any(|place| *place != 7),
+            "found without what is common"
+        );
+        assert!(chosen(&pictures).iter().all(|c| c.unwrap().change == brightened(0.05)));
+        // One alone takes its best, and none of those that have none.
+        assert_eq!(chosen(&pictures[..1])[0].unwrap(), &pictures[0].candidates[0]);
+        let none = BlindReading {
+            bits: BITS,
+            candidates: Vec::new(),
+            is_clear: false,
+        };
+        let found = chosen(&[&none, pictures[0]]);
+        assert!(found[0].is_none() && found[1].is_some());
+        assert!(chosen(&[]).is_empty());
+    }
+}
