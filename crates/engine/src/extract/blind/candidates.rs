@@ -96,8 +96,7 @@ impl<'a> Search<'a> {
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn refine(&mut self, starts: usize) -> Result<()> {
         for _ in 0..starts {
-            let apart = |a: &Candidate, b: &Candidate| a.part != b.part || search::apart(&a.change, &b.change);
-            let new = |candidate: &&Candidate| self.refined.iter().all(|start| apart(candidate, start));
+            let new = |candidate: &&Candidate| self.refined.iter().all(|start| candidate.lies_apart_from(start));
             let best = self.found.iter().filter(new).max_by(|a, b| a.score.total_cmp(&b.score));
             let Some(best) = best.cloned() else { break };
             let Some((part, small)) = self.parts.iter().find(|(part, _)| *part == best.part) else {
@@ -153,18 +152,16 @@ impl<'a> Search<'a> {
     pub fn best(mut self) -> Vec<Candidate> {
         let as_it_is = self.found.first().cloned();
         self.found.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let apart = |a: &Candidate, b: &Candidate| a.part != b.part || search::apart(&a.change, &b.change);
         let mut best: Vec<Candidate> = Vec::with_capacity(joint::MOST);
         for candidate in self.found {
             if best.len() + 1 >= joint::MOST {
                 break;
             }
-            if best.iter().all(|other| apart(other, &candidate)) {
+            if best.iter().all(|other| candidate.lies_apart_from(other)) {
                 best.push(candidate);
             }
         }
-        let known = |as_it_is: &Candidate| best.iter().any(|other| !apart(other, as_it_is));
-        let missing = as_it_is.filter(|as_it_is| !known(as_it_is));
+        let missing = as_it_is.filter(|as_it_is| best.iter().all(|other| as_it_is.lies_apart_from(other)));
         best.extend(missing);
         best
     }

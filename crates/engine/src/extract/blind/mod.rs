@@ -53,6 +53,11 @@ impl Candidate {
     pub fn logits(&self) -> &[f32] {
         &self.logits
     }
+
+    /// Whether it is of another part, or so far from another candidate that a refinement of one would not find the other.
+    fn lies_apart_from(&self, other: &Self) -> bool {
+        self.part != other.part || search::apart(&self.change, &other.change)
+    }
 }
 
 /// In words.
