@@ -12,6 +12,8 @@ const KINDS = { embed: "Marking", verify: "Verifying", createKey: "Making a key"
 const PAGE = 25;
 
 let next = "";
+/** How often it was looked. The answer to a look is dropped once there is a later one, or jobs would stand there twice. */
+let looks = 0;
 
 function act(text, does) {
     const button = element("button", { type: "button", className: "second" }, text);
@@ -81,7 +83,10 @@ function item(job) {
 
 async function page() {
     const states = STATES[by("jobs-state").value];
+    looks += 1;
+    const look = looks;
     const answer = await patiently(() => jobs.listJobs({ pageSize: PAGE, pageToken: next, states }, { timeoutMs: SOON }));
+    if (look !== looks) return;
     next = answer.nextPageToken;
     by("jobs-list").append(...answer.jobs.map(item));
     by("jobs-more").hidden = !next;
