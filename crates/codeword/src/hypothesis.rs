@@ -19,6 +19,10 @@ pub struct Hypothesis {
     pub correction: PhotometricCorrection,
     /// A part of it is read, the rest is not.
     pub window: Option<Window>,
+    /// The number of the one picture, from 1, that this was done to; each of the others is read in the way that agrees best
+    /// with it. `None` where it was done to all pictures alike. The message that is claimed has no say in what agrees, so one
+    /// reading is paid for.
+    pub leader: Option<u32>,
 }
 
 /// What may have been done to the tones of a picture.
@@ -102,8 +106,12 @@ impl fmt::Display for Hypothesis {
         }
         undone.extend(self.window.map(|window| window.to_string()));
         match undone.is_empty() {
-            true => f.write_str("as given"),
-            false => f.write_str(&undone.join(", ")),
+            true => f.write_str("as given")?,
+            false => f.write_str(&undone.join(", "))?,
+        }
+        match self.leader {
+            None => Ok(()),
+            Some(picture) => write!(f, ": picture {picture}, the others as they agree with it"),
         }
     }
 }
@@ -151,6 +159,7 @@ mod tests {
                 top: 6,
                 side: 6,
             }),
+            leader: None,
         };
         let told = "brightness x 0.81 undone, turned by 270 degrees, mirrored, without borders, 50 % of its sides from \
                     25 % right and 50 % down";
@@ -164,5 +173,10 @@ mod tests {
             Hypothesis::estimated().to_string(),
             "tones and part estimated from each picture"
         );
+        let led = Hypothesis {
+            leader: Some(2),
+            ..Hypothesis::default()
+        };
+        assert_eq!(led.to_string(), "as given: picture 2, the others as they agree with it");
     }
 }

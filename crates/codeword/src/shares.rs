@@ -1,8 +1,9 @@
 //! How the rate of false positives is shared among the readings of one suspect.
 //!
 //! Most suspects are as they were given, and what was done to others can mostly be estimated; guesses come last, and many
-//! at once. So half of the rate is for files as given, half of the rest for the estimate, and all that is left for guesses,
-//! alike. A reading with one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend
+//! at once. So half of the rate is for files as given, half of the rest for the estimate, half of what is left then for
+//! guesses about one picture that the others follow, and all that is left for guesses about all pictures, alike within a
+//! kind. A reading with one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend
 //! on what was read and not on any message, and together are no more than the rate (a weighted union bound, Holm 1979).
 use crate::hypothesis::{Hypothesis, PhotometricCorrection};
 
@@ -11,12 +12,14 @@ use crate::hypothesis::{Hypothesis, PhotometricCorrection};
 enum Kind {
     AsGiven,
     Estimated,
+    Led,
     Guessed,
 }
 
 fn kind(hypothesis: &Hypothesis) -> Kind {
     match *hypothesis {
         given if given == Hypothesis::default() => Kind::AsGiven,
+        led if led.leader.is_some() => Kind::Led,
         estimated if estimated.correction == PhotometricCorrection::Estimated => Kind::Estimated,
         _ => Kind::Guessed,
     }
@@ -26,7 +29,7 @@ fn kind(hypothesis: &Hypothesis) -> Kind {
 pub fn shares(hypotheses: &[Hypothesis]) -> Vec<u64> {
     let kinds: Vec<Kind> = hypotheses.iter().map(kind).collect();
     let count = |wanted| kinds.iter().filter(|kind| **kind == wanted).count() as u64;
-    let there = [Kind::AsGiven, Kind::Estimated, Kind::Guessed].map(|kind| (kind, count(kind)));
+    let there = [Kind::AsGiven, Kind::Estimated, Kind::Led, Kind::Guessed].map(|kind| (kind, count(kind)));
     let there: Vec<_> = there.into_iter().filter(|(_, count)| *count > 0).collect();
     let of = |wanted: Kind| {
         let place = there.iter().position(|(kind, _)| *kind == wanted).unwrap_or(0);
@@ -49,23 +52,35 @@ mod tests {
         }
     }
 
+    fn led(i: usize) -> Hypothesis {
+        Hypothesis {
+            leader: Some(1 + i as u32 % 4),
+            ..guess(i)
+        }
+    }
+
     #[test]
     fn the_whole_rate_is_shared_and_no_more() {
-        for estimates in 0..3 {
-            for guesses in [0, 1, 2, 7, 177] {
-                for given in [0, 1] {
-                    let all: Vec<_> = std::iter::repeat_n(Hypothesis::default(), given)
-                        .chain(std::iter::repeat_n(Hypothesis::estimated(), estimates))
-                        .chain((0..guesses).map(guess))
-                        .collect();
-                    let shares = shares(&all);
-                    assert_eq!(shares.len(), all.len());
-                    let sum: f64 = shares.iter().map(|&tries| 1.0 / tries as f64).sum();
-                    assert!(
-                        all.is_empty() || (sum - 1.0).abs() < 1e-9,
-                        "{given} {estimates} {guesses}: {shares:?}"
-                    );
-                }
+        let counts = [0, 1, 2, 7, 177];
+        let each = |given: usize, estimates: usize, leads: usize, guesses: usize| {
+            let all: Vec<_> = std::iter::repeat_n(Hypothesis::default(), given)
+                .chain(std::iter::repeat_n(Hypothesis::estimated(), estimates))
+                .chain((0..leads).map(led))
+                .chain((0..guesses).map(guess))
+                .collect();
+            let shares = shares(&all);
+            assert_eq!(shares.len(), all.len());
+            let sum: f64 = shares.iter().map(|&tries| 1.0 / tries as f64).sum();
+            assert!(
+                all.is_empty() || (sum - 1.0).abs() < 1e-9,
+                "{given} {estimates} {leads} {guesses}: {shares:?}"
+            );
+        };
+        for (given, estimates) in [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)] {
+            for leads in counts {
+                counts
+                    .iter()
+                    .for_each(|guesses| each(given, estimates, leads, *guesses));
             }
         }
     }
@@ -80,6 +95,10 @@ mod tests {
             [2, 4, 8, 8]
         );
         assert_eq!(shares(&[guess(1), given, guess(2)]), [4, 2, 4]);
+        assert_eq!(
+            shares(&[given, Hypothesis::estimated(), led(1), led(2), guess(1)]),
+            [2, 4, 16, 16, 8]
+        );
         assert_eq!(shares(&[guess(1), guess(2), guess(3)]), [3, 3, 3]);
     }
 }

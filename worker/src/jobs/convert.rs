@@ -209,6 +209,7 @@ pub fn framed_reading(hypothesis: Hypothesis, logits: &PooledLogits) -> api::Fra
             top_twelfths: window.top,
             side_twelfths: window.side,
         }),
+        leading_picture: hypothesis.leader.unwrap_or(0),
     }
 }
 

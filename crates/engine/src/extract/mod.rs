@@ -3,6 +3,7 @@ mod blind;
 mod engine;
 mod extractor;
 mod hypothesis;
+mod led;
 mod photometric;
 mod picture_logits;
 mod pictures;

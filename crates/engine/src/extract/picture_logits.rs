@@ -3,9 +3,10 @@ use guardsplat_codeword::Hypothesis;
 
 use super::blind::{BlindReading, Candidate, chosen};
 use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
-use super::restore::restored;
+use super::led::{self, Ways};
+use super::restore::{read_restored, restored};
 use super::window::read_windows;
-use super::{Engine, PooledLogits, without_borders};
+use super::{Engine, Extractor, PooledLogits, without_borders};
 use crate::clip::config::Tones;
 use crate::error::Result;
 use crate::picture::Picture;
@@ -39,7 +40,7 @@ impl PictureLogits {
     pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
         let restored = restored(engine, picture);
         let picture = restored.as_ref();
-        let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
+        let as_given = read_restored(engine, picture)?;
         let blind = match engine.extractor.tones() {
             Tones::Searched => None,
             Tones::Estimated => {
@@ -82,6 +83,8 @@ impl Searched {
 /// only if some picture has any, and parts if some picture is large enough: others would be the same once more. All of
 /// them together are [`searched_hypotheses`](super::searched_hypotheses).
 ///
+/// Of several pictures each in turn leads, too: what was done to it is guessed, and the others follow ([`led`]).
+///
 /// Where what was done is estimated that is the second hypothesis, and the only other one if all estimates are clear. The
 /// message has no part in that, so that only what is here has to be paid for. A picture whose estimate is clear is read so
 /// under all guesses.
@@ -117,6 +120,14 @@ pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hy
     };
     let searched = || pictures.iter().filter_map(|picture| picture.searched.as_ref());
     if searched().next().is_some() {
+        let ways: Vec<Ways<'_>> = pictures
+            .iter()
+            .zip(&estimated)
+            .map(|(picture, estimated)| picture.ways(extractor, estimated))
+            .collect();
+        for led in led::readings(&ways) {
+            readings.push(pooled(led.hypothesis, led.logits)?);
+        }
         let whole = whole_hypotheses(extractor, false).into_iter().enumerate().skip(1);
         for (place, hypothesis) in whole {
             readings.push(pooled(hypothesis, under(Searched::whole, place))?);
@@ -133,6 +144,35 @@ pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hy
         }
     }
     Ok(readings)
+}
+
+impl PictureLogits {
+    /// All ways in which it was read: as it is `estimated` only, where that is clear.
+    fn ways<'a>(&'a self, extractor: &dyn Extractor, estimated: &'a [f32]) -> Ways<'a> {
+        let estimate = (Hypothesis::estimated(), estimated);
+        let Some(searched) = &self.searched else {
+            return Ways {
+                leading: vec![estimate],
+                following: Vec::new(),
+            };
+        };
+        fn of<'a>(
+            hypotheses: Vec<Hypothesis>,
+            logits: &'a [Vec<f32>],
+        ) -> impl Iterator<Item = (Hypothesis, &'a [f32])> {
+            hypotheses.into_iter().zip(logits.iter().map(Vec::as_slice))
+        }
+        let mut leading: Vec<_> = of(whole_hypotheses(extractor, false), &searched.whole).collect();
+        leading.extend(self.blind.as_ref().map(|_| estimate));
+        let trimmed = searched.trimmed.iter();
+        leading.extend(trimmed.flat_map(|trimmed| of(whole_hypotheses(extractor, true), trimmed)));
+        let candidates = self.blind.iter().flat_map(BlindReading::candidates);
+        let parts = searched.parts.iter().flatten().map(Vec::as_slice);
+        Ways {
+            leading,
+            following: candidates.map(Candidate::logits).chain(parts).collect(),
+        }
+    }
 }
 
 impl Searched {

@@ -11,7 +11,8 @@ use guardsplat_proto::v1::{FramedReading, Undone};
 use crate::error::Result;
 use crate::service::violations::Violations;
 
-/// Most readings. Workers try some hundred and thirty tones, with borders and without, and some thirty parts.
+/// Most readings. Workers try some hundred and thirty tones, with borders and without, some thirty parts, and up to 512
+/// in which one picture leads.
 const MOST: usize = 1024;
 
 /// What was read under each hypothesis, checked against the bits of the key.
@@ -60,7 +61,14 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
                 channels(&undone).map(f32::to_bits),
             )
         });
-        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone, part)) {
+        let leader = reading.leading_picture;
+        let most = reading.views;
+        problems.check(
+            leader <= most,
+            &field("leading_picture"),
+            "must be one of the pictures that were read",
+        );
+        if !seen.insert((turns, reading.mirrored, reading.trimmed, undone, part, leader)) {
             problems.add(format!("readings[{i}]"), "is in the same framing as another one");
         }
     }
@@ -100,6 +108,7 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
             top: part.top_twelfths,
             side: part.side_twelfths,
         }),
+        leader: (reading.leading_picture > 0).then_some(reading.leading_picture),
     }
 }
 
@@ -112,6 +121,7 @@ fn channels(undone: &Undone) -> [f32; 3] {
 pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evidence::HypothesisGroup> {
     use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
+        _ if reading.leading_picture > 0 => Tone,
         _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) => Estimated,
         _ if reading.undone.is_some() => Tone,
         _ if reading.part.is_some() => Crop,
@@ -156,6 +166,7 @@ mod tests {
             logits: vec![1.0; 64],
             undone: None,
             part: None,
+            leading_picture: 0,
         }
     }
 
@@ -254,6 +265,22 @@ mod tests {
             .map(|framing| framing.variants)
             .collect();
         assert_eq!(counts, [1, 1]);
+    }
+
+    #[test]
+    fn what_one_picture_leads_is_a_framing_of_its_own() {
+        let led = |picture: u32| FramedReading {
+            leading_picture: picture,
+            views: 2,
+            ..reading(0, false, false)
+        };
+        let readings = [reading(0, false, false), led(1), led(2)];
+        let read = checked(&readings, 64).unwrap();
+        assert_eq!(read[2].name, "as given: picture 2, the others as they agree with it");
+        let groups: Vec<_> = kinds(&readings, &read).iter().map(|g| (g.kind, g.variants)).collect();
+        let (as_given, tone) = (evidence::HypothesisKind::AsGiven, evidence::HypothesisKind::Tone);
+        assert_eq!(groups, [(as_given, 1), (tone, 2)]);
+        assert!(checked(&[led(1), led(1)], 64).is_err() && checked(&[led(3)], 64).is_err());
     }
 
     #[test]

@@ -102,6 +102,11 @@ impl BlindReading {
         })
     }
 
+    /// The best candidates, best first.
+    pub fn candidates(&self) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter()
+    }
+
     /// Whether the best candidate is one that wrong ones never come near to: then what was done need not be guessed.
     pub fn is_clear(&self) -> bool {
         self.is_clear

@@ -11,6 +11,8 @@ const SHARE: f32 = 0.5;
 const CUT: f32 = 0.4;
 /// A ground is black or white when it is no further off than this.
 const CLEAN: f32 = 0.002;
+/// A ground is plain where that share of the border is no further from its colour than this: two levels of 255.
+const PLAIN: f32 = 2.5 / 255.0;
 
 /// The picture with its ground made white; `None` where its border is not of one colour, or is white or black already.
 pub(in crate::extract) fn whitened(picture: &Picture) -> Option<Picture> {
@@ -64,6 +66,14 @@ pub(in crate::extract) fn colour(picture: &Picture) -> Option<[f32; 3]> {
     let mut of_ground = border.iter().filter(|pixel| is_near(pixel, ground));
     let clean = of_ground.all(|pixel| is_clean(*pixel));
     (!clean).then_some(ground)
+}
+
+/// The colour of a ground that is plain, as no scene is; `None` where there is none, or it is white or black.
+pub(in crate::extract) fn plain(picture: &Picture) -> Option<[f32; 3]> {
+    let ground = colour(picture)?;
+    let border = border(picture);
+    let plain = border.iter().filter(|pixel| distance(pixel, ground) <= PLAIN).count();
+    (plain as f32 >= SHARE * border.len() as f32).then_some(ground)
 }
 
 /// The colour of the ground, whatever it is; `None` where the border is not of one colour.
@@ -164,6 +174,16 @@ mod tests {
         for (ground, waves) in [(0.8, 0.0), (0.96, 0.02), (0.02, 0.02)] {
             assert_eq!(whitened(&disc(ground, waves)).unwrap(), clean, "{ground} {waves}");
         }
+    }
+
+    #[test]
+    fn a_ground_is_plain_where_it_is_of_one_colour_and_no_scene() {
+        assert_eq!(plain(&disc(0.2, 0.0)), Some([0.2; 3]));
+        // What JPEG at quality 20 makes of white.
+        assert!(plain(&disc(253.0 / 255.0, 0.0)).is_some() && plain(&disc(0.5, 0.005)).is_some());
+        // A wall has a texture.
+        assert!(plain(&disc(0.5, 0.04)).is_none() && colour(&disc(0.5, 0.04)).is_some());
+        assert!(plain(&disc(1.0, 0.0)).is_none() && plain(&disc(0.0, 0.0)).is_none());
     }
 
     #[test]

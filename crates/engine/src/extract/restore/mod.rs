@@ -4,6 +4,9 @@
 //!   not white any more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers
 //!   more of a picture than the scene does.
 //! - **Plain areas with sharp edges**: covers and boxes that somebody drew.
+//! - **A plain ground**, where a picture is read as it was given. It says nothing of the scene, but covers more of a picture.
+//!   White and black add nothing to a reading; JPEG makes 253 or 254 of white at some qualities, and viewers have grey ones.
+//!   Elsewhere it is kept, for it tells what was done to its white.
 //!
 //! Nothing is guessed: the picture alone decides, so that no claim pays for it.
 mod median;
@@ -29,10 +32,20 @@ const RADIUS: [usize; 2] = [1, 7];
 /// # Errors
 /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn read_given(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
-    let restored = restored(engine, picture);
-    Ok(engine
-        .read_logits(std::slice::from_ref(restored.as_ref()))?
-        .swap_remove(0))
+    read_restored(engine, &restored(engine, picture))
+}
+
+/// Logits of a picture that was restored, as it was given.
+///
+/// # Errors
+/// Those of [`read_given`].
+pub(super) fn read_restored(engine: &Engine, restored: &Picture) -> Result<Vec<f32>> {
+    let on_white = match engine.extractor.reads_exact_colours() {
+        true => ground::plain(restored).map(|ground| ground::whitened_from(restored, ground)),
+        false => None,
+    };
+    let picture = on_white.as_ref().unwrap_or(restored);
+    Ok(engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0))
 }
 
 /// Logits of a view that the engine rendered: as [`read_given`], but for noise. A render has none, and what is taken for it
