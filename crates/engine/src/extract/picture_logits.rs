@@ -146,6 +146,11 @@ pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hy
     Ok(readings)
 }
 
+/// Hypotheses with what was read under each.
+fn read_under(hypotheses: Vec<Hypothesis>, logits: &[Vec<f32>]) -> impl Iterator<Item = (Hypothesis, &[f32])> {
+    hypotheses.into_iter().zip(logits.iter().map(Vec::as_slice))
+}
+
 impl PictureLogits {
     /// All ways in which it was read: as it is `estimated` only, where that is clear.
     fn ways<'a>(&'a self, extractor: &dyn Extractor, estimated: &'a [f32]) -> Ways<'a> {
@@ -156,16 +161,10 @@ impl PictureLogits {
                 following: Vec::new(),
             };
         };
-        fn of<'a>(
-            hypotheses: Vec<Hypothesis>,
-            logits: &'a [Vec<f32>],
-        ) -> impl Iterator<Item = (Hypothesis, &'a [f32])> {
-            hypotheses.into_iter().zip(logits.iter().map(Vec::as_slice))
-        }
-        let mut leading: Vec<_> = of(whole_hypotheses(extractor, false), &searched.whole).collect();
+        let mut leading: Vec<_> = read_under(whole_hypotheses(extractor, false), &searched.whole).collect();
         leading.extend(self.blind.as_ref().map(|_| estimate));
         let trimmed = searched.trimmed.iter();
-        leading.extend(trimmed.flat_map(|trimmed| of(whole_hypotheses(extractor, true), trimmed)));
+        leading.extend(trimmed.flat_map(|trimmed| read_under(whole_hypotheses(extractor, true), trimmed)));
         let candidates = self.blind.iter().flat_map(BlindReading::candidates);
         let parts = searched.parts.iter().flatten().map(Vec::as_slice);
         Ways {
