@@ -62,9 +62,9 @@ pub fn checked(readings: &[FramedReading], bits: u32) -> Result<Vec<HypothesisRe
             )
         });
         let leader = reading.leading_picture;
-        let most = reading.views;
+        let is_read = leader <= reading.views;
         problems.check(
-            leader <= most,
+            is_read,
             &field("leading_picture"),
             "must be one of the pictures that were read",
         );
@@ -120,13 +120,15 @@ fn channels(undone: &Undone) -> [f32; 3] {
 /// Hypotheses by kinds, for the report, with what each pays: as much as was done counts under what changes most.
 pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evidence::HypothesisGroup> {
     use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Mirrored, QuarterTurn, Tone};
+    let is_led = |reading: &FramedReading| reading.leading_picture > 0;
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
-        _ if reading.leading_picture > 0 => Tone,
-        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) => Estimated,
+        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) && !is_led(reading) => Estimated,
         _ if reading.undone.is_some() => Tone,
         _ if reading.part.is_some() => Crop,
         (true, ..) => Crop,
         (_, true, _) => Mirrored,
+        // What the other pictures agree in had something undone.
+        (_, _, 0) if is_led(reading) => Tone,
         (_, _, 0) => AsGiven,
         _ => QuarterTurn,
     };
@@ -280,6 +282,14 @@ mod tests {
         let groups: Vec<_> = kinds(&readings, &read).iter().map(|g| (g.kind, g.variants)).collect();
         let (as_given, tone) = (evidence::HypothesisKind::AsGiven, evidence::HypothesisKind::Tone);
         assert_eq!(groups, [(as_given, 1), (tone, 2)]);
+        // Of published CLIPs pictures are turned, whichever leads.
+        let turned = FramedReading {
+            leading_picture: 1,
+            ..reading(1, false, false)
+        };
+        let turned = std::slice::from_ref(&turned);
+        let groups = kinds(turned, &checked(turned, 64).unwrap());
+        assert_eq!(groups[0].kind, evidence::HypothesisKind::QuarterTurn);
         assert!(checked(&[led(1), led(1)], 64).is_err() && checked(&[led(3)], 64).is_err());
     }
 
