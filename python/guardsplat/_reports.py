@@ -86,13 +86,15 @@ class Verdict:
     verdict: str
     """``match``, ``no_match`` or ``inconclusive``."""
     p_value: float | None
-    """Probability that as many bits match by chance."""
+    """Probability that bits match as well by chance."""
     threshold: float | None
     """A match needs a p-value at or below this."""
     matched_bits: int | None
     """Bits that match."""
-    needed_bits: int | None
-    """Matches that the verdict needs."""
+    rank_sum: int | None
+    """The sum of their ranks, of bits ranked by how clearly they were read."""
+    needed_rank_sum: int | None
+    """The rank sum that a match needs."""
     bits: int
     """Bits compared."""
     views: int

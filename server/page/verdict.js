@@ -21,11 +21,15 @@ export function often(probability) {
 }
 
 function sure(result) {
-    const { verdict, pValue, threshold, matchedBits, neededBits, bits } = result;
+    const { verdict, pValue, threshold, matchedBits, rankSum, neededRankSum, bits } = result;
     const lines = [];
     if (matchedBits !== undefined) {
-        const needed = neededBits === undefined ? "" : `; ${neededBits} are needed`;
-        lines.push(`${matchedBits} of ${bits} bits agree${needed}.`);
+        lines.push(`${matchedBits} of ${bits} bits agree.`);
+    }
+    if (rankSum !== undefined) {
+        const share = (sum) => `${((200 * sum) / (bits * (bits + 1))).toFixed(1)} %`;
+        const needed = neededRankSum === undefined ? "" : `; ${share(neededRankSum)} are needed`;
+        lines.push(`Weighed by how clearly each was read, ${share(rankSum)} agree${needed}.`);
     }
     if (verdict === Verdict.MATCH && pValue !== undefined) {
         const most = result.redacted ? "at most " : "";

@@ -112,7 +112,8 @@ fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict
     for field in [
         "p_value",
         "threshold",
-        "needed_bits",
+        "rank_sum",
+        "needed_rank_sum",
         "bit_accuracy",
         "bit_accuracy_worst_view",
         "mean_abs_logit",

@@ -160,6 +160,7 @@ fn who_is_no_admin_is_told_the_verdict_and_what_it_took() {
     for hidden in [
         "p_value",
         "matched_bits",
+        "rank_sum",
         "mean_abs_logit",
         "view_agreement",
         "framing",

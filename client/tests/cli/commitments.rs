@@ -87,7 +87,7 @@ fn report(opened: &OpenedDocument, wrong: usize) -> String {
                 ..Tried::once()
             },
             views: 1,
-            decision: Some(Decision::new(64, 64, None, 1, 1e-6)),
+            decision: Some(Decision::new(64, (64, 2080), 1, 1e-6)),
             history: Some(History {
                 first_seen: now,
                 readings_of_key: 1,

@@ -24,7 +24,8 @@ fn result(verdict: Verdict) -> VerifyResult {
         result.p_value = Some(7.5e-9);
         result.threshold = Some(1e-6);
         result.matched_bits = Some(31);
-        result.needed_bits = Some(30);
+        result.rank_sum = Some(520);
+        result.needed_rank_sum = Some(494);
         result.bit_accuracy = Some(0.875);
         result.bit_accuracy_worst_view = Some(0.75);
     }
@@ -50,7 +51,10 @@ fn a_match_exits_with_0_and_tells_the_figures() {
     let json = ran.json();
     assert_eq!((&json["verdict"], &json["key"]), (&"match".into(), &KEY.into()));
     assert_eq!((&json["p_value"], &json["threshold"]), (&7.5e-9.into(), &1e-6.into()));
-    assert_eq!((&json["matched_bits"], &json["needed_bits"]), (&31.into(), &30.into()));
+    assert_eq!(
+        (&json["rank_sum"], &json["needed_rank_sum"]),
+        (&520.into(), &494.into())
+    );
     assert_eq!(
         (&json["bits"], &json["views"], &json["message"]),
         (&32.into(), &3.into(), &"c0ffee43".into())

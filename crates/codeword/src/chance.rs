@@ -1,4 +1,5 @@
-//! How likely it is that a word matches by chance: exact binomial tails, and what they ask of a match.
+//! How likely it is that so many bits of a word match by chance: exact binomial tails. Claims are decided by how clearly
+//! bits were read besides ([`signed_rank`](crate::signed_rank)); these tell what it would take if all were read alike.
 //!
 //! The embedded word is whitened by a secret uniform pad. So the matches of any fixed word of n bits with it are
 //! Binomial(n, 1/2) for whoever lacks the pad, whatever the decoder's bias or the correlation between bits. Views of one
@@ -54,7 +55,7 @@ pub(crate) fn check_rate(rate: f64) -> Result<()> {
     }
 }
 
-fn check(n: u32) -> Result<()> {
+pub(crate) fn check(n: u32) -> Result<()> {
     if (1..=MAX_BITS).contains(&n) {
         Ok(())
     } else {

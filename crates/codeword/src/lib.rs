@@ -3,7 +3,7 @@
 //! A [`Payload`] is packed into a codeword of a [`Code`]; the codeword is whitened by a secret pad ([`Whitening`]) and
 //! embedded. What is read back are logits, summed per bit over views, under each [`Hypothesis`] about what was done to a
 //! picture. A [`Claim`] compares the words that they decide for with whitened words, and asks the [`AcceptanceRule`] whether
-//! chance explains so many matches: error correction reads the payload and never decides. [`Index`] finds the nearest of many registered words.
+//! chance explains so many matches of bits read so clearly: error correction reads the payload and never decides. [`Index`] finds the nearest of many registered words.
 //!
 //! Nothing here needs tensors, threads or files, so that server, worker and client all use the same code.
 mod acceptance;
@@ -18,6 +18,7 @@ mod message;
 mod reading;
 mod search;
 mod shares;
+pub mod signed_rank;
 mod whiten;
 
 /// The code that assets are marked with: 2 bits of version, 10 of the key and 24 of the payload number in 64.

@@ -1,17 +1,21 @@
-//! The word that logits decide for, once, and the bits that they leave undecided.
+//! The word that logits decide for, once, with how clearly each bit was read.
 use crate::error::{Error, Result};
 use crate::message::{LIMBS, Message, MessageLength};
+use crate::signed_rank::{self, Ranks};
 
 /// A word that was read.
 ///
 /// A bit is 1 where its logit is above 0, and 0 where it is below, infinities included. A logit of exactly 0, of either
 /// sign, and NaN leave a bit *undecided*: it matches no target. That only ever lowers the number of matches, so that
-/// p-values stay true; guessing such bits would let a reader that read nothing match half of them.
+/// p-values stay true; guessing such bits would let a reader that read nothing match half of them. Bits are ranked by the
+/// size of their logits ([`signed_rank`]), undecided ones lowest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     word: Message,
     /// Ones where a bit was decided.
     decided: Message,
+    /// How clearly each bit was read: 1 for the least clear.
+    ranks: Ranks,
 }
 
 impl Reading {
@@ -26,14 +30,22 @@ impl Reading {
             word.set(position as u32, logit > 0.0);
             decided.set(position as u32, logit.abs() > 0.0); // false for NaN
         }
-        Ok(Self { word, decided })
+        Ok(Self {
+            word,
+            decided,
+            ranks: signed_rank::ranks(logits),
+        })
     }
 
-    /// A reading that decided every bit.
+    /// A reading that decided every bit, later ones more clearly.
     pub fn of(word: Message) -> Self {
         let mut decided = Message::zeros(word.length());
         (0..word.length().bits()).for_each(|position| decided.set(position, true));
-        Self { word, decided }
+        Self {
+            word,
+            decided,
+            ranks: signed_rank::ranks(&vec![1.0; word.len()]),
+        }
     }
 
     /// The bits read; undecided ones are 0.
@@ -61,6 +73,24 @@ impl Reading {
         Ok(self.decided_bits() - differ)
     }
 
+    /// The sum of the ranks of the decided bits that equal those of `target`.
+    ///
+    /// # Errors
+    /// [`Error::OtherLength`] for a target of another length.
+    pub fn rank_sum(&self, target: &Message) -> Result<u32> {
+        self.word.require("the target", target)?;
+        let same = self.word.bits().zip(target.bits()).zip(self.decided.bits());
+        let same = same
+            .zip(self.ranks)
+            .filter(|(((read, wanted), decided), _)| *decided && read == wanted);
+        Ok(same.map(|(_, rank)| u32::from(rank)).sum())
+    }
+
+    /// The rank sum of a target that equals all decided bits: none has more.
+    pub fn largest_rank_sum(&self) -> u32 {
+        signed_rank::largest(self.word.length().bits()) - signed_rank::largest(self.undecided_bits())
+    }
+
     /// [`Reading::matches`] as a share of all bits.
     ///
     /// # Errors
@@ -80,6 +110,11 @@ impl Reading {
     /// The word and the mask of its decided bits.
     pub(crate) fn limbs(&self) -> (&[u64; LIMBS], &[u64; LIMBS]) {
         (self.word.limbs(), self.decided.limbs())
+    }
+
+    /// The ranks of the bits of the word's limbs, in their order: the least significant bit of the first limb first.
+    pub(crate) fn ranks_of_limbs(&self) -> impl Iterator<Item = u8> {
+        self.ranks[..self.word.len()].iter().rev().copied()
     }
 
     /// Fails unless the reading has `length`; `what` names it in the message.
@@ -138,6 +173,11 @@ mod tests {
             let expected = pairs.iter().filter(|&&(logit, bit)| if bit { logit > 0.0 } else { logit < 0.0 }).count();
             prop_assert_eq!(reading.matches(&target).unwrap() as usize, expected);
             prop_assert_eq!(Reading::of(target).matches(&target).unwrap(), target.length().bits());
+            let ranks = signed_rank::ranks(&logits);
+            let right = |place: &usize| if bits[*place] { logits[*place] > 0.0 } else { logits[*place] < 0.0 };
+            let sum: u32 = (0..bits.len()).filter(right).map(|place| u32::from(ranks[place])).sum();
+            prop_assert_eq!(reading.rank_sum(&target).unwrap(), sum);
+            prop_assert_eq!(reading.rank_sum(&reading.message()).unwrap(), reading.largest_rank_sum());
         }
     }
 }

@@ -18,7 +18,7 @@ fn holds(counts: [u64; 6]) -> bool {
 fn one_test_a_claim_is_calibrated() {
     let counts = run(Method::OneTest, CLAIMS, 1);
     assert!(holds(counts), "{counts:?}");
-    // Not merely below: as often as the binomial tail says, within 5 standard deviations.
+    // Not merely below: as often as the exact tail says, within 5 standard deviations.
     for (k, count) in (1..).zip(counts) {
         let expected = CLAIMS as f64 * attainable(k);
         let off = (count as f64 - expected).abs();

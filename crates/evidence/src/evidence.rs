@@ -9,13 +9,15 @@ use serde::{Deserialize, Serialize};
 /// What every report says of itself.
 pub const SCHEMA: &str = "guardsplat.evidence";
 /// The version of the fields below, which new reports have. Those of version 1 are read as well; they name neither the
-/// worker nor what was tried before; those of version 2 share the rate alike among readings. Any other is refused, never
-/// guessed at.
-pub const VERSION: u32 = 3;
+/// worker nor what was tried before; those of version 2 share the rate alike among readings; those of version 3 count bits
+/// alike, however clearly they were read. Any other is refused, never guessed at.
+pub const VERSION: u32 = 4;
 /// The oldest version that is read.
 pub(crate) const FIRST_VERSION: u32 = 1;
 /// The last version in which all readings had the same part of the rate.
 pub(crate) const ALIKE_VERSION: u32 = 2;
+/// The last version in which matches were counted, without ranks.
+pub(crate) const COUNTED_VERSION: u32 = 3;
 
 /// Everything that a report says. The order of fields is the order of the JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

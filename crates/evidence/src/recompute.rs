@@ -1,8 +1,8 @@
 //! What of a report follows from other parts of it, computed again.
 use crate::evidence::Evidence;
 use crate::picture::{Picture, View};
-use crate::verification::{Decision, Reason, Verification};
-use guardsplat_codeword::{Verdict, chance};
+use crate::verification::{Reason, Test, Verification};
+use guardsplat_codeword::{Message, Reading, Verdict, chance};
 use std::fmt::Debug;
 
 /// One thing that was computed again.
@@ -43,13 +43,7 @@ impl Verification {
             true,
             self.tried.rate_given() <= 1.0 + 1e-9,
         ));
-        let fresh = Decision::new(
-            decision.bits,
-            decision.matched,
-            decision.corrected,
-            decision.hypotheses,
-            decision.threshold,
-        );
+        let fresh = decision.clone().computed();
         findings.push(Finding::number(
             "p-value of one hypothesis",
             decision.p_single,
@@ -58,7 +52,11 @@ impl Verification {
         // From what is stated, since one wrong number is one finding.
         let p_value = chance::any_of(decision.p_single, decision.hypotheses);
         findings.push(Finding::number("p-value", decision.p_value, p_value));
-        findings.push(Finding::of("needed bits", decision.needed, fresh.needed));
+        let needed = match decision.test() {
+            Test::SignedRank(_) => "needed rank sum",
+            Test::Counted => "needed bits",
+        };
+        findings.push(Finding::of(needed, decision.needed, fresh.needed));
         // To decide nothing is always allowed, with a reason that no number contradicts.
         let cautious = !matches!(self.reason, None | Some(Reason::TooFewBits | Reason::TooManyHypotheses));
         let verdict = if cautious { self.verdict } else { decision.verdict() };
@@ -78,6 +76,19 @@ impl Verification {
             let matched = same.iter().filter(|same| **same).count();
             findings.push(Finding::of("matches of the strip", decision.matched as usize, matched));
         }
+        if let (Some(stated), Some(recomputed)) = (decision.rank_sum, self.rank_sum_of_strip()) {
+            findings.push(Finding::of("rank sum of the strip", stated, recomputed));
+        }
+    }
+
+    /// The rank sum that the strip shows; `None` where it does not have all logits, or no bits that were wanted.
+    fn rank_sum_of_strip(&self) -> Option<u32> {
+        self.strip.iter().find(|bit| bit.wanted.is_some())?;
+        let logits: Option<Vec<f32>> = self.strip.iter().map(|bit| Some(bit.logit? as f32)).collect();
+        // A bit that was undecided has no wanted one, and matches nothing whatever it is.
+        let wanted: Vec<bool> = self.strip.iter().map(|bit| bit.wanted.unwrap_or(bit.read)).collect();
+        let reading = Reading::from_logits(&logits?).ok()?;
+        reading.rank_sum(&Message::from_bits(&wanted).ok()?).ok()
     }
 }
 

@@ -64,6 +64,8 @@ pub enum HypothesisKind {
     /// What was done to tones, and which part shows the scene, estimated from the picture and the key alone. Not before
     /// version 3.
     Estimated,
+    /// What was done to one of several pictures, the others as they agree with it. Not before version 4.
+    Led,
 }
 
 impl Tried {

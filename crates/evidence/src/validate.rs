@@ -3,12 +3,12 @@
 //! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
 use crate::embedding::Embedding;
 use crate::error::{Error, Result};
-use crate::evidence::{ALIKE_VERSION, Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
+use crate::evidence::{ALIKE_VERSION, COUNTED_VERSION, Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
 use crate::history::History;
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
 use crate::tried::{HypothesisKind, Tried};
-use crate::verification::{Decision, Reason, Verification};
-use guardsplat_codeword::Verdict;
+use crate::verification::{Decision, Reason, Test, Verification};
+use guardsplat_codeword::{Verdict, signed_rank};
 
 impl Evidence {
     /// Whether everything is in range; see [`Evidence::to_json`].
@@ -49,6 +49,7 @@ impl Evidence {
             }
         }
         self.validate_version()?;
+        self.validate_ranks()?;
         let mut tried = self.verification.iter().map(|found| &found.tried);
         tried.try_for_each(|tried| self.validate_shares(tried))?;
         self.verification.iter().try_for_each(Verification::validate)?;
@@ -92,6 +93,17 @@ impl Evidence {
         }
     }
 
+    /// Whether it has the rank sum that it was decided by, since version 4.
+    fn validate_ranks(&self) -> Result<()> {
+        let decision = self.verification.as_ref().and_then(|found| found.decision.as_ref());
+        let reason = match decision.map(|decision| (decision.test(), self.version > COUNTED_VERSION)) {
+            Some((Test::SignedRank(_), false)) => "bits are ranked since version 4",
+            Some((Test::Counted, true)) => "a decision has it since version 4",
+            _ => return Ok(()),
+        };
+        Err(Error::field("verification.decision.rank_sum", reason))
+    }
+
     /// Whether it says what each reading paid for, since version 3, where not all pay alike.
     fn validate_shares(&self, tried: &Tried) -> Result<()> {
         let field = || "verification.tried.framings".to_owned();
@@ -103,6 +115,9 @@ impl Evidence {
                 (Some(_), true) => "what was pooled has no part of the rate",
                 (None, false) if shared => "each reading has a part of the rate since version 3",
                 _ if group.kind == HypothesisKind::Estimated && !shared => "an estimate is told since version 3",
+                _ if group.kind == HypothesisKind::Led && self.version <= COUNTED_VERSION => {
+                    "that one picture leads is told since version 4"
+                }
                 _ => continue,
             };
             return Err(Error::field(field(), reason));
@@ -209,11 +224,19 @@ impl Decision {
         let counts = [
             ("matched", Some(self.matched)),
             ("corrected", self.corrected),
-            ("needed", self.needed),
+            ("needed", self.needed.filter(|_| self.test() == Test::Counted)),
         ];
         for (name, number) in counts {
             if number.is_some_and(|n| n > self.bits) {
                 return Err(Error::field(field(name), format!("there are {} bits only", self.bits)));
+            }
+        }
+        let largest = signed_rank::largest(self.bits);
+        let sums = [("rank_sum", self.rank_sum), ("needed", self.needed)];
+        for (name, number) in sums {
+            if number.is_some_and(|n| n > largest) {
+                let reason = format!("the ranks of {} bits add up to {largest} only", self.bits);
+                return Err(Error::field(field(name), reason));
             }
         }
         if self.hypotheses == 0 {

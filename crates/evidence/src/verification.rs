@@ -1,7 +1,7 @@
 //! What a reading found: the verdict, the numbers behind it, and whose message it is.
 use crate::history::History;
 use crate::tried::Tried;
-use guardsplat_codeword::{AcceptanceRule, Verdict, chance};
+use guardsplat_codeword::{AcceptanceRule, Verdict, chance, signed_rank};
 use serde::{Deserialize, Serialize};
 
 /// The outcome of reading a suspect, or of reading back what was just marked.
@@ -49,7 +49,8 @@ pub enum Reason {
 }
 
 /// The numbers behind a verdict. Null hypothesis: the suspect is independent of the secret, uniform pad that the message
-/// was whitened with, so that matches are Binomial(bits, 1/2).
+/// was whitened with, so that each bit matches as a thrown coin would, however clearly it was read. The test is Wilcoxon's
+/// signed-rank test ([`signed_rank`]); before version 4 of reports matches were counted, and are Binomial(bits, 1/2).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
@@ -57,42 +58,76 @@ pub struct Decision {
     pub bits: u32,
     /// Bits that match.
     pub matched: u32,
+    /// The sum of their ranks, of all bits ranked from 1 by the size of their logits; absent before version 4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rank_sum: Option<u32>,
     /// Bits that the error-correcting code set right when the message was read; never part of the decision.
     pub corrected: Option<u32>,
     /// Hypotheses that were tried, at least 1.
     pub hypotheses: u64,
-    /// P(Binomial(bits, 1/2) ≥ matched), 0 to 1: before the correction for several hypotheses.
+    /// The probability that chance reaches such a rank sum, 0 to 1: before the correction for several hypotheses. Before
+    /// version 4 P(Binomial(bits, 1/2) ≥ matched).
     pub p_single: f64,
     /// The same after it: times `hypotheses`, at most 1.
     pub p_value: f64,
     /// A match needs a `p_value` at or below this rate of false positives, 0 to 1.
     pub threshold: f64,
-    /// Matches that this needs; absent when even all bits would not do.
+    /// The rank sum that this needs, before version 4 the matches; absent when even all bits would not do.
     pub needed: Option<u32>,
 }
 
+/// How a report's decision came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Test {
+    /// By the sum of the ranks of the bits that match.
+    SignedRank(u32),
+    /// By their number: before version 4.
+    Counted,
+}
+
 impl Decision {
-    /// The numbers that follow from `matched` of `bits` after so many hypotheses; of impossible ones, that nothing is
-    /// shown.
-    pub fn new(bits: u32, matched: u32, corrected: Option<u32>, hypotheses: u64, threshold: f64) -> Self {
-        let p_single = chance::tail(bits, matched).unwrap_or(1.0);
-        let rule = AcceptanceRule {
-            false_positive_rate: threshold,
-            hypotheses,
-        };
+    /// The numbers that follow from `matched` of `bits` with the sum of their ranks, after so many hypotheses; of impossible
+    /// ones, that nothing is shown.
+    pub fn new(bits: u32, (matched, rank_sum): (u32, u32), hypotheses: u64, threshold: f64) -> Self {
         Self {
             bits,
             matched,
-            corrected,
+            rank_sum: Some(rank_sum),
+            corrected: None,
             hypotheses,
-            p_single,
-            p_value: rule.p_value(bits, matched).unwrap_or(1.0),
+            p_single: 1.0,
+            p_value: 1.0,
             threshold,
-            needed: rule.least_matches(bits).unwrap_or(None),
+            needed: None,
+        }
+        .computed()
+    }
+
+    /// This with all numbers that follow from others computed, as its version does it.
+    pub(crate) fn computed(self) -> Self {
+        let rule = AcceptanceRule {
+            false_positive_rate: self.threshold,
+            hypotheses: self.hypotheses,
+        };
+        let (p_single, needed) = match self.test() {
+            Test::SignedRank(sum) => (signed_rank::tail(self.bits, sum), rule.least_rank_sum(self.bits)),
+            Test::Counted => (chance::tail(self.bits, self.matched), rule.least_matches(self.bits)),
+        };
+        let p_single = p_single.unwrap_or(1.0);
+        Self {
+            p_single,
+            p_value: chance::any_of(p_single, self.hypotheses),
+            needed: needed.unwrap_or(None),
+            ..self
         }
     }
 
-    /// What follows from these numbers: [`Verdict::Inconclusive`] where no number of matches would do.
+    /// How it was decided.
+    pub(crate) fn test(&self) -> Test {
+        self.rank_sum.map_or(Test::Counted, Test::SignedRank)
+    }
+
+    /// What follows from these numbers: [`Verdict::Inconclusive`] where not even all bits would do.
     pub fn verdict(&self) -> Verdict {
         match self.needed {
             None => Verdict::Inconclusive,

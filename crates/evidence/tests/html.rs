@@ -133,25 +133,26 @@ fn the_verdict_comes_first_and_says_how_sure_it_is() {
         verdict.contains("Owner Atelier Morgenrot, asset Garden statue, payload c0ffee42c0ffee42."),
         "{verdict}"
     );
-    // P(Bin(64, 1/2) ≥ 62) = 2081/2⁶⁴ = 1.128e-16, half of the rate, times 10 assets: 2.26e-15.
+    // The two that differ are the least clear, so 5 words of 2⁶⁴ are as good (no bit, 1, 2, 3 or 1 and 2 wrong): 2.71e-19,
+    // half of the rate, times 10 assets: 5.42e-18.
     assert!(
         verdict.contains("62 of 64 bits agree, read from 20 views."),
         "{verdict}"
     );
     assert!(
-        verdict.contains("less than one in a hundred trillion would agree"),
+        verdict.contains("less than one in a hundred quadrillion would agree"),
         "{verdict}"
     );
     let readings = text(&found, ".reading");
     assert!(
-        readings.contains("less than one in a hundred trillion cases, with all 20 attempts"),
+        readings.contains("less than one in a hundred quadrillion cases, with all 20 attempts"),
         "{readings}"
     );
-    assert!(readings.contains("X ~ Binomial(64, ½)"), "{readings}");
+    assert!(readings.contains("T = 2,077 of 2,080"), "{readings}");
     assert!(readings.contains("pad is secret and uniform"), "{readings}");
-    assert!(readings.contains("p = 2.26 · 10−15"), "{readings}");
+    assert!(readings.contains("p = 5.42 · 10−18"), "{readings}");
     let numbers = text(&found, "table.facts");
-    assert!(numbers.contains("Threshold in bits54 of 64"), "{numbers}");
+    assert!(numbers.contains("Threshold as a rank sum1,788 after"), "{numbers}");
     assert!(text(&found, "section p").contains("2 × 10 × 1 = 20 hypotheses"));
     assert_eq!(all(&found, "rect.cell").len(), 64);
     assert_eq!(all(&found, "rect.differs").len(), 2);

@@ -3,6 +3,7 @@
 #[path = "../examples/samples/mod.rs"]
 mod samples;
 
+use guardsplat_codeword::chance;
 use guardsplat_evidence::{
     Answer, Decision, Error, Evidence, HypothesisGroup, HypothesisKind, Signed, check, limits, sign,
 };
@@ -46,7 +47,7 @@ fn the_order_of_fields_is_fixed() {
     let json = samples::matching().to_json().unwrap();
     assert!(
         json.starts_with(
-            "{\"schema\":\"guardsplat.evidence\",\"version\":3,\"audience\":\"owner\",\"kind\":\"verify\""
+            "{\"schema\":\"guardsplat.evidence\",\"version\":4,\"audience\":\"owner\",\"kind\":\"verify\""
         )
     );
     let place = |field: &str| json.rfind(&format!("\"{field}\":")).unwrap();
@@ -113,14 +114,14 @@ proptest! {
 #[test]
 fn another_version_is_named_before_its_fields_are_looked_at() {
     let json = samples::matching().to_json().unwrap();
-    let newer = json.replace("\"version\":3,", "\"version\":4,\"something\":{\"new\":[1,2]},");
+    let newer = json.replace("\"version\":4,", "\"version\":5,\"something\":{\"new\":[1,2]},");
     let error = Evidence::from_json(newer.as_bytes()).unwrap_err();
-    assert!(matches!(error, Error::UnknownVersion { found: 4, known: 3 }), "{error}");
-    assert!(error.to_string().contains("version 4"), "{error}");
+    assert!(matches!(error, Error::UnknownVersion { found: 5, known: 4 }), "{error}");
+    assert!(error.to_string().contains("version 5"), "{error}");
     let signed = sign(&samples::matching(), &samples::key())
         .unwrap()
         .json
-        .replace("\"version\":3", "\"version\":7");
+        .replace("\"version\":4", "\"version\":7");
     let error = Evidence::from_json(signed.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 7, .. }), "{error}");
 }
@@ -225,6 +226,31 @@ const REPORTS: [(&str, &[u8]); 5] = [
     ("page", include_bytes!("reports_of_before/match-stranger.html")),
 ];
 
+/// Signed by version 3.
+const COUNTED: [(&str, &[u8]); 2] = [
+    ("match", include_bytes!("reports_of_before/match-version-3.json")),
+    ("no match", include_bytes!("reports_of_before/no-match-version-3.json")),
+];
+
+#[test]
+fn what_was_signed_when_bits_were_counted_is_genuine_still() {
+    for (name, document) in COUNTED {
+        let checked = check(document, &samples::key().verifying_key());
+        assert!(
+            matches!(checked.answer, Answer::Genuine) && checked.holds(),
+            "{name}: {:#?}",
+            checked.findings
+        );
+        let mut evidence = checked.evidence.unwrap();
+        assert_eq!(
+            (evidence.version, decision(&mut evidence).rank_sum),
+            (3, None),
+            "{name}"
+        );
+        assert!(evidence.to_html().unwrap().contains("Threshold in bits"), "{name}");
+    }
+}
+
 #[test]
 fn what_was_signed_before_is_genuine_still() {
     for (name, document) in REPORTS {
@@ -242,6 +268,19 @@ fn what_was_signed_before_is_genuine_still() {
     }
 }
 
+/// Makes it a decision of before version 4: by the number of the 62 of 64 bits that match.
+fn count_matches(decision: &mut Decision, hypotheses: u64) {
+    let p_single = chance::tail(64, 62).unwrap();
+    *decision = Decision {
+        rank_sum: None,
+        hypotheses,
+        p_single,
+        p_value: p_single * hypotheses as f64,
+        needed: chance::least_matches(64, decision.threshold, hypotheses).unwrap(),
+        ..decision.clone()
+    };
+}
+
 /// A report as version 2 had it: five readings that pay alike for ten assets.
 fn of_version_2() -> Evidence {
     let mut evidence = samples::matching();
@@ -251,7 +290,7 @@ fn of_version_2() -> Evidence {
     framings.retain(|group| group.kind != HypothesisKind::Estimated);
     framings.iter_mut().for_each(|group| group.tries = None);
     let decision = verification.decision.as_mut().unwrap();
-    *decision = Decision::new(64, 62, Some(2), 5 * 10, decision.threshold);
+    count_matches(decision, 5 * 10);
     evidence
 }
 
@@ -275,6 +314,26 @@ fn readings_of_version_2_pay_alike() {
     assert!(refused(|group| group.tries = None, &samples::matching()));
     assert!(refused(|group| group.tries = Some(0), &samples::matching()));
     assert!(refused(|group| group.pooled = true, &samples::matching()));
+}
+
+#[test]
+fn ranks_and_leading_pictures_are_of_version_4() {
+    let refused = |version: u32, evidence: &Evidence| {
+        let evidence = Evidence {
+            version,
+            ..evidence.clone()
+        };
+        match evidence.to_json() {
+            Err(Error::BadField { field, .. }) => field,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(3, &samples::matching()), "verification.decision.rank_sum");
+    let counted = check(COUNTED[0].1, &samples::key().verifying_key()).evidence.unwrap();
+    assert_eq!(refused(4, &counted), "verification.decision.rank_sum");
+    let mut led = counted;
+    led.verification.as_mut().unwrap().tried.framings[1].kind = HypothesisKind::Led;
+    assert_eq!(refused(3, &led), "verification.tried.framings");
 }
 
 #[test]

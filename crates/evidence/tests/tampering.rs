@@ -231,7 +231,7 @@ fn numbers_that_do_not_follow_are_found_even_when_they_were_signed() {
         ("p-value", |d| d.p_value *= 1.0 + 1e-6),
         ("p-value of one hypothesis", |d| d.p_single *= 2.0),
         ("hypotheses", |d| d.hypotheses = 1),
-        ("needed bits", |d| d.needed = Some(50)),
+        ("needed rank sum", |d| d.needed = Some(50)),
         ("verdict", |d| d.threshold = 1e-20),
     ];
     for (what, change) in changes {
@@ -250,6 +250,12 @@ fn numbers_that_do_not_follow_are_found_even_when_they_were_signed() {
     evidence.verification.as_mut().unwrap().strip[0].read ^= true;
     let wrong = |e: &guardsplat_evidence::Evidence| e.recompute().into_iter().find(|f| !f.agrees).map(|f| f.what);
     assert_eq!(wrong(&evidence).as_deref(), Some("matches of the strip"));
+    let mut evidence = samples::matching();
+    let strip = &mut evidence.verification.as_mut().unwrap().strip;
+    strip
+        .iter_mut()
+        .for_each(|bit| bit.logit = bit.logit.map(|logit| 1.0 / logit));
+    assert_eq!(wrong(&evidence).as_deref(), Some("rank sum of the strip"));
     let mut evidence = samples::matching();
     evidence.views[0].difference = evidence.views[1].difference.clone();
     assert_eq!(wrong(&evidence).as_deref(), Some("difference of View 1"));

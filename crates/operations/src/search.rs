@@ -56,7 +56,7 @@ fn nearest(engine: &Engine, reading: &PooledLogits, messages: &[Message], tries:
     let mut best: Option<Nearest> = None;
     for (index, message) in messages.iter().enumerate() {
         let comparison = reading.compare(message, &rule)?;
-        let nearer = |best: &Nearest| comparison.decision.matched_bits > best.comparison.decision.matched_bits;
+        let nearer = |best: &Nearest| comparison.decision.rank_sum > best.comparison.decision.rank_sum;
         if best.as_ref().is_none_or(nearer) {
             best = Some(Nearest { index, comparison });
         }

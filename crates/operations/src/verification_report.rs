@@ -15,14 +15,16 @@ const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compar
 pub struct VerificationReport {
     /// Whether the message is there.
     pub verdict: Verdict,
-    /// Probability that as many bits match by chance.
+    /// Probability that bits match as well by chance.
     pub p_value: Option<f64>,
     /// A match needs a p-value at or below this.
     pub threshold: Option<f64>,
     /// Bits that match.
     pub matched_bits: Option<u32>,
-    /// Matches that the verdict needs.
-    pub needed_bits: Option<u32>,
+    /// The sum of their ranks, of bits ranked by how clearly they were read.
+    pub rank_sum: Option<u32>,
+    /// The rank sum that a match needs.
+    pub needed_rank_sum: Option<u32>,
     /// Bits compared.
     pub bits: usize,
     /// Views or pictures read.
@@ -74,7 +76,8 @@ impl VerificationReport {
             p_value: decision.map(|d| d.p_value),
             threshold: decision.map(|d| d.threshold),
             matched_bits: decision.map(|d| d.matched_bits),
-            needed_bits: decision.and_then(|d| d.needed_bits),
+            rank_sum: decision.map(|d| d.rank_sum),
+            needed_rank_sum: decision.and_then(|d| d.needed_rank_sum),
             bits: reading.summed.len(),
             views: reading.views.len(),
             message: reading.message().to_string(),

@@ -7,12 +7,13 @@ use serde_json::Value;
 use crate::{EMBED, KEY, MISSED, environment, offline};
 
 /// Fields of a verdict that have to be the same, whoever computes it.
-const VERDICT: [&str; 9] = [
+const VERDICT: [&str; 10] = [
     "verdict",
     "p_value",
     "threshold",
     "matched_bits",
-    "needed_bits",
+    "rank_sum",
+    "needed_rank_sum",
     "bits",
     "views",
     "message",

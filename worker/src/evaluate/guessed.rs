@@ -3,7 +3,7 @@
 //! A claim takes the reading of which chance is the least likely, each paid for by its share. The share of right bits under
 //! that reading would be too good: it was searched for. So each bit is read as a claim about all *other* bits would; no bit
 //! has a say in how it is read.
-use guardsplat_codeword::{Hypothesis, Message, chance, shares};
+use guardsplat_codeword::{Hypothesis, Message, Reading, shares, signed_rank};
 
 use crate::error::Result;
 
@@ -12,35 +12,32 @@ use crate::error::Result;
 /// # Errors
 /// Messages of more bits than claims have.
 pub(super) fn cross_chosen(read: &[(Hypothesis, Vec<f32>)], message: &Message) -> Result<Vec<f32>> {
-    let others = message.len() as u32 - 1;
-    let by_chance = match others {
-        0 => vec![1.0],
-        n => (0..=n)
-            .map(|matches| chance::tail(n, matches))
-            .collect::<Result<_, _>>()?,
-    };
     let hypotheses: Vec<Hypothesis> = read.iter().map(|(hypothesis, _)| *hypothesis).collect();
     let tries = shares(&hypotheses);
-    let right: Vec<Vec<bool>> = read.iter().map(|(_, logits)| right(logits, message)).collect();
-    let all: Vec<usize> = right
-        .iter()
-        .map(|bits| bits.iter().filter(|bit| **bit).count())
-        .collect();
-    let chosen = (0..message.len()).map(|bit| {
-        let p_value = |place: usize| by_chance[all[place] - usize::from(right[place][bit])] * tries[place] as f64;
+    let each = (0..message.len()).map(|bit| {
+        let p_values = read.iter().zip(&tries).map(|((_, logits), tries)| {
+            let p_value = p_value_without(bit, logits, message)?;
+            Ok(p_value * *tries as f64)
+        });
+        let p_values = p_values.collect::<Result<Vec<f64>>>()?;
         // The first of equal ones.
-        let better = |best: usize, place: usize| if p_value(place) < p_value(best) { place } else { best };
-        read[(0..read.len()).fold(0, better)].1[bit]
+        let better = |best: usize, place: usize| if p_values[place] < p_values[best] { place } else { best };
+        Ok(read[(0..read.len()).fold(0, better)].1[bit])
     });
-    Ok(chosen.collect())
+    each.collect()
 }
 
-/// Whether each bit is right; one that is undecided isn't.
-fn right(logits: &[f32], message: &Message) -> Vec<bool> {
-    let pairs = logits.iter().zip(message.bits());
-    pairs
-        .map(|(logit, bit)| if bit { *logit > 0.0 } else { *logit < 0.0 })
-        .collect()
+/// The p-value of a claim about all bits but one; 1 where there are no others.
+fn p_value_without(bit: usize, logits: &[f32], message: &Message) -> Result<f64> {
+    let mut others = logits.to_vec();
+    others.remove(bit);
+    if others.is_empty() {
+        return Ok(1.0);
+    }
+    let mut bits: Vec<bool> = message.bits().collect();
+    bits.remove(bit);
+    let rank_sum = Reading::from_logits(&others)?.rank_sum(&Message::from_bits(&bits)?)?;
+    Ok(signed_rank::tail(others.len() as u32, rank_sum)?)
 }
 
 #[cfg(test)]
@@ -48,6 +45,14 @@ mod tests {
     use guardsplat_codeword::{PhotometricCorrection, Tone};
 
     use super::*;
+
+    /// Whether each bit is right; one that is undecided isn't.
+    fn right(logits: &[f32], message: &Message) -> Vec<bool> {
+        let pairs = logits.iter().zip(message.bits());
+        pairs
+            .map(|(logit, bit)| if bit { *logit > 0.0 } else { *logit < 0.0 })
+            .collect()
+    }
 
     fn message() -> Message {
         Message::parse("c0de", 16).unwrap()
@@ -68,7 +73,7 @@ mod tests {
         cross_chosen(&under_guesses(readings), &message()).unwrap()
     }
 
-    /// Logits of size 1 of which the first `wrong` are wrong.
+    /// Logits of size 1 of which the first `wrong` are wrong, which have the lowest ranks.
     fn logits(wrong: usize) -> Vec<f32> {
         let right = message().targets().map(|t| 2.0 * t - 1.0).collect::<Vec<_>>();
         let wrong = |(i, v): (usize, &f32)| if i < wrong { -v } else { *v };
@@ -87,13 +92,13 @@ mod tests {
         assert_eq!(chosen(vec![logits(1), logits(0)]), logits(1));
         // Many guesses pay more than one.
         let many = |wrong: usize| {
-            let mut readings = vec![logits(2)];
+            let mut readings = vec![logits(3)];
             readings.extend(std::iter::repeat_n(logits(8), 500));
             readings.push(logits(wrong));
             matches(&chosen(readings))
         };
-        assert_eq!(many(0), 14);
-        assert_eq!(matches(&chosen(vec![logits(2), logits(8), logits(0)])), 16);
+        assert_eq!(many(0), 13);
+        assert_eq!(matches(&chosen(vec![logits(3), logits(8), logits(0)])), 16);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Claims with wrong keys, read by a decoder as bad as decoders are: biased, and correlated between bits and views.
-use guardsplat_codeword::{Claim, Code, HypothesisReading, Message, Payload, Scheme, Target, Whitening, chance, mark};
+use guardsplat_codeword::{
+    Claim, Code, HypothesisReading, Message, Payload, Scheme, Target, Whitening, chance, mark, signed_rank,
+};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -44,8 +46,8 @@ pub fn run(method: Method, claims: u64, seed: u64) -> Counts {
 /// The share of claims with p <= 10^-k that one test with one hypothesis has, exactly: the largest tail that is not above.
 pub fn attainable(k: i32) -> f64 {
     let rate = 10_f64.powi(-k);
-    let least = chance::least_matches(BITS as u32, rate, 1).ok().flatten();
-    least.map_or(0.0, |least| chance::tail(BITS as u32, least).unwrap_or(f64::NAN))
+    let least = signed_rank::least(BITS as u32, rate, 1).ok().flatten();
+    least.map_or(0.0, |least| signed_rank::tail(BITS as u32, least).unwrap_or(f64::NAN))
 }
 
 /// A share and its Wilson interval of 95 %, which is (0, 0.0000038) for none of a million.

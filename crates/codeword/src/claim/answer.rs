@@ -17,8 +17,8 @@ pub struct Answer {
     pub rate: f64,
     /// Bits of a word.
     pub bits: u32,
-    /// The threshold in bits: matches that the rate needs with so many hypotheses; `None` when no number would do.
-    pub needed_bits: Option<u32>,
+    /// The rank sum that the rate needs with so many hypotheses; `None` when that of all bits would not do.
+    pub needed_rank_sum: Option<u32>,
     /// Hypotheses that the best reading pays for: its `tries` times targets times other tries.
     pub hypotheses: u64,
     /// The best hypothesis; `None` when nothing was compared.
@@ -43,7 +43,9 @@ pub struct Comparison {
     pub matched_bits: u32,
     /// Bits that no logit spoke for. They count as not matching.
     pub undecided_bits: u32,
-    /// P(Bin(bits, 1/2) >= matched bits): the p-value if this were the only hypothesis.
+    /// The sum of their ranks, of bits ranked by how clearly they were read ([`signed_rank`](crate::signed_rank)).
+    pub rank_sum: u32,
+    /// The probability that chance reaches that: the p-value if this were the only hypothesis.
     pub p_alone: f64,
     /// The p-value: that, times the hypotheses that this reading pays for, at most 1.
     pub p_value: f64,

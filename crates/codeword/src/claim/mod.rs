@@ -2,7 +2,8 @@
 //!
 //! Pictures are read under each [`Hypothesis`](crate::Hypothesis) about what was done to them (nothing, cropped, turned,
 //! mirrored …), and each gives one word, decided once from logits that were summed over views before. The best pair of a
-//! reading and a target is judged by the [`AcceptanceRule`], which counts all hypotheses: targets, whatever else the caller
+//! reading and a target is judged by the [`AcceptanceRule`], which weighs bits by how clearly they were read
+//! ([`signed_rank`]) and counts all hypotheses: targets, whatever else the caller
 //! tried, and readings, each by its share of the rate ([`shares`](crate::shares)). Error correction reads the payload of a
 //! match afterwards, and never decides.
 mod answer;
@@ -17,6 +18,7 @@ use crate::decision::too_few_decided;
 use crate::error::{Error, Result};
 use crate::message::Message;
 use crate::reading::Reading;
+use crate::signed_rank;
 pub use answer::{Answer, Comparison, Confidences, ReadPayload, Tested};
 
 /// Pictures of the suspect, read under one hypothesis.
@@ -71,7 +73,8 @@ struct Terms {
 impl Terms {
     /// Whether it could be a match, whatever the targets are.
     fn can_match(&self) -> bool {
-        self.needed.is_some_and(|needed| self.reading.decided_bits() >= needed)
+        self.needed
+            .is_some_and(|needed| self.reading.largest_rank_sum() >= needed)
     }
 }
 
@@ -80,7 +83,7 @@ struct Winner<'a> {
     read: &'a HypothesisReading,
     terms: &'a Terms,
     target: &'a Target,
-    matched: u32,
+    rank_sum: u32,
 }
 
 impl Claim<'_> {
@@ -109,7 +112,7 @@ impl Claim<'_> {
             verdict: Verdict::Inconclusive,
             rate: self.rate,
             bits,
-            needed_bits: alone.least_matches(bits)?,
+            needed_rank_sum: alone.least_rank_sum(bits)?,
             hypotheses: others,
             best: None,
             payload: None,
@@ -131,23 +134,24 @@ impl Claim<'_> {
             return undecided(answer);
         };
         let Terms { reading, rule, needed } = winner.terms;
-        (answer.needed_bits, answer.hypotheses) = (*needed, rule.hypotheses);
+        (answer.needed_rank_sum, answer.hypotheses) = (*needed, rule.hypotheses);
         answer.best = Some(Comparison {
             hypothesis: winner.read.name.clone(),
             views: winner.read.views,
             target: winner.target.id.clone(),
-            matched_bits: winner.matched,
+            matched_bits: reading.matches(&winner.target.word)?,
             undecided_bits: reading.undecided_bits(),
-            p_alone: chance::tail(bits, winner.matched)?,
-            p_value: rule.p_value(bits, winner.matched)?,
+            rank_sum: winner.rank_sum,
+            p_alone: signed_rank::tail(bits, winner.rank_sum)?,
+            p_value: rule.p_value(bits, winner.rank_sum)?,
         });
         match *needed {
             None => answer.reason = Some(too_short(bits, rule.hypotheses, self.rate)?),
-            Some(needed) if !terms.iter().any(Terms::can_match) => {
+            Some(_) if !terms.iter().any(Terms::can_match) => {
                 let decided = terms.iter().map(|terms| terms.reading.decided_bits()).max();
-                answer.reason = Some(too_few_decided(decided.unwrap_or(0), bits, needed));
+                answer.reason = Some(too_few_decided(decided.unwrap_or(0), bits));
             }
-            Some(needed) if winner.matched >= needed => {
+            Some(needed) if winner.rank_sum >= needed => {
                 answer.verdict = Verdict::Match;
                 answer.payload = read::payload(self.scheme, winner.target, &winner.read.logits)?;
             }
@@ -192,7 +196,7 @@ impl Claim<'_> {
                 false_positive_rate: self.rate,
                 hypotheses: read.tries.checked_mul(others).ok_or_else(too_many)?,
             };
-            let needed = rule.least_matches(bits)?;
+            let needed = rule.least_rank_sum(bits)?;
             Ok(Terms { reading, rule, needed })
         };
         self.readings.iter().map(terms).collect()
@@ -214,16 +218,16 @@ impl Claim<'_> {
         let mut best: Option<(Winner<'a>, (bool, f64))> = None;
         for (read, terms) in self.readings.iter().zip(terms) {
             for target in self.targets {
-                let matched = terms.reading.matches(&target.word)?;
+                let rank_sum = terms.reading.rank_sum(&target.word)?;
                 // What can't match whatever it reads comes last. Not cut at 1, so that of bad ones the better is told.
-                let p_value = chance::tail(bits, matched)? * terms.rule.hypotheses as f64;
+                let p_value = signed_rank::tail(bits, rank_sum)? * terms.rule.hypotheses as f64;
                 let rank = (terms.needed.is_none(), p_value);
                 if best.as_ref().is_none_or(|(_, least)| rank < *least) {
                     let winner = Winner {
                         read,
                         terms,
                         target,
-                        matched,
+                        rank_sum,
                     };
                     best = Some((winner, rank));
                 }

@@ -62,21 +62,24 @@ fn p_value_of(claim: &Claim<'_>) -> f64 {
 }
 
 #[test]
-fn matches_decide_at_the_thresholds_of_the_table() {
-    for (bits, needed) in [(32, 30), (48, 41), (64, 51), (72, 57)] {
+fn rank_sums_decide_at_their_thresholds() {
+    // Of so many bits the least clear may be wrong, as long as the rank sum is no less than that.
+    for (bits, needed, wrong) in [(32, 494, 7), (48, 1022, 17), (64, 1718, 26), (72, 2126, 31)] {
         let word = Message::zeros(MessageLength::new(bits).unwrap());
         let targets = [target("ours", word)];
-        for (matched, verdict) in [(needed, Verdict::Match), (needed - 1, Verdict::NoMatch)] {
-            let readings = [reading("as given", logits(&word, bits - matched))];
+        for (wrong, verdict) in [(wrong, Verdict::Match), (wrong + 1, Verdict::NoMatch)] {
+            let readings = [reading("as given", logits(&word, wrong))];
             let answer = claim(raw(bits), &readings, &targets).test().unwrap().answer;
             let best = answer.best.unwrap();
             assert_eq!(
-                (answer.verdict, answer.needed_bits),
-                (verdict, Some(needed as u32)),
+                (answer.verdict, answer.needed_rank_sum),
+                (verdict, Some(needed)),
                 "{bits}"
             );
-            assert_eq!((best.matched_bits, best.views), (matched as u32, 4));
-            assert_eq!(best.p_alone, chance::tail(bits as u32, matched as u32).unwrap());
+            assert_eq!((best.matched_bits, best.views), ((bits - wrong) as u32, 4));
+            let rank_sum = signed_rank::largest(bits as u32) - signed_rank::largest(wrong as u32);
+            assert_eq!(best.rank_sum, rank_sum);
+            assert_eq!(best.p_alone, signed_rank::tail(bits as u32, rank_sum).unwrap());
             assert_eq!((answer.payload, answer.reason), (None, None));
         }
     }
@@ -89,7 +92,7 @@ fn a_short_key_is_inconclusive_and_says_what_it_can_reach() {
     let targets = [target("ours", word)];
     let question = claim(raw(16), &readings, &targets);
     let answer = question.test().unwrap().answer;
-    assert_eq!((answer.verdict, answer.needed_bits), (Verdict::Inconclusive, None));
+    assert_eq!((answer.verdict, answer.needed_rank_sum), (Verdict::Inconclusive, None));
     let expected = "16 bits with 1 hypotheses can never reach a rate of 1e-6: all of them match by chance at a rate of up \
                     to 1.5e-5";
     assert_eq!(answer.reason.as_deref(), Some(expected));
@@ -105,7 +108,7 @@ fn all_hypotheses_count() {
     let word = Message::from_u64(0x0123_4567_89ab_cdef);
     let readings = alike(vec![
         reading("as given", vec![-1.0; 64]),
-        reading("mirrored", logits(&word, 13)),
+        reading("mirrored", logits(&word, 26)),
     ]);
     let targets = [
         target("theirs", Message::from_u64(!0)),
@@ -118,10 +121,10 @@ fn all_hypotheses_count() {
     };
     let answer = question.test().unwrap().answer;
     let best = answer.best.clone().unwrap();
-    assert_eq!((answer.hypotheses, answer.verdict), (2 * 3 * 5, Verdict::NoMatch)); // alone, 51 would do
+    assert_eq!((answer.hypotheses, answer.verdict), (2 * 3 * 5, Verdict::NoMatch)); // alone, it would do
     assert_eq!(
         (best.hypothesis.as_str(), best.target.as_str(), best.matched_bits),
-        ("mirrored", "ours", 51)
+        ("mirrored", "ours", 38)
     );
     assert!(best.p_alone <= 1e-6 && best.p_value == 30.0 * best.p_alone);
     let searched = Claim {
@@ -131,7 +134,7 @@ fn all_hypotheses_count() {
     };
     let answer = searched.test().unwrap().answer;
     assert_eq!(answer.hypotheses, 10_000_000);
-    assert_eq!(answer.needed_bits, chance::least_matches(64, 1e-10, 1).unwrap());
+    assert_eq!(answer.needed_rank_sum, signed_rank::least(64, 1e-10, 1).unwrap());
     // Whatever was tried, the p-value is a probability.
     let often = Claim {
         other_tries: 1 << 60,
@@ -155,10 +158,10 @@ fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() 
     );
 
     let mut unsure = vec![1.0; 64];
-    unsure[..14].fill(f32::NAN);
+    unsure[..27].fill(f32::NAN);
     let readings = [reading("as given", unsure.clone())];
     let answer = claim(raw(64), &readings, &targets).test().unwrap().answer;
-    let reason = "at most 50 of 64 bits could be decided, and a match needs 51";
+    let reason = "at most 37 of 64 bits could be decided: were all of them right, it would be no match";
     assert_eq!(
         (answer.verdict, answer.reason.as_deref()),
         (Verdict::Inconclusive, Some(reason))
@@ -170,7 +173,7 @@ fn nothing_to_compare_with_is_an_unknown_key_and_nothing_read_is_inconclusive() 
     let best = tested.answer.best.unwrap();
     assert_eq!(
         (tested.answer.verdict, best.matched_bits, best.undecided_bits),
-        (Verdict::Match, 51, 13)
+        (Verdict::Match, 38, 26)
     );
     let confidences = tested.confidences.unwrap();
     assert_eq!((confidences.bits[1], confidences.bits[63]), (0.0, 0.5_f32.tanh()));
@@ -221,7 +224,7 @@ fn a_match_of_a_coded_scheme_says_what_was_embedded() {
 #[test]
 fn error_correction_never_decides() {
     // A word that decodes to the very payload isn't a match when its matches do not make one: the code of 30 bits reads
-    // through 6 wrong bits, and at a rate of 1e-18 no more than 1 may be wrong.
+    // through 6 wrong bits, and at a rate of 1e-18 no more than the 3 least clear may be wrong.
     let whitening = Whitening {
         secret: &[5; 32],
         asset: b"lego",

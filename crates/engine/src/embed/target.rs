@@ -1,10 +1,11 @@
 //! What a marked scene must reach to be handed out, by the length of its message.
 //!
 //! A message of up to 32 bits is compared bit by bit by whoever gave it, so all of it must be read. Longer ones are the
-//! words of assets, or compared with a claim, and a claim wants many bits and not all of them: so many must match in the
-//! mean picture, and in the scene as a claim renders it, that no chance explains them under whatever hypothesis they are read: the rule is that of claims.
+//! words of assets, or compared with a claim, and a claim wants many bits and not all of them. So the scene as a claim
+//! renders it must match by the rule of claims, under whatever hypothesis it is read; and in the mean picture so many bits
+//! must be right that it would match were they merely counted, which leaves a claim something to spare.
 //! Whether the code of words reads its payload as well (up to 5 bits of 64 wrong) decides nothing: no claim rests on it.
-use guardsplat_codeword::AcceptanceRule;
+use guardsplat_codeword::{AcceptanceRule, Decision, Verdict};
 use serde::{Deserialize, Serialize};
 
 use super::verify::Verification;
@@ -29,7 +30,7 @@ pub struct Target {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub psnr_covered_db: Option<f64>,
     /// Whether the message must be read: up to 32 bits all of it, from [`Verify::message_views`](super::Verify::message_views)
-    /// views; beyond, as much as a claim about a picture needs, from all views.
+    /// views; beyond, so well from all views that a claim about a picture is a match.
     pub message: bool,
 }
 
@@ -80,23 +81,29 @@ impl Target {
                 "PSNR over what the scene covers, {psnr:.2} dB, is below {wanted} dB"
             ));
         }
-        let allowed = bits - needed(bits, rule);
-        let wrong = if bits <= SHORT {
-            found.wrong_bits
-        } else {
-            found.wrong_bits_of_all
-        };
-        if self.message && wrong > allowed {
+        if self.message && bits <= SHORT && found.wrong_bits > 0 {
             // How many, and not which: the words of assets are told to nobody.
+            missed.push(format!("{} of {bits} bits of the message are wrong", found.wrong_bits));
+        }
+        if self.message && bits > SHORT && !claimable(&found.comparison.decision, rule) {
             missed.push(format!(
-                "{wrong} of {bits} bits of the message are wrong, at most {allowed} may be"
+                "a claim would be no match: {} of {bits} bits of the message are wrong",
+                found.wrong_bits_of_all
             ));
         }
         missed
     }
 }
 
-/// Bits of so many that must match: all of a short message, and of others what a claim needs.
+/// Whether a claim about the scene would be a match; where none could be, whether all bits are right.
+fn claimable(decision: &Decision, rule: &AcceptanceRule) -> bool {
+    match rule.verdict(decision.bits, decision.rank_sum) {
+        Ok(Verdict::Inconclusive) | Err(_) => decision.matched_bits == decision.bits,
+        Ok(verdict) => verdict == Verdict::Match,
+    }
+}
+
+/// Bits of so many that must match: all of a short message, and of others what a claim would need that counted them.
 fn needed(bits: usize, rule: &AcceptanceRule) -> usize {
     let claimed = |bits: usize| rule.least_matches(bits as u32).ok().flatten();
     match bits {
@@ -108,7 +115,7 @@ fn needed(bits: usize, rule: &AcceptanceRule) -> usize {
 #[cfg(test)]
 mod tests {
     use guardsplat_codeword::{
-        Claim, DEFAULT_FALSE_POSITIVE_RATE, HypothesisReading, Message, Scheme, Target as Claimed, Verdict,
+        Claim, DEFAULT_FALSE_POSITIVE_RATE, HypothesisReading, Message, Reading, Scheme, Target as Claimed, Verdict,
     };
 
     use super::*;
@@ -130,7 +137,7 @@ mod tests {
         let wanted = |bits| (target.wanted(bits, &RULE), needed(bits, &RULE));
         assert_eq!(wanted(32), (0.95, 32));
         assert_eq!(wanted(8), (0.95, 8));
-        // 55 of 64 is what a claim about a picture needs (docs/verify.md).
+        // 55 of 64 would be a match if all bits were read alike.
         assert_eq!(wanted(64), (55.0 / 64.0, 55));
         assert!(wanted(128).0 < wanted(64).0 && wanted(128).0 > 0.7);
         // A target that asks for less is not raised.
@@ -148,18 +155,20 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_that_just_meets_its_target_is_a_match_as_a_claim_and_one_bit_fewer_is_not() {
+    fn a_mark_is_claimable_where_a_claim_about_it_is_a_match() {
+        let word = Message::from_u64(u64::MAX);
+        let mut found = Vec::new();
         for rule in [1e-6, 1e-9, 1e-3].map(|false_positive_rate| AcceptanceRule {
             false_positive_rate,
             ..RULE
         }) {
-            let least = needed(64, &rule);
-            for (right, verdict) in [(least, Verdict::Match), (least - 1, Verdict::NoMatch)] {
-                let logits = (0..64).map(|bit| if bit < right { 1.0 } else { -1.0 }).collect();
+            for wrong in 15..30 {
+                // The least clear bits are wrong.
+                let logits: Vec<f32> = (0..64).map(|bit| if bit < wrong { -0.5 } else { 1.0 }).collect();
                 let best = HypothesisReading {
                     name: "as given".into(),
                     views: 1,
-                    logits,
+                    logits: logits.clone(),
                     tries: rule.hypotheses,
                 };
                 // Other hypotheses read nothing, and are paid for.
@@ -174,15 +183,28 @@ mod tests {
                     readings: &readings,
                     targets: &[Claimed {
                         id: "asset".into(),
-                        word: Message::from_u64(u64::MAX),
+                        word,
                         pad: None,
                     }],
                     targets_tried: None,
                     other_tries: 1,
                     rate: rule.false_positive_rate,
                 };
-                assert_eq!(claim.test().unwrap().answer.verdict, verdict);
+                let alone = AcceptanceRule { hypotheses: 1, ..rule };
+                let decision = alone.decide(&Reading::from_logits(&logits).unwrap(), &word).unwrap();
+                let matches = claim.test().unwrap().answer.verdict == Verdict::Match;
+                assert_eq!(claimable(&decision, &rule), matches, "{wrong}");
+                found.push(matches);
             }
+        }
+        assert!(found.contains(&true) && found.contains(&false));
+        // Where no claim could be a match, all bits must be right.
+        let short = Message::parse("3ffff", 18).unwrap();
+        for (logit, right) in [(1.0, true), (-1.0, false)] {
+            let mut logits = [1.0; 18];
+            logits[0] = logit;
+            let decision = RULE.decide(&Reading::from_logits(&logits).unwrap(), &short).unwrap();
+            assert_eq!(claimable(&decision, &RULE), right);
         }
     }
 }

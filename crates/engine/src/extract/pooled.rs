@@ -189,12 +189,12 @@ mod tests {
         for (wrong, undecided) in [
             (0, 0),
             (9, 0),
-            (13, 0),
-            (14, 0),
-            (5, 8),
-            (5, 9),
-            (0, 13),
-            (0, 14),
+            (26, 0),
+            (27, 0),
+            (8, 18),
+            (8, 19),
+            (0, 26),
+            (0, 27),
             (0, 64),
         ] {
             let logit = |(place, bit): (usize, bool)| match place {
@@ -237,8 +237,8 @@ mod tests {
             let claimed = claim.test().unwrap().answer;
             let best = claimed.best.unwrap();
             assert_eq!(
-                (raw.matched_bits, raw.p_value, raw.needed_bits),
-                (best.matched_bits, best.p_value, claimed.needed_bits),
+                (raw.matched_bits, raw.rank_sum, raw.p_value, raw.needed_rank_sum),
+                (best.matched_bits, best.rank_sum, best.p_value, claimed.needed_rank_sum),
                 "{wrong} {undecided}"
             );
             assert_eq!(raw.matched_bits as usize, 64 - wrong - undecided);

@@ -1,4 +1,5 @@
 //! Made-up reports, plausible and always the same, for examples and tests.
+use guardsplat_codeword::{Message, Reading};
 use guardsplat_evidence::{
     Audience, Bit, Decision, Embedding, Evidence, EvidenceKind, Found, History, HypothesisGroup, HypothesisKind, Input,
     Key, Model, Multiplicity, Picture, Reason, Registration, Role, SCHEMA, Sha256, SigningKey, Target, Timestamp,
@@ -156,13 +157,12 @@ pub fn verify(verification: Verification) -> Evidence {
 /// A verification that compared 64 bits, so many of which agree.
 pub fn decided(matched: u32, mut tried: Tried) -> Verification {
     tried.paid.get_or_insert(Multiplicity { assets: 1, readings: 1 });
-    let decision = Decision::new(
-        64,
-        matched,
-        Some((64 - matched).min(3)),
-        tried.hypotheses(tried.parts()[0]),
-        1e-6,
-    );
+    let strip = strip(64, matched as usize);
+    let hypotheses = tried.hypotheses(tried.parts()[0]);
+    let decision = Decision {
+        corrected: Some((64 - matched).min(3)),
+        ..Decision::new(64, (matched, rank_sum(&strip)), hypotheses, 1e-6)
+    };
     let verdict = decision.verdict();
     Verification {
         verdict,
@@ -176,7 +176,7 @@ pub fn decided(matched: u32, mut tried: Tried) -> Verification {
             asset: "Garden statue".into(),
             payload: Some("c0ffee42c0ffee42".into()),
         }),
-        strip: strip(64, matched as usize),
+        strip,
         decision: Some(decision),
     }
 }
@@ -222,7 +222,7 @@ fn undecided(reason: Reason) -> Verification {
 
 fn few_bits() -> Verification {
     let mut verification = undecided(Reason::TooFewBits);
-    verification.decision = Some(Decision::new(16, 16, None, 1, 1e-6));
+    verification.decision = Some(Decision::new(16, (16, 136), 1, 1e-6));
     verification.strip = strip(16, 16);
     verification
 }
@@ -237,12 +237,13 @@ fn unknown_key() -> Verification {
     }
 }
 
-/// Bits by a simple generator; the last ones of a shuffle differ.
+/// Bits by a simple generator; the last ones of a shuffle differ, of a mark because they were hardly read.
 fn strip(bits: usize, matched: usize) -> Vec<Bit> {
     let bit = |i: usize| {
         let noise = (i * 2_654_435_761) >> 7;
         let differs = (i * 37 + 11) % bits >= matched;
-        let confidence = if differs { 0.04 } else { 0.55 } + (noise % 40) as f64 / 100.0;
+        let weak = differs && 4 * matched > 3 * bits;
+        let confidence = if weak { 0.04 } else { 0.55 } + (noise % 40) as f64 / 100.0;
         let read = noise.is_multiple_of(2);
         Bit {
             wanted: Some(read != differs),
@@ -252,6 +253,16 @@ fn strip(bits: usize, matched: usize) -> Vec<Bit> {
         }
     };
     (0..bits).map(bit).collect()
+}
+
+/// The sum of the ranks of the bits that match, ranked by the size of their logits.
+fn rank_sum(strip: &[Bit]) -> u32 {
+    let logits: Vec<f32> = strip.iter().filter_map(|bit| Some(bit.logit? as f32)).collect();
+    let wanted: Vec<bool> = strip.iter().filter_map(|bit| bit.wanted).collect();
+    let message = Message::from_bits(&wanted).expect("a message");
+    Reading::from_logits(&logits)
+        .and_then(|reading| reading.rank_sum(&message))
+        .expect("a reading of it")
 }
 
 fn input(role: Role, name: &str) -> Input {

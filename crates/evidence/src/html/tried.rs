@@ -58,6 +58,7 @@ fn row(framing: &HypothesisGroup, readings: u64) -> Markup {
         HypothesisKind::Scaling => "Other scales",
         HypothesisKind::Tone => "Changed tones undone",
         HypothesisKind::Estimated => "Tones and part estimated",
+        HypothesisKind::Led => "One picture leads",
     };
     html! {
         tr {

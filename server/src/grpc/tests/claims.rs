@@ -332,8 +332,8 @@ async fn a_claim_is_decided_by_the_server_and_leaves_evidence() {
     assert_eq!(result.verdict(), Verdict::Match);
     assert_eq!((&result.asset, &result.owner), (first, &bench.owners[0]));
     assert_eq!(
-        (result.matched_bits, result.needed_bits, result.bits),
-        (Some(60), Some(52), 64)
+        (result.matched_bits, result.rank_sum, result.bits),
+        (Some(60), Some(2004), 64)
     );
     assert_eq!((result.payload_number, result.corrected_bits), (Some(1), Some(4)));
     // All three assets of the key are paid for, though one was named.
@@ -425,11 +425,14 @@ async fn the_rate_is_a_setting_and_may_be_out_of_reach() {
     let word = bench.word(0).await;
     let read = || vec![framed(0, logits(&word, 0))];
     let (result, _) = bench.claimed(of_asset(&bench.assets[0].0), read()).await;
-    assert_eq!((result.verdict(), result.needed_bits), (Verdict::Match, Some(64)));
+    assert_eq!((result.verdict(), result.needed_rank_sum), (Verdict::Match, Some(2080)));
     // 2^-64 is 5.4e-20: four readings of three assets are too many.
     let four = (0..4).map(|turns| framed(turns, logits(&word, 0))).collect();
     let (result, checked) = bench.claimed(of_owner(&bench.owners[0]), four).await;
-    assert_eq!((result.verdict(), result.needed_bits), (Verdict::Inconclusive, None));
+    assert_eq!(
+        (result.verdict(), result.needed_rank_sum),
+        (Verdict::Inconclusive, None)
+    );
     let told = checked.evidence.unwrap().verification.unwrap();
     assert_eq!(told.reason, Some(guardsplat_evidence::Reason::TooManyHypotheses));
 }

@@ -61,7 +61,7 @@ async fn whoever_registers_until_one_fits_gets_no_evidence_of_one_hypothesis() {
     let mut nearest = Vec::new();
     for owner in registered.keys() {
         let (result, _) = bench.claimed(of_owner(owner), read()).await;
-        nearest.push((result.matched_bits, owner));
+        nearest.push((result.rank_sum, owner));
     }
     nearest.sort();
     for asset in nearest.iter().rev().take(3).flat_map(|(_, owner)| &registered[*owner]) {

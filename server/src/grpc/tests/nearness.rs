@@ -58,7 +58,11 @@ async fn how_near_a_claim_was_is_told_to_admins_only() {
         let report = bench.job_of(result).await;
         for told in told(&door, &shop, &report).await {
             assert_eq!(told.verdict(), verdict);
-            assert_eq!((told.matched_bits, told.corrected_bits), (None, None), "{told:?}");
+            assert_eq!(
+                (told.matched_bits, told.rank_sum, told.corrected_bits),
+                (None, None, None),
+                "{told:?}"
+            );
             // Of a match what it had to be at most, and of anything else nothing.
             assert_eq!(
                 told.p_value,
@@ -68,8 +72,8 @@ async fn how_near_a_claim_was_is_told_to_admins_only() {
             assert_eq!((told.mean_abs_logit, told.view_agreement), (0.0, 0.0), "{told:?}");
             assert_eq!(told.framing, "");
             assert_eq!(
-                (told.bits, told.needed_bits, told.threshold),
-                (64, result.needed_bits, Some(1e-6))
+                (told.bits, told.needed_rank_sum, told.threshold),
+                (64, result.needed_rank_sum, Some(1e-6))
             );
         }
         for told in told(&door, &admin, &report).await {

@@ -163,7 +163,7 @@ fn answered(read: VerifyResult, decided: &Decided, framings: usize) -> VerifyRes
         verdict,
         rate,
         bits,
-        needed_bits,
+        needed_rank_sum,
         hypotheses,
         best,
         payload,
@@ -185,7 +185,8 @@ fn answered(read: VerifyResult, decided: &Decided, framings: usize) -> VerifyRes
         p_value: best.as_ref().map(|best| best.p_value),
         threshold: Some(*rate),
         matched_bits: best.as_ref().map(|best| best.matched_bits),
-        needed_bits: *needed_bits,
+        rank_sum: best.as_ref().map(|best| best.rank_sum),
+        needed_rank_sum: *needed_rank_sum,
         bits: *bits,
         views: best.as_ref().map_or(read.views, |best| best.views),
         // Bit by bit only the owner is told.

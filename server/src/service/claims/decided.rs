@@ -62,7 +62,7 @@ pub(super) fn unmarkable(key: &KeyRow, rate: f64, before: Option<ReadBefore>, re
         verdict: Verdict::Inconclusive,
         rate,
         bits: key.bits,
-        needed_bits: None,
+        needed_rank_sum: None,
         hypotheses: 1,
         best: None,
         payload: None,
@@ -116,8 +116,8 @@ impl Decided {
     /// Whether so many bits agree that it would be a match, were the asset not younger than its suspect.
     pub fn is_refused(&self) -> bool {
         let answer = &self.tested.answer;
-        let enough = answer.best.as_ref().zip(answer.needed_bits);
-        answer.verdict == Verdict::Inconclusive && enough.is_some_and(|(best, needed)| best.matched_bits >= needed)
+        let enough = answer.best.as_ref().zip(answer.needed_rank_sum);
+        answer.verdict == Verdict::Inconclusive && enough.is_some_and(|(best, needed)| best.rank_sum >= needed)
     }
 
     /// The asset, where it may be told of: one that was named or found. What came nearest in a search that found nothing is

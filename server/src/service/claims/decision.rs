@@ -21,7 +21,7 @@ struct Words {
     tried: Tried,
 }
 
-/// Readings with one share of the rate each, for among them the most matches are the least p-value.
+/// Readings with one share of the rate each, for among them the largest rank sum is the least p-value.
 fn of_equal_shares(read: &[HypothesisReading], readings: &[Reading]) -> Vec<Vec<Reading>> {
     let mut groups: Vec<(u64, Vec<Reading>)> = Vec::new();
     for (read, reading) in read.iter().zip(readings) {

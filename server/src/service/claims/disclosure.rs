@@ -49,6 +49,7 @@ impl Disclosure {
             // What it is at most. Any finer, and whoever changes a copy step by step sees each step.
             p_value: result.threshold.filter(|_| matches),
             matched_bits: None,
+            rank_sum: None,
             corrected_bits: None,
             message: String::new(),
             bit_accuracy: None,

@@ -119,21 +119,19 @@ fn channels(undone: &Undone) -> [f32; 3] {
 
 /// Hypotheses by kinds, for the report, with what each pays: as much as was done counts under what changes most.
 pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evidence::HypothesisGroup> {
-    use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Mirrored, QuarterTurn, Tone};
-    let is_led = |reading: &FramedReading| reading.leading_picture > 0;
+    use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Led, Mirrored, QuarterTurn, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
-        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) && !is_led(reading) => Estimated,
+        _ if reading.leading_picture > 0 => Led,
+        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) => Estimated,
         _ if reading.undone.is_some() => Tone,
         _ if reading.part.is_some() => Crop,
         (true, ..) => Crop,
         (_, true, _) => Mirrored,
-        // What the other pictures agree in had something undone.
-        (_, _, 0) if is_led(reading) => Tone,
         (_, _, 0) => AsGiven,
         _ => QuarterTurn,
     };
     let mut groups: Vec<evidence::HypothesisGroup> = Vec::new();
-    for wanted in [AsGiven, Estimated, Tone, QuarterTurn, Mirrored, Crop] {
+    for wanted in [AsGiven, Estimated, Led, Tone, QuarterTurn, Mirrored, Crop] {
         for (_, read) in told.iter().zip(readings).filter(|(told, _)| kind(told) == wanted) {
             let tries = Some(read.tries);
             match groups
@@ -280,16 +278,8 @@ mod tests {
         let read = checked(&readings, 64).unwrap();
         assert_eq!(read[2].name, "as given: picture 2, the others as they agree with it");
         let groups: Vec<_> = kinds(&readings, &read).iter().map(|g| (g.kind, g.variants)).collect();
-        let (as_given, tone) = (evidence::HypothesisKind::AsGiven, evidence::HypothesisKind::Tone);
-        assert_eq!(groups, [(as_given, 1), (tone, 2)]);
-        // Of published CLIPs pictures are turned, whichever leads.
-        let turned = FramedReading {
-            leading_picture: 1,
-            ..reading(1, false, false)
-        };
-        let turned = std::slice::from_ref(&turned);
-        let groups = kinds(turned, &checked(turned, 64).unwrap());
-        assert_eq!(groups[0].kind, evidence::HypothesisKind::QuarterTurn);
+        use evidence::HypothesisKind::{AsGiven, Led};
+        assert_eq!(groups, [(AsGiven, 1), (Led, 2)]);
         assert!(checked(&[led(1), led(1)], 64).is_err() && checked(&[led(3)], 64).is_err());
     }
 

@@ -38,8 +38,11 @@ impl Read<'_> {
             },
             views: answer.best.as_ref().map_or(0, |best| best.views),
             decision: answer.best.as_ref().map(|best| {
-                let (bits, corrected) = (answer.bits, corrected(answer));
-                evidence::Decision::new(bits, best.matched_bits, corrected, answer.hypotheses, answer.rate)
+                let matched = (best.matched_bits, best.rank_sum);
+                evidence::Decision {
+                    corrected: corrected(answer),
+                    ..evidence::Decision::new(answer.bits, matched, answer.hypotheses, answer.rate)
+                }
             }),
             history: self.history()?,
             found: self.found(key)?,
@@ -50,7 +53,7 @@ impl Read<'_> {
     fn reason(&self) -> Option<Reason> {
         let answer = &self.decided.tested.answer;
         let inconclusive = answer.verdict == Verdict::Inconclusive;
-        inconclusive.then(|| match answer.needed_bits {
+        inconclusive.then(|| match answer.needed_rank_sum {
             Some(_) if self.decided.is_refused() => Reason::RegisteredLater,
             Some(_) => Reason::WeakReading,
             None if self.decided.too_few_bits() => Reason::TooFewBits,

@@ -1,8 +1,8 @@
 //! What readings pay where they share the rate unevenly.
 use super::*;
 
-/// A reading with half of the rate needs fewer matches than one of many with the other half; the least p-value wins, not
-/// the most matches.
+/// A reading with half of the rate needs a smaller rank sum than one of many with the other half; the least p-value wins,
+/// not the largest rank sum.
 #[test]
 fn readings_pay_by_their_shares() {
     let word = Message::from_u64(0x0123_4567_89ab_cdef);
@@ -19,13 +19,18 @@ fn readings_pay_by_their_shares() {
         let readings: Vec<_> = std::iter::once(given).chain((0..500).map(guess)).collect();
         let answer = claim(raw(64), &readings, &targets).test().unwrap().answer;
         let best = answer.best.unwrap();
-        (answer.verdict, best.hypothesis, answer.hypotheses, answer.needed_bits)
+        (
+            answer.verdict,
+            best.hypothesis,
+            answer.hypotheses,
+            answer.needed_rank_sum,
+        )
     };
     let (given, guess) = ("as given".to_owned(), "guess".to_owned());
-    assert_eq!(with(12, 12), (Verdict::Match, given.clone(), 2, Some(52)));
-    assert_eq!(with(13, 12), (Verdict::NoMatch, given, 2, Some(52)));
-    assert_eq!(with(32, 9), (Verdict::NoMatch, guess.clone(), 1000, Some(56)));
-    assert_eq!(with(32, 8), (Verdict::Match, guess, 1000, Some(56)));
+    assert_eq!(with(25, 20), (Verdict::Match, given.clone(), 2, Some(1735)));
+    assert_eq!(with(26, 21), (Verdict::NoMatch, given, 2, Some(1735)));
+    assert_eq!(with(32, 21), (Verdict::NoMatch, guess.clone(), 1000, Some(1863)));
+    assert_eq!(with(32, 20), (Verdict::Match, guess, 1000, Some(1863)));
     // Together they have the rate, and not more.
     let more = [reading("as given", vec![1.0; 64]), reading("again", vec![1.0; 64])];
     let error = claim(raw(64), &more, &targets).test().unwrap_err().to_string();

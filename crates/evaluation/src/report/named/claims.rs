@@ -14,7 +14,7 @@ const RIGHT: &str = "Rates in percent of the claims about a mark, mean over mark
     paid for; the payload is what the error-correcting code reads of a match.";
 const WRONG: &str = "Shares of wrong claims, each with an owner's secret, an asset and a payload of its own, in brackets 95 % \
     intervals (Wilson 1927): given what was read, wrong claims are independent. \"Exactly\" is the largest tail of the \
-    binomial distribution that is not above 10^-k: with 64 bits no p-value lies between. Where all framings are searched, \
+    signed-rank distribution that is not above 10^-k. Where all framings are searched, \
     p-values are union bounds, and shares are below.";
 const AS_TRIALS: &str = "Counting the bits of only two views as independent makes false claims; the column is there so that \
     nobody does it.";
@@ -189,7 +189,7 @@ fn wrong(report: &mut Report, all: &[(&Mark, &Claims)]) -> Result<()> {
     });
     let drawn = [
         Line {
-            name: "exactly, by the binomial distribution".into(),
+            name: "exactly, by the signed-rank distribution".into(),
             points: exact.collect(),
             dots: false,
         },
@@ -204,19 +204,23 @@ fn wrong(report: &mut Report, all: &[(&Mark, &Claims)]) -> Result<()> {
     Ok(())
 }
 
-/// The largest P(Bin(bits, 1/2) >= n) that is not above `rate`; 0 if there is none.
+/// The largest probability, not above `rate`, that a random subset of the ranks 1 to `bits` has so large a sum or a larger
+/// one; 0 if there is none.
 fn attainable(bits: u32, rate: f64) -> f64 {
-    let mut term = 2_f64.powi(-(bits as i32));
-    let (mut sum, mut best) = (0.0, 0.0);
-    for k in (0..=bits).rev() {
-        sum += term;
-        if sum > rate {
-            break;
+    let mut sums = vec![1.0];
+    for rank in 1..=bits as usize {
+        let mut next = vec![0.0; sums.len() + rank];
+        for (sum, probability) in sums.iter().enumerate() {
+            next[sum] += probability / 2.0;
+            next[sum + rank] += probability / 2.0;
         }
-        best = sum;
-        term *= f64::from(k) / f64::from(bits - k + 1);
+        sums = next;
     }
-    best
+    let tails = sums.iter().rev().scan(0.0, |above, probability| {
+        *above += probability;
+        Some(*above)
+    });
+    tails.take_while(|tail| *tail <= rate).last().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -228,8 +232,13 @@ mod tests {
 
     #[test]
     fn known_tails() {
-        // 51 of 64 bits: 2^-64 times the sum of C(64, 51..).
-        assert!((attainable(64, 1e-6) / 9.404_810_782e-7 - 1.0).abs() < 1e-9);
+        // Seven subsets of ten ranks have a sum of 51 or more, of 55: those without none, 1, 2, 3, 1 and 2, 4, or 1 and 3.
+        assert_eq!(attainable(10, 7.5 / 1024.0), 7.0 / 1024.0);
+        assert!(
+            (9.7e-7..=1e-6).contains(&attainable(64, 1e-6)),
+            "{}",
+            attainable(64, 1e-6)
+        );
         assert_eq!(attainable(4, 0.1), 1.0 / 16.0);
         assert_eq!(attainable(16, 1e-6), 0.0);
     }
