@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::embed::{Job, Preset, Progress, Settings, embed_with_files};
 use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::{Key as EngineKey, Message};
@@ -86,7 +86,7 @@ impl Options {
 impl Chosen {
     /// The engine for the key, which heeds the job's end.
     fn engine(&self, path: &std::path::Path, key: &EngineKey, context: &Context) -> Result<Engine> {
-        let compute = open(self.device)?;
+        let compute = load::device(self.device, self.clip.as_deref().unwrap_or(&key.clip.name))?;
         let mut engine = load::engine(path, key, self.clip.as_deref(), compute, true, self.memory)?;
         engine.stop = context.stop.clone();
         Ok(engine)

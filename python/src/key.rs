@@ -3,11 +3,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use guardsplat_distortion::RobustTo;
-use guardsplat_engine::device::open;
+use guardsplat_engine::clip::ShippedClip;
 use guardsplat_engine::message::key::KeyProgress;
 use guardsplat_engine::message::training::Progress as Training;
 use guardsplat_engine::message::{Key as EngineKey, KeyOptions, TrainingOptions};
 use guardsplat_operations::create_key::{ProjectionOverrides, create};
+use guardsplat_operations::load;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -61,7 +62,7 @@ impl Key {
         };
         let device = device.parse().map_err(|error| exception(py, &error))?;
         let made = run(py, progress, |context| {
-            let compute = open(device)?;
+            let compute = load::device(device, clip.unwrap_or_else(|| ShippedClip::for_bits(bits)))?;
             let overrides = ProjectionOverrides::default();
             create(&options, overrides, clip, &compute, &context.stop, |progress| {
                 tell(context, progress);

@@ -2,7 +2,6 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use guardsplat_engine::device::open;
 use guardsplat_engine::extract::find_source;
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::BadRows;
@@ -83,7 +82,8 @@ pub fn verify(
             level: 0,
         };
         let clip = options.clip.as_deref();
-        let mut engine = load::engine(path, inner, clip, open(device)?, false, options.memory)?;
+        let device = load::device(device, clip.unwrap_or(&inner.clip.name))?;
+        let mut engine = load::engine(path, inner, clip, device, false, options.memory)?;
         engine.stop = context.stop.clone();
         let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
             context.at("reading", done, total);

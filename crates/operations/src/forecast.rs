@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use guardsplat_codeword::Message;
 use guardsplat_distortion::RobustTo;
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::clip::ShippedClip;
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::embed::{Forecast, Preset, forecast};
 use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_engine::scene::Scene;
@@ -90,7 +91,11 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
             reason: "marks of preset paper are not forecast, for nothing holds their PSNR".into(),
         });
     }
-    let compute = open(wish.device)?;
+    let clip = match &wish.key {
+        Some((_, key)) => key.clip.name.as_str(),
+        None => ShippedClip::for_bits(wish.bits),
+    };
+    let compute = load::device(wish.device, clip)?;
     let (path, key) = match &wish.key {
         Some((path, key)) => (path.clone(), key.clone()),
         None => {

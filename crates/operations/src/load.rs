@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use guardsplat_engine::clip::{Clip, Parts, ShippedClip};
-use guardsplat_engine::device::Compute;
+use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::extract::{Engine, HiddenExtractor};
 use guardsplat_engine::memory::Limits;
 use guardsplat_engine::message::{ClipIdentity, Decoding, Key};
@@ -14,6 +14,18 @@ use guardsplat_engine::{Error, Result};
 /// Cameras of a file or folder; none without one.
 pub fn cameras(path: Option<&Path>) -> Result<Vec<Camera>> {
     Ok(path.map(read_cameras).transpose()?.unwrap_or_default())
+}
+
+/// The device for the CLIP called `clip`, where `choice` was made. Shipped CLIPs are slower on a card than on the CPU beside
+/// it (docs/performance.md), so `auto` takes a card, if there is one, for all others only.
+///
+/// # Errors
+/// Those of [`open`].
+pub fn device(choice: DeviceChoice, clip: &str) -> Result<Compute> {
+    match choice {
+        DeviceChoice::Auto if ShippedClip::named(clip).is_some() => open(DeviceChoice::Cpu),
+        _ => open(choice),
+    }
 }
 
 /// The CLIP of that name: a shipped one, or one that was added.
@@ -70,4 +82,21 @@ pub fn engine(
         ..Limits::of_machine(budget)
     };
     Ok(engine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn auto_leaves_shipped_clips_to_the_cpu_and_gives_a_card_to_others() {
+        let shipped = ShippedClip::for_bits(64);
+        assert_eq!(device(DeviceChoice::Auto, shipped).unwrap().name, "cpu");
+        let [other, any] =
+            [device(DeviceChoice::Auto, "vit-b32"), open(DeviceChoice::Auto)].map(|open| open.unwrap().name);
+        assert_eq!(other, any);
+        // Who names a device gets it, or an error.
+        let named = |clip| device(DeviceChoice::Wgpu, clip).map(|compute| compute.name).ok();
+        assert_eq!(named(shipped), named("vit-b32"));
+    }
 }

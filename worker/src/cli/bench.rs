@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use guardsplat_engine::Result;
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::embed::Preset;
 use serde::Serialize;
 
@@ -56,7 +56,7 @@ struct Report<'a> {
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     // First of all: what is computed would be seen as the machine's load.
     let machine = Machine::here();
-    let given = Given::new(arguments, open(arguments.device)?)?;
+    let given = Given::new(arguments)?;
     let mut scenes = Vec::new();
     for gaussians in &arguments.gaussians {
         scenes.push(Case::measure(&given, &machine, *gaussians as usize)?);

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use clap::Args;
 use guardsplat_distortion::RobustTo;
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::embed::{Job, Outcome, Preset, Progress, TrainableCoefficients, Verification, embed_with_files};
 use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
         &arguments.key,
         &key,
         arguments.clip.as_deref(),
-        open(arguments.device)?,
+        load::device(arguments.device, arguments.clip.as_deref().unwrap_or(&key.clip.name))?,
         true,
         arguments.budget.bytes(),
     )?;

@@ -101,7 +101,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let mut tools = None;
     if !arguments.report_only {
         check(arguments)?;
-        let compute = open(arguments.device)?;
+        let compute = match arguments.extractor {
+            Extractor::Clip => load::device(
+                arguments.device,
+                arguments.clip.as_deref().unwrap_or(ShippedClip::NEWEST),
+            )?,
+            Extractor::Hidden => open(arguments.device)?,
+        };
         let vae = vae(arguments, &compute)?;
         tools = Some((compute, vae));
     } else if !arguments.folder.is_dir() {

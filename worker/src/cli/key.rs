@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use guardsplat_distortion::RobustTo;
+use guardsplat_engine::clip::ShippedClip;
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::message::key::{HiddenKeyOptions, KeyProgress, create_hidden_key};
 use guardsplat_engine::message::training::Progress;
@@ -14,7 +15,7 @@ use serde::Serialize;
 
 use super::display::Display;
 use super::{Exit, Extractor, print_json, print_line};
-use guardsplat_operations::create_key;
+use guardsplat_operations::{create_key, load};
 
 #[derive(Subcommand)]
 pub enum Command {
@@ -89,7 +90,14 @@ struct Report<'a> {
 pub fn run(command: Command) -> Result<Exit> {
     let Command::Create(arguments) = command;
     let start = Instant::now();
-    let compute = open(arguments.device)?;
+    let clip = arguments.clip.as_deref();
+    let compute = match arguments.extractor {
+        Extractor::Clip => load::device(
+            arguments.device,
+            clip.unwrap_or_else(|| ShippedClip::for_bits(arguments.bits)),
+        )?,
+        Extractor::Hidden => open(arguments.device)?,
+    };
     let key = match arguments.extractor {
         Extractor::Clip => for_clip(&arguments, &compute)?,
         Extractor::Hidden => hidden(&arguments, &compute)?,

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use guardsplat_codeword::Verdict;
 use guardsplat_engine::Result;
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::extract::{Comparison, DEFAULT_VIEWS, find_source};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::scene::{BadRows, Ignored};
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         &arguments.key,
         &key,
         arguments.clip.as_deref(),
-        open(arguments.device)?,
+        load::device(arguments.device, arguments.clip.as_deref().unwrap_or(&key.clip.name))?,
         false,
         arguments.budget.bytes(),
     )?;

@@ -2,6 +2,7 @@
 use std::time::{Duration, Instant};
 
 use guardsplat_distortion::RobustTo;
+use guardsplat_engine::clip::ShippedClip;
 use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
 use guardsplat_proto::v1::complete_job_request::Result as Done;
 use guardsplat_proto::v1::{KeyOutput, KeyResult, KeySpec};
@@ -31,12 +32,12 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outc
     };
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
-        let compute = cache.compute();
+        let compute = cache.compute(ShippedClip::for_bits(options.bits))?;
         let key = create_key::create(
             &options,
             ProjectionOverrides::default(),
             None,
-            compute,
+            &compute,
             stop,
             |progress| {
                 reporter.tell(convert::key_progress(progress));

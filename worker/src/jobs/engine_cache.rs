@@ -1,4 +1,4 @@
-//! A cache of the engine's thread: the device, and the engine of the key that was used last.
+//! A cache of the engine's thread: the engine of the key that was used last, on the device that suits its CLIP.
 use std::path::Path;
 
 use guardsplat_engine::Result;
@@ -9,9 +9,11 @@ use guardsplat_engine::stop::Stop;
 
 use guardsplat_operations::load;
 
-/// A device, and the engine of the last key on it.
+/// A choice of device, and the engine of the last key.
 pub struct EngineCache {
-    compute: Compute,
+    choice: DeviceChoice,
+    /// What is opened where nothing is known of a CLIP.
+    device: String,
     /// Bytes of memory that a job may take, if not all of the machine's.
     budget: Option<u64>,
     /// The key's id, and its engine.
@@ -22,20 +24,21 @@ impl EngineCache {
     /// Opens the device, for jobs that may take so many bytes of memory.
     pub fn open(device: DeviceChoice, budget: Option<u64>) -> Result<Self> {
         Ok(Self {
-            compute: open(device)?,
+            choice: device,
+            device: open(device)?.name,
             budget,
             loaded: None,
         })
     }
 
-    /// The device's name.
+    /// The name of the device, of the card if `auto` found one; jobs with shipped CLIPs run beside it on the CPU.
     pub fn device(&self) -> &str {
-        &self.compute.name
+        &self.device
     }
 
-    /// The device.
-    pub fn compute(&self) -> &Compute {
-        &self.compute
+    /// The device for the CLIP of that name.
+    pub fn compute(&self, clip: &str) -> Result<Compute> {
+        load::device(self.choice, clip)
     }
 
     /// The engine for `key`, the one from before if it is the same key's; it heeds `stop`, and judges at a rate of false
@@ -46,7 +49,10 @@ impl EngineCache {
         let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
         let engine = match kept {
             Some((_, engine)) => engine,
-            None => load::engine(Path::new(name), key, None, self.compute.clone(), true, self.budget)?,
+            None => {
+                let compute = self.compute(&key.clip.name)?;
+                load::engine(Path::new(name), key, None, compute, true, self.budget)?
+            }
         };
         let (_, engine) = self.loaded.insert((id, engine));
         engine.stop = stop.clone();

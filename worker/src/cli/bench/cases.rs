@@ -3,7 +3,8 @@ use std::path::{Path, PathBuf};
 
 use guardsplat_codeword::Message;
 use guardsplat_distortion::RobustTo;
-use guardsplat_engine::device::Compute;
+use guardsplat_engine::clip::ShippedClip;
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::embed::{Job, Preset, Progress, Settings, StepTimes, embed_with_files};
 use guardsplat_engine::extract::{DEFAULT_VIEWS, Engine, find_source};
 use guardsplat_engine::message::{Key, KeyOptions, TrainingOptions};
@@ -44,7 +45,7 @@ pub struct Given {
 }
 
 impl Given {
-    pub fn new(arguments: &Arguments, compute: Compute) -> Result<Self> {
+    pub fn new(arguments: &Arguments) -> Result<Self> {
         let json = arguments
             .settings
             .as_ref()
@@ -58,8 +59,9 @@ impl Given {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         let (path, key) = match &arguments.key {
             Some(path) => (path.clone(), Key::read(path)?),
-            None => (folder.path().join("key"), made(&compute)?),
+            None => (folder.path().join("key"), made(arguments.device)?),
         };
+        let compute = load::device(arguments.device, &key.clip.name)?;
         // Without LPIPS, which some have and others don't.
         let engine = load::engine(&path, &key, None, compute, false, arguments.budget.bytes())?;
         let digits = key.bits().div_ceil(4);
@@ -76,7 +78,7 @@ impl Given {
 }
 
 /// A key for the newest shipped CLIP.
-fn made(compute: &Compute) -> Result<Key> {
+fn made(device: DeviceChoice) -> Result<Key> {
     let options = KeyOptions {
         bits: BITS,
         bits_per_token: None,
@@ -85,7 +87,8 @@ fn made(compute: &Compute) -> Result<Key> {
         training: TrainingOptions::default(),
     };
     let overrides = create_key::ProjectionOverrides::default();
-    create_key::create(&options, overrides, None, compute, &Stop::default(), |_| {})
+    let compute = load::device(device, ShippedClip::for_bits(BITS))?;
+    create_key::create(&options, overrides, None, &compute, &Stop::default(), |_| {})
 }
 
 /// How long things take with one scene.

@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use guardsplat_engine::device::{DeviceChoice, open};
+use guardsplat_engine::device::DeviceChoice;
 use guardsplat_engine::extract::{DEFAULT_VIEWS, Engine, find_source};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::scene::BadRows;
@@ -54,7 +54,9 @@ impl Arguments {
 
     /// What reads the mark of this key.
     pub fn engine(&self, key: &Key) -> Result<Engine> {
-        let (device, memory) = (open(self.device)?, self.budget.bytes());
+        let clip = self.clip.as_deref();
+        let device = load::device(self.device, clip.unwrap_or(&key.clip.name))?;
+        let memory = self.budget.bytes();
         Ok(load::engine(
             &self.key,
             key,
