@@ -106,8 +106,8 @@ def test_a_scene_is_marked_and_a_picture_of_it_verified(
     found = tab.locator("#verify-result")
     expect(found.get_by_role("heading", name="The mark is there")).to_be_focused(timeout=LONG)
     expect(found).to_contain_text("of 32 bits agree")
-    # The rank sums of 32 bits that a match of a scene needs: 494 of 528.
-    expect(found).to_contain_text("agree; 93.6 % are needed")
+    # The rank sum that a match of a picture as given needs: 498 of 528.
+    expect(found).to_contain_text("agree; 94.3 % are needed")
     expect(found).to_contain_text("What it does not say")
 
     # Another message is not there.
