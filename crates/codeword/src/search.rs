@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::message::{Message, MessageLength};
 use crate::reading::Reading;
+use crate::signed_rank;
 
 /// Words of one length, as compact as their bits allow: 8, 16 or 24 bytes each.
 ///
@@ -99,8 +100,12 @@ impl Index {
         let weights = Weights::<LIMBS>::of(reading);
         let (words, _) = self.limbs.as_chunks::<LIMBS>();
         for (row, target) in (0_u64..).zip(words) {
-            let differ = std::array::from_fn(|limb| (target[limb] ^ word[limb]) & decided[limb]);
-            best.offer((largest - weights.sum(differ), Reverse(place), Reverse(row)));
+            let differ: [u64; LIMBS] = std::array::from_fn(|limb| (target[limb] ^ word[limb]) & decided[limb]);
+            // So many bits have at least these ranks: few words are near enough to look at them.
+            let bits = differ.iter().map(|limb| limb.count_ones()).sum();
+            if largest - signed_rank::largest(bits) >= best.least() {
+                best.offer((largest - weights.sum(differ), Reverse(place), Reverse(row)));
+            }
         }
     }
 }
@@ -142,6 +147,12 @@ struct Best {
 }
 
 impl Best {
+    /// The rank sum that a hit needs.
+    fn least(&self) -> u32 {
+        let worst = self.heap.peek().filter(|_| self.heap.len() >= self.count);
+        worst.map_or(0, |Reverse((rank_sum, ..))| *rank_sum)
+    }
+
     fn offer(&mut self, hit: Order) {
         if self.heap.len() < self.count {
             self.heap.push(Reverse(hit));
