@@ -86,8 +86,7 @@ impl Options {
 impl Chosen {
     /// The engine for the key, which heeds the job's end.
     fn engine(&self, path: &std::path::Path, key: &EngineKey, context: &Context) -> Result<Engine> {
-        let compute = load::device(self.device, self.clip.as_deref().unwrap_or(&key.clip.name))?;
-        let mut engine = load::engine(path, key, self.clip.as_deref(), compute, true, self.memory)?;
+        let mut engine = load::engine(path, key, self.clip.as_deref(), self.device, true, self.memory)?;
         engine.stop = context.stop.clone();
         Ok(engine)
     }

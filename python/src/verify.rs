@@ -82,7 +82,6 @@ pub fn verify(
             level: 0,
         };
         let clip = options.clip.as_deref();
-        let device = load::device(device, clip.unwrap_or(&inner.clip.name))?;
         let mut engine = load::engine(path, inner, clip, device, false, options.memory)?;
         engine.stop = context.stop.clone();
         let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {

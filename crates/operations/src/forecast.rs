@@ -91,11 +91,6 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
             reason: "marks of preset paper are not forecast, for nothing holds their PSNR".into(),
         });
     }
-    let clip = match &wish.key {
-        Some((_, key)) => key.clip.name.as_str(),
-        None => ShippedClip::for_bits(wish.bits),
-    };
-    let compute = load::device(wish.device, clip)?;
     let (path, key) = match &wish.key {
         Some((path, key)) => (path.clone(), key.clone()),
         None => {
@@ -107,12 +102,13 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
                 training: TrainingOptions::default(),
             };
             let none = create_key::ProjectionOverrides::default();
+            let compute = load::device(wish.device, ShippedClip::for_bits(wish.bits))?;
             let key = create_key::create(&options, none, None, &compute, &wish.stop, |_| {})?;
             (PathBuf::from("a key made for the forecast"), Arc::new(key))
         }
     };
     let bits = key.bits();
-    let mut engine = load::engine(&path, &key, None, compute, false, memory)?;
+    let mut engine = load::engine(&path, &key, None, wish.device, false, memory)?;
     engine.stop = wish.stop.clone();
     let settings = Choices {
         preset: wish.preset,

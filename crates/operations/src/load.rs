@@ -48,17 +48,19 @@ fn lpips() -> Option<PathBuf> {
     Some(folder.join(WEIGHTS))
 }
 
-/// An engine for a key, which must belong to the CLIP, if it reads with one: the one named, else the one that the key names. `path` names the
-/// key in messages, and `budget` is how many bytes of memory a job may take, if not all of the machine's.
+/// An engine for a key on the [`device`] for its CLIP. The key must belong to the CLIP, if it reads with one: the one named,
+/// else the one that the key names. `path` names the key in messages, and `budget` is how many bytes of memory a job may
+/// take, if not all of the machine's.
 pub fn engine(
     path: &Path,
     key: &Key,
     clip_name: Option<&str>,
-    compute: Compute,
+    choice: DeviceChoice,
     with_lpips: bool,
     budget: Option<u64>,
 ) -> Result<Engine> {
     let lpips = if with_lpips { lpips() } else { None };
+    let compute = device(choice, clip_name.unwrap_or(&key.clip.name))?;
     let mut engine = match &key.decoding {
         Decoding::Clip { .. } => {
             let name = clip_name.unwrap_or(&key.clip.name);

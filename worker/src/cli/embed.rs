@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
         &arguments.key,
         &key,
         arguments.clip.as_deref(),
-        load::device(arguments.device, arguments.clip.as_deref().unwrap_or(&key.clip.name))?,
+        arguments.device,
         true,
         arguments.budget.bytes(),
     )?;

@@ -316,7 +316,7 @@ fn engine(
             (key, Some(start.elapsed().as_secs_f64()))
         }
     };
-    let engine = load::engine(&path, &key, clip, compute, true, arguments.budget.bytes())?;
+    let engine = load::engine(&path, &key, clip, arguments.device, true, arguments.budget.bytes())?;
     Ok((engine, key, seconds))
 }
 

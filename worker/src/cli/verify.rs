@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         &arguments.key,
         &key,
         arguments.clip.as_deref(),
-        load::device(arguments.device, arguments.clip.as_deref().unwrap_or(&key.clip.name))?,
+        arguments.device,
         false,
         arguments.budget.bytes(),
     )?;

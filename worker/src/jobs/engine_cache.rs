@@ -49,10 +49,7 @@ impl EngineCache {
         let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
         let engine = match kept {
             Some((_, engine)) => engine,
-            None => {
-                let compute = self.compute(&key.clip.name)?;
-                load::engine(Path::new(name), key, None, compute, true, self.budget)?
-            }
+            None => load::engine(Path::new(name), key, None, self.choice, true, self.budget)?,
         };
         let (_, engine) = self.loaded.insert((id, engine));
         engine.stop = stop.clone();

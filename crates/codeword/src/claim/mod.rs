@@ -3,9 +3,8 @@
 //! Pictures are read under each [`Hypothesis`](crate::Hypothesis) about what was done to them (nothing, cropped, turned,
 //! mirrored …), and each gives one word, decided once from logits that were summed over views before. The best pair of a
 //! reading and a target is judged by the [`AcceptanceRule`], which weighs bits by how clearly they were read
-//! ([`signed_rank`]) and counts all hypotheses: targets, whatever else the caller
-//! tried, and readings, each by its share of the rate ([`shares`](crate::shares)). Error correction reads the payload of a
-//! match afterwards, and never decides.
+//! ([`signed_rank`]) and counts all hypotheses: targets, whatever else the caller tried, and readings, each by its share of
+//! the rate ([`shares`](crate::shares)). Error correction reads the payload of a match afterwards, and never decides.
 mod answer;
 mod read;
 #[cfg(test)]

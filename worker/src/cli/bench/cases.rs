@@ -61,9 +61,8 @@ impl Given {
             Some(path) => (path.clone(), Key::read(path)?),
             None => (folder.path().join("key"), made(arguments.device)?),
         };
-        let compute = load::device(arguments.device, &key.clip.name)?;
         // Without LPIPS, which some have and others don't.
-        let engine = load::engine(&path, &key, None, compute, false, arguments.budget.bytes())?;
+        let engine = load::engine(&path, &key, None, arguments.device, false, arguments.budget.bytes())?;
         let digits = key.bits().div_ceil(4);
         Ok(Self {
             // The first digit may have only one bit.

@@ -54,16 +54,13 @@ impl Arguments {
 
     /// What reads the mark of this key.
     pub fn engine(&self, key: &Key) -> Result<Engine> {
-        let clip = self.clip.as_deref();
-        let device = load::device(self.device, clip.unwrap_or(&key.clip.name))?;
-        let memory = self.budget.bytes();
         Ok(load::engine(
             &self.key,
             key,
             self.clip.as_deref(),
-            device,
+            self.device,
             false,
-            memory,
+            self.budget.bytes(),
         )?)
     }
 

@@ -205,7 +205,7 @@ fn wrong(report: &mut Report, all: &[(&Mark, &Claims)]) -> Result<()> {
 }
 
 /// The largest probability, not above `rate`, that a random subset of the ranks 1 to `bits` has so large a sum or a larger
-/// one; 0 if there is none.
+/// one; 0 if there is none. Computed here once more, apart from the code whose p-values are judged by it.
 fn attainable(bits: u32, rate: f64) -> f64 {
     let mut sums = vec![1.0];
     for rank in 1..=bits as usize {
