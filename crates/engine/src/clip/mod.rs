@@ -5,6 +5,7 @@
 pub mod config;
 mod conv;
 mod init;
+mod layer_norm;
 mod model;
 mod names;
 mod params;

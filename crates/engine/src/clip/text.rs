@@ -1,9 +1,9 @@
 //! CLIP's text tower: a causal transformer whose feature is taken at the end token.
 use super::config::{EndToken, TextConfig};
+use super::layer_norm::LayerNorm;
 use super::params::param;
 use super::transformer::{Transformer, layer_norm};
 use burn::module::{Module, Param};
-use burn::nn::LayerNorm;
 use burn::tensor::{Device, Int, IntDType, Tensor};
 
 /// The text tower. Fields are named as in OpenCLIP's checkpoints.

@@ -1,8 +1,9 @@
 //! The residual attention blocks that both the vision and the text transformer are made of.
 use super::config::{Activation, BlockConfig};
+use super::layer_norm::LayerNorm;
 use super::params::param;
 use burn::module::{Module, Param};
-use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
+use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::{sigmoid, softmax};
 use burn::tensor::module::linear;
 use burn::tensor::{Device, Tensor};
@@ -131,9 +132,7 @@ impl Activation {
 }
 
 pub(super) fn layer_norm(width: usize, config: &BlockConfig, device: &Device) -> LayerNorm {
-    LayerNormConfig::new(width)
-        .with_epsilon(config.norm_epsilon)
-        .init(device)
+    LayerNorm::new(width, config.norm_epsilon, device)
 }
 
 /// Zero where a key may be seen, hugely negative (not infinite, which shaders need not support) where it may not.

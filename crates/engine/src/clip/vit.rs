@@ -1,9 +1,9 @@
 //! CLIP's vision transformer (Dosovitskiy et al. 2021, with CLIP's extra normalisation before the blocks).
 use super::config::{BlockConfig, VisionConfig};
+use super::layer_norm::LayerNorm;
 use super::params::param;
 use super::transformer::{Transformer, layer_norm};
 use burn::module::{Module, Param};
-use burn::nn::LayerNorm;
 use burn::tensor::module::linear;
 use burn::tensor::{Device, Tensor};
 

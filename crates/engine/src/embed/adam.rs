@@ -101,7 +101,7 @@ impl Penalty {
     }
 
     /// What a squared offset of each kind is multiplied by: weight over count.
-    fn scales(&self, rows: usize, stride: usize) -> [f64; 2] {
+    pub(super) fn scales(&self, rows: usize, stride: usize) -> [f64; 2] {
         let over = |weight: f32, count: usize| match count {
             0 => 0.0, // no Gaussians, or no coefficients beyond the constant one
             count => f64::from(weight) / count as f64,
@@ -112,9 +112,9 @@ impl Penalty {
 
 /// The state of the optimiser; Gaussians that are not learned take none.
 pub struct Adam {
-    options: AdamOptions,
+    pub(super) options: AdamOptions,
     stride: usize,
-    gaussians: usize,
+    pub(super) gaussians: usize,
     /// Steps that each row has taken.
     steps: Vec<u32>,
     /// Of the step sizes after so many steps, for what the means still lack of having begun at 0.
@@ -180,15 +180,15 @@ impl Adam {
 
 /// What the means lack after some steps.
 #[derive(Clone, Copy, Debug)]
-struct Correction {
+pub(super) struct Correction {
     /// Of the mean of gradients, as a factor.
-    scale: f32,
+    pub scale: f32,
     /// Of the root of the mean of squares, as a divisor.
-    root: f32,
+    pub root: f32,
 }
 
 impl Correction {
-    fn new(options: AdamOptions, steps: i32) -> Self {
+    pub fn new(options: AdamOptions, steps: i32) -> Self {
         let lack = |beta: f32| 1.0 - f64::from(beta).powi(steps);
         Self {
             scale: (1.0 / lack(options.beta1)) as f32,

@@ -16,7 +16,6 @@ use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
 use crate::picture::Picture;
 use crate::quality::{Likeness, LikenessOnDevice, LikenessWeights, batch, likeness_with_gradient, unbatch};
-use crate::splat::{Drawing, GpuRasterizer, PreparedView};
 
 /// What is fixed for a run.
 pub(super) struct Loss<'a> {
@@ -105,42 +104,39 @@ impl<'a> Loss<'a> {
         Ok((evaluated, gradients))
     }
 
-    /// [`Loss::evaluate`] of pictures that are drawn on the device and stay there; the gradients are those to the colours.
-    /// The host waits once.
+    /// [`Loss::evaluate`] of `[views, 3, height, width]` that stay on the device: the gradient to the pictures, and numbers for
+    /// [`Loss::evaluated_on_device`]. Nothing is waited for.
     ///
     /// # Errors
-    /// Those of [`Loss::evaluate`] and of the renderer.
+    /// A failing device.
     pub fn evaluate_on_device(
         &self,
         step: usize,
-        rasterizer: &GpuRasterizer,
-        drawings: &[Drawing<'_>],
-        references: &[&Picture],
+        pictures: Tensor<4>,
+        originals: Tensor<4>,
         factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
-    ) -> Result<(Evaluated, Vec<Vec<f32>>)> {
-        let views = drawings.len();
-        let pictures = rasterizer.draw(drawings)?;
-        let original = batch(references, &self.engine.compute.device)?;
+    ) -> Result<(Tensor<4>, Tensor<1>)> {
         let weights = self.likeness_weights(factors);
-        let likeness = LikenessOnDevice::new(original.clone(), pictures.clone(), weights)?;
+        let likeness = LikenessOnDevice::new(originals.clone(), pictures.clone(), weights)?;
         let leaf = Tensor::from_inner(pictures).require_grad();
-        let graph = self.graph(step, leaf.clone(), || Ok(original), factors, rng)?;
+        let graph = self.graph(step, leaf.clone(), || Ok(originals), factors, rng)?;
         let gradient = self.gradient(&graph.total, &leaf)? + likeness.gradient;
-        let prepared: Vec<&PreparedView> = drawings.iter().map(|drawing| drawing.view).collect();
         let numbers = Tensor::cat(vec![likeness.means.flatten(0, 1), graph.numbers()], 0);
-        let (gradients, numbers) = rasterizer.draw_backward(&prepared, gradient, numbers)?;
+        Ok((gradient, numbers))
+    }
 
+    /// What the numbers of [`Loss::evaluate_on_device`] say.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] with the term.
+    pub fn evaluated_on_device(&self, step: usize, numbers: &[f32], views: usize) -> Result<Evaluated> {
         let mean = |of: &[f32]| of.iter().sum::<f32>() / views as f32;
         let (likeness, numbers) = numbers.split_at(3 * views);
         let [ssim, l1, mse] = [0, 1, 2].map(|part| &likeness[part * views..][..views]);
         let psnrs = mse.iter().map(|mse| -10.0 * f64::from(*mse).log10());
         let terms = [mean(l1), 1.0 - mean(ssim)];
-        let evaluated = self.evaluated(step, numbers, terms, psnrs.sum::<f64>() / views as f64)?;
-        let of_view = |gradient: &Vec<f32>| gradient.iter().map(|g| g.abs()).sum::<f32>();
-        let sums: Vec<f32> = gradients.par_iter().map(of_view).collect();
-        finite(step, "gradient", sums.iter().sum())?;
-        Ok((evaluated, gradients))
+        self.evaluated(step, numbers, terms, psnrs.sum::<f64>() / views as f64)
     }
 
     fn likeness_weights(&self, factors: LossWeightFactors) -> LikenessWeights {

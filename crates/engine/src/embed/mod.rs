@@ -14,6 +14,7 @@ mod learned_offsets;
 mod loss;
 mod loss_weight_controller;
 mod marking;
+mod on_device;
 mod optimise;
 mod optimizer;
 mod preconditioned_sgd;

@@ -9,8 +9,9 @@ use rand_chacha::ChaCha8Rng;
 use super::adam::{Adam, Penalty};
 use super::early_stopping::EarlyStopping;
 use super::learned_offsets::LearnedOffsets;
-use super::loss::{Loss, finite};
-use super::loss_weight_controller::LossWeightController;
+use super::loss::{Evaluated, Loss, finite};
+use super::loss_weight_controller::{LossWeightController, LossWeightFactors};
+use super::on_device::{OnDevice, StepOptions};
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgd;
 use super::progress::{Check, Progress, Step};
@@ -22,7 +23,7 @@ use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
-use crate::splat::{Drawing, Geometry, Learnable, PreparedView, sh};
+use crate::splat::{Geometry, Learnable, PreparedView, sh};
 use crate::view::{Camera, ViewSampler};
 
 /// Steps between two reports of the timing.
@@ -92,6 +93,7 @@ pub fn optimise(
         let mut enough = false;
         if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
             let check;
+            run.fetch()?;
             (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
             run.heed(&check);
             progress(Progress::Check(check));
@@ -103,6 +105,7 @@ pub fn optimise(
             break;
         }
     }
+    run.fetch()?;
     Ok(Optimised {
         learned: run.learned,
         covering_views: coverage.views,
@@ -112,7 +115,7 @@ pub fn optimise(
 }
 
 /// What moves the offsets.
-enum OptimizerState {
+pub(super) enum OptimizerState {
     Adam(Adam),
     PreconditionedSgd(PreconditionedSgd),
 }
@@ -134,6 +137,8 @@ struct Run<'a> {
     augmentation: ChaCha8Rng,
     learned: LearnedOffsets,
     gradient: Vec<f32>,
+    /// Where the engine computes on a card.
+    on_device: Option<OnDevice>,
 }
 
 impl<'a> Run<'a> {
@@ -163,8 +168,11 @@ impl<'a> Run<'a> {
             }
             Optimizer::Adam(options) => OptimizerState::Adam(Adam::new(options, rows, columns, scene.gaussians.len())),
         };
+        let rasterizer = engine.rasterizer()?.on_device();
+        let on_device = rasterizer.map(|rasterizer| OnDevice::new(rasterizer, scene, &learnable, &optimiser));
         let run = Self {
             engine,
+            on_device,
             scene,
             geometry: Arc::new(geometry),
             settings,
@@ -188,27 +196,55 @@ impl<'a> Run<'a> {
         let mut figures = if step < self.steps {
             // What the next step is to draw does not depend on this one.
             let (engine, geometry, upcoming) = (self.engine, self.geometry.clone(), self.pool.upcoming());
-            let (figures, prepared) = thread::scope(|scope| {
-                let prepared = scope.spawn(|| upcoming.prepare(engine, &geometry));
-                let figures = self.differentiate(step, &views, timing);
-                (figures, prepared.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            let mut prepared = Vec::new();
+            let figures = thread::scope(|scope| {
+                let preparing = scope.spawn(|| upcoming.prepare(engine, &geometry));
+                self.differentiate(step, &views, timing, || {
+                    prepared = preparing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+                    PooledView::send(engine, &mut prepared)
+                })
             });
-            timing.lap(Stage::Prepare);
-            self.pool.prepared(prepared?);
+            self.pool.prepared(prepared);
             figures?
         } else {
-            self.differentiate(step, &views, timing)?
+            self.differentiate(step, &views, timing, || Ok(()))?
         };
+        if !self.moves_on_device() {
+            figures.terms.offset = self.advance(step)?;
+        }
+        let ssim = 1.0 - f64::from(figures.terms.ssim);
+        self.controller.update(figures.psnr_db, figures.bit_accuracy, ssim);
+        timing.lap(Stage::Adam);
+        Ok(figures)
+    }
 
-        let lambda = &self.settings.lambda;
-        let penalty = Penalty {
-            dc: lambda.offset_dc,
-            rest: lambda.offset_rest,
-        };
+    fn moves_on_device(&self) -> bool {
+        self.on_device.as_ref().is_some_and(OnDevice::moves)
+    }
+
+    /// Brings the offsets from where they are moved.
+    fn fetch(&mut self) -> Result<()> {
+        match (&self.on_device, self.engine.rasterizer()?.on_device()) {
+            (Some(on_device), Some(rasterizer)) if on_device.moves() => {
+                on_device.read_offsets(rasterizer, &mut self.learned.values)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn penalty(&self) -> Penalty {
+        Penalty {
+            dc: self.settings.lambda.offset_dc,
+            rest: self.settings.lambda.offset_rest,
+        }
+    }
+
+    /// Moves the offsets along `self.gradient`, which is all zero afterwards; returns the penalty of where they were.
+    fn advance(&mut self, step: usize) -> Result<f32> {
+        let (penalty, rate) = (self.penalty(), self.rate(step));
         let (columns, gaussians) = (self.learned.learnable.columns(), self.scene.gaussians.len());
-        figures.terms.offset = penalty.value(&self.learned.values, columns, gaussians) as f32;
-        finite(step, "offset", figures.terms.offset)?;
-        let rate = self.rate(step);
+        let offset = penalty.value(&self.learned.values, columns, gaussians) as f32;
+        finite(step, "offset", offset)?;
         let (offsets, gradient) = (&mut self.learned.values, &mut self.gradient);
         match &mut self.optimiser {
             OptimizerState::Adam(adam) => adam.step(rate, penalty, offsets, gradient),
@@ -218,42 +254,79 @@ impl<'a> Run<'a> {
             }
         }
         self.learned.quantize(self.scene);
-        let ssim = 1.0 - f64::from(figures.terms.ssim);
-        self.controller.update(figures.psnr_db, figures.bit_accuracy, ssim);
-        timing.lap(Stage::Adam);
-        Ok(figures)
+        if let (Some(on_device), Some(rasterizer)) = (&mut self.on_device, self.engine.rasterizer()?.on_device()) {
+            on_device.set_offsets(rasterizer, self.learned.changes().values);
+        }
+        Ok(offset)
     }
 
     /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
-    /// `self.gradient`.
-    fn differentiate(&mut self, step: usize, views: &[Arc<PooledView>], timing: &mut StepTimer) -> Result<Step> {
-        let (engine, scene) = (self.engine, &self.scene.gaussians);
-        let changes = self.learned.changes();
-        let colours = PooledView::colours(views, &scene.sh, Some(changes));
-        timing.lap(Stage::Colours);
-        let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
+    /// `self.gradient`. On a card the offsets are moved as well, if they are moved there; `meanwhile` is done while it computes.
+    fn differentiate(
+        &mut self,
+        step: usize,
+        views: &[Arc<PooledView>],
+        timing: &mut StepTimer,
+        meanwhile: impl FnOnce() -> Result<()>,
+    ) -> Result<Step> {
         let factors = self.controller.factors();
-        let rng = &mut self.augmentation;
-        let (found, gradients) = match engine.rasterizer()?.on_device() {
-            Some(rasterizer) => {
-                let drawings: Vec<Drawing<'_>> = views.iter().zip(&colours).map(|(v, c)| v.drawing(c)).collect();
-                let (loss, drawings) = (&self.loss, &drawings);
-                let found = loss.evaluate_on_device(step, rasterizer, drawings, &references, factors, rng)?;
+        let options = StepOptions {
+            step,
+            factors,
+            rate: self.rate(step),
+            penalty: self.penalty(),
+        };
+        let found = match (self.engine.rasterizer()?.on_device(), &mut self.on_device) {
+            (Some(rasterizer), Some(on_device)) => {
+                let launched = on_device.launch(rasterizer, &self.loss, views, options, &mut self.augmentation)?;
+                timing.lap(Stage::Loss);
+                meanwhile()?;
+                timing.lap(Stage::Prepare);
+                let found = on_device.wait(rasterizer, &self.loss, launched)?;
+                if !on_device.moves() {
+                    on_device.read_gradient(rasterizer, &mut self.gradient)?;
+                }
                 timing.lap(Stage::Loss);
                 found
             }
-            None => {
-                let pictures = PooledView::draw_all(engine, views, &colours)?;
-                timing.lap(Stage::Render);
-                let pictures: Vec<&Picture> = pictures.iter().collect();
-                let (found, gradients) = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
-                timing.lap(Stage::Loss);
-                let prepared: Vec<&PreparedView> = views.iter().map(|v| &v.view).collect();
-                let gradients = engine.rasterizer()?.backward_all(&prepared, &gradients)?;
-                timing.lap(Stage::Backward);
-                (found, gradients)
+            _ => {
+                let found = self.differentiate_on_host(step, views, factors, timing)?;
+                meanwhile()?;
+                timing.lap(Stage::Prepare);
+                found
             }
         };
+        Ok(Step {
+            step,
+            total: self.steps,
+            bit_accuracy: found.bit_accuracy,
+            psnr_db: found.psnr_db,
+            terms: found.terms,
+            balance: factors.reconstruction,
+        })
+    }
+
+    fn differentiate_on_host(
+        &mut self,
+        step: usize,
+        views: &[Arc<PooledView>],
+        factors: LossWeightFactors,
+        timing: &mut StepTimer,
+    ) -> Result<Evaluated> {
+        let engine = self.engine;
+        let changes = self.learned.changes();
+        let colours = PooledView::colours(views, &self.scene.gaussians.sh, Some(changes));
+        timing.lap(Stage::Colours);
+        let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
+        let pictures = PooledView::draw_all(engine, views, &colours)?;
+        timing.lap(Stage::Render);
+        let pictures: Vec<&Picture> = pictures.iter().collect();
+        let rng = &mut self.augmentation;
+        let (found, gradients) = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
+        timing.lap(Stage::Loss);
+        let prepared: Vec<&PreparedView> = views.iter().map(|v| &v.view).collect();
+        let gradients = engine.rasterizer()?.backward_all(&prepared, &gradients)?;
+        timing.lap(Stage::Backward);
         let of_views = views.iter().zip(&colours).zip(&gradients);
         let of_views: Vec<sh::ColourGradient<'_>> = of_views
             .map(|((v, colours), gradient)| sh::ColourGradient {
@@ -264,14 +337,7 @@ impl<'a> Run<'a> {
             .collect();
         sh::backward_of_views(&self.learned.learnable, &of_views, &mut self.gradient);
         timing.lap(Stage::ShBackward);
-        Ok(Step {
-            step,
-            total: self.steps,
-            bit_accuracy: found.bit_accuracy,
-            psnr_db: found.psnr_db,
-            terms: found.terms,
-            balance: factors.reconstruction,
-        })
+        Ok(found)
     }
 
     /// Heeds what held-out views showed. Where they show the mark more than they may, its PSNR is held higher. Where they
@@ -372,7 +438,7 @@ mod tests {
                 run.gradient.fill(0.0);
                 // The same augmentation every time.
                 run.augmentation = ChaCha8Rng::seed_from_u64(4);
-                let t = run.differentiate(1, &views, &mut StepTimer::new()).unwrap().terms;
+                let t = run.differentiate(1, &views, &mut StepTimer::new(), || Ok(())).unwrap().terms;
                 let l = &settings.lambda;
                 let reconstruction = l.l1 * t.l1 + l.ssim * t.ssim;
                 let loss = l.message * t.message + l.reconstruction * reconstruction;

@@ -13,7 +13,7 @@ use crate::error::Result;
 /// Rows that one task updates.
 const CHUNK: usize = 512;
 /// The square of the constant spherical harmonic, and the mean square over directions of all others.
-const MEAN_SQUARE: f32 = 0.079_577_47;
+pub(super) const MEAN_SQUARE: f32 = 0.079_577_47;
 /// Smallest energy of a Gaussian that is believed, against the mean of all.
 const FLOOR: f32 = 1e-2;
 /// The same where views are from inside, as among cameras that were given: each shows another part of the scene, so what few show
@@ -61,10 +61,10 @@ impl PreconditionedSgdOptions {
 
 /// The state of the optimiser.
 pub struct PreconditionedSgd {
-    options: PreconditionedSgdOptions,
+    pub(super) options: PreconditionedSgdOptions,
     stride: usize,
     /// Of each slot: one over the mean over views of `sum_p w c`, a colour's squared change in a picture's squares.
-    inverse: Vec<f32>,
+    pub(super) inverse: Vec<f32>,
     velocity: Vec<f32>,
     /// Running mean of the squared length of steps before they are scaled, and the largest that it was.
     running: f32,

@@ -18,7 +18,7 @@ use crate::extract::Engine;
 use crate::picture::Picture;
 use crate::quality::cover::{COVERED, share};
 use crate::scene::Sh;
-use crate::splat::{Changes, Drawing, Geometry, PreparedView, sh};
+use crate::splat::{Changes, Drawing, Geometry, PackedView, PreparedView, Shown, sh};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
@@ -32,7 +32,9 @@ pub(super) struct PooledView {
     background: [f32; 3],
     /// Added to the colours of the visible Gaussians; empty for nothing.
     noise: Vec<f32>,
-    /// The unmarked picture.
+    /// What a card is to have of the view, until it has it.
+    packed: Option<PackedView>,
+    /// The unmarked picture; of none that a step draws on a card, which does it there.
     pub reference: Picture,
 }
 
@@ -63,6 +65,7 @@ impl PooledView {
 
     /// Draws what views look like unmarked.
     fn with_references(engine: &Engine, geometry: &Geometry<'_>, mut views: Vec<Self>) -> Result<Vec<Self>> {
+        Self::send(engine, &mut views)?;
         let colours = Self::colours(&views, geometry.sh(), None);
         let references = Self::draw_all(engine, &views, &colours)?;
         for (view, reference) in views.iter_mut().zip(references) {
@@ -82,8 +85,10 @@ impl PooledView {
             view.degree = view.degree.min(degree);
         }
         let noise = how.augmentation.noise(&view, geometry.sh().degree);
+        let packed = (!engine.on_cpu()).then(|| PackedView::new(&view));
         Ok(Self {
             view,
+            packed,
             background: how.background,
             noise,
             reference: Picture {
@@ -104,6 +109,34 @@ impl PooledView {
             }
         }
         all
+    }
+
+    /// Sends views to the card that they will be drawn on. Nothing is waited for.
+    ///
+    /// # Errors
+    /// Those of the renderer.
+    pub fn send(engine: &Engine, views: &mut [Self]) -> Result<()> {
+        if let Some(rasterizer) = engine.rasterizer()?.on_device() {
+            for view in views {
+                if let Some(packed) = view.packed.take() {
+                    rasterizer.send(&view.view, packed);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What is drawn on a card, where colours are.
+    pub fn shown(&self) -> Shown<'_> {
+        Shown {
+            view: &self.view,
+            background: self.background,
+        }
+    }
+
+    /// What is added to the colours of the visible Gaussians, `[visible][3]`; empty for nothing.
+    pub fn noise(&self) -> &[f32] {
+        &self.noise
     }
 
     /// What there is to draw with these colours of the visible Gaussians.
@@ -343,14 +376,17 @@ impl ViewPool {
         (self.next..self.next + count as u64).map(|i| i % all).collect()
     }
 
-    /// The next views, drawn.
+    /// The next views, with what they look like unmarked where that is needed.
     fn make(&mut self, engine: &Engine, geometry: &Geometry<'_>, count: usize) -> Result<Vec<Arc<PooledView>>> {
         let mut views = std::mem::take(&mut self.ahead);
         if views.len() != count {
             views = self.maker.prepare(engine, geometry, &self.numbers(count))?;
         }
         self.next += count as u64;
-        let views = PooledView::with_references(engine, geometry, views)?;
+        PooledView::send(engine, &mut views)?;
+        if engine.rasterizer()?.on_device().is_none() {
+            views = PooledView::with_references(engine, geometry, views)?;
+        }
         Ok(views.into_iter().map(Arc::new).collect())
     }
 

@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 
 /// Units of a cube.
 const CUBE: u32 = 256;
+const UNITS: usize = CUBE as usize;
 /// Cubes a dimension that every device allows.
 const MAX_CUBES: u32 = 65_535;
 
@@ -168,6 +169,33 @@ fn to_marked(
     }
 }
 
+/// A cube for each row of `values` (`[rows][len]`): its mean.
+#[cube(launch)]
+fn means_of_rows(values: &[f32], means: &mut [f32], len: u32, scale: f32) {
+    let row = CUBE_POS_X as usize;
+    let unit = UNIT_POS as usize;
+    let mut sums = Shared::<[f32]>::new_slice(UNITS);
+    let mut sum = 0.0f32;
+    let mut at = unit;
+    while at < len as usize {
+        sum += values[row * len as usize + at];
+        at += UNITS;
+    }
+    sums[unit] = sum;
+    #[unroll]
+    for level in 0..comptime!(UNITS.ilog2() as usize) {
+        sync_cube();
+        let half = comptime!(UNITS >> (level + 1));
+        if unit < half {
+            let other = sums[unit + half];
+            sums[unit] += other;
+        }
+    }
+    if unit == 0 {
+        means[row] = sums[0] * scale;
+    }
+}
+
 /// Likeness of pictures on a card, and its gradient.
 pub(crate) struct LikenessOnDevice {
     /// Means over pixels and colours of SSIM, of absolute and of squared differences, `[3, views]`.
@@ -226,9 +254,19 @@ impl LikenessOnDevice {
             scale * weights.l2,
             scale * weights.ssim,
         );
-        let values = tensor::<3>(&y, values, [3, views, channels * height * width]);
+        let (rows, len) = (3 * views, channels * height * width);
+        let means = client.empty(4 * rows);
+        means_of_rows::launch(
+            &client,
+            CubeCount::Static(rows as u32, 1, 1),
+            CubeDim::new_1d(CUBE),
+            argument(&values, rows * len),
+            argument(&means, rows),
+            len as u32,
+            1.0 / len as f32,
+        );
         Ok(Self {
-            means: values.mean_dim(2).reshape([3, views]),
+            means: tensor(&y, means, [3, views]),
             gradient: tensor(&y, gradient, [views, channels, height, width]),
         })
     }

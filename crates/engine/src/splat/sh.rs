@@ -7,10 +7,10 @@ use std::ops::Range;
 /// Coefficients a channel at the highest degree.
 pub const MAX_COEFFICIENTS: usize = 25;
 
-const C0: f32 = 0.282_094_8;
-const C1: f32 = 0.488_602_52;
-const C2: [f32; 5] = [1.092_548_5, -1.092_548_5, 0.315_391_57, -1.092_548_5, 0.546_274_24];
-const C3: [f32; 7] = [
+pub(super) const C0: f32 = 0.282_094_8;
+pub(super) const C1: f32 = 0.488_602_52;
+pub(super) const C2: [f32; 5] = [1.092_548_5, -1.092_548_5, 0.315_391_57, -1.092_548_5, 0.546_274_24];
+pub(super) const C3: [f32; 7] = [
     -0.590_043_6,
     2.890_611_4,
     -0.457_045_8,
@@ -19,7 +19,7 @@ const C3: [f32; 7] = [
     1.445_305_7,
     -0.590_043_6,
 ];
-const C4: [f32; 9] = [
+pub(super) const C4: [f32; 9] = [
     2.503_343,
     -1.770_130_8,
     0.946_174_7,

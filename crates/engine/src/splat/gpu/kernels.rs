@@ -2,26 +2,48 @@
 //!
 //! One cube of 16 x 16 units a tile, one unit a pixel. They use nothing that lavapipe lacks: no subgroup operations, no
 //! float atomics, under 24 KiB of shared memory. Every sum has a fixed order, so results repeat to the byte.
-//! Views of a batch share a buffer of pictures and one of gradients to them, in which a view begins at `first_pixel`.
+//! Views of a group are drawn side by side: a view a layer of cubes, its words found by the group's table ([`super::batch`]).
 // The launch functions that the macro makes carry no documentation.
 #![allow(missing_docs)]
 use cubecl::prelude::*;
 
-use super::composite::{ALPHA_MAX, TRANSMITTANCE_MIN};
-use super::project::ALPHA_MIN;
+use super::batch::{
+    BACKGROUND, FIELDS, FIRST_COLOUR, FIRST_SLOT, PICTURE, SHAPE, SLOT_LIST, SLOT_START, SPLATS, TILE_LIST, TILE_START, VISIBLE,
+};
+use super::buffer::unit_of_layer;
+use crate::splat::composite::{ALPHA_MAX, TRANSMITTANCE_MIN};
+use crate::splat::project::ALPHA_MIN;
+use crate::splat::tiles;
 
-/// Floats of a [`super::Splat2d`] in a buffer.
-pub(super) const SPLAT_FLOATS: usize = 8;
-const PIXELS: usize = super::tiles::TILE_PIXELS;
-const SIDE: u32 = super::tiles::TILE;
-/// Floats of a splat that compositing needs: the first six of `Splat2d`.
-const SHAPE: usize = 6;
+const PIXELS: usize = tiles::TILE_PIXELS;
+const SIDE: u32 = tiles::TILE;
 /// The same and a colour.
 const SHAPE_AND_COLOUR: usize = SHAPE + 3;
 /// Splats whose weights are in shared memory at a time: 16 x 256 floats are 16 KiB.
 const BATCH: usize = 16;
 /// Units that sum one splat's 256 products: 256 / BATCH.
 const SUMMERS: usize = PIXELS / BATCH;
+
+/// A field of a view's row in the table.
+#[cube]
+pub(super) fn field(table: &[u32], view: usize, #[comptime] which: usize) -> usize {
+    table[view * FIELDS + which] as usize
+}
+
+/// A field that is a float.
+#[cube]
+fn float_field(table: &[u32], view: usize, #[comptime] which: usize) -> f32 {
+    f32::reinterpret(table[view * FIELDS + which])
+}
+
+/// Copies `part` to `words` from `at` on.
+#[cube(launch)]
+pub fn append(part: &[u32], words: &mut [u32], at: u32) {
+    let unit = unit_of_layer();
+    if unit < part.len() {
+        words[at as usize + unit] = part[unit];
+    }
+}
 
 /// Opacity of a splat at a pixel `dx`, `dy` from its centre; see [`super::Splat2d`] for the formula.
 #[cube]
@@ -32,21 +54,13 @@ fn alpha_at(dx: f32, dy: f32, inverse_x: f32, slope: f32, inverse_y: f32, opacit
     min(opacity * f32::exp(max(power, -80.0f32)), ALPHA_MAX)
 }
 
-/// Draws a tile: `pictures` (`[views][3][height][width]`) from the tile's list, front to back.
+/// Draws a tile: `pictures` (`[views][3][height][width]`) from the tile's list, front to back, with the group's `colours`.
 #[cube(launch)]
-pub fn composite(
-    splats: &[f32],
-    start: &[u32],
-    list: &[u32],
-    colours: &[f32],
-    pictures: &mut [f32],
-    first_pixel: u32,
-    width: u32,
-    height: u32,
-    red: f32,
-    green: f32,
-    blue: f32,
-) {
+pub fn composite(words: &[u32], table: &[u32], colours: &[f32], pictures: &mut [f32], width: u32, height: u32) {
+    let view = CUBE_POS_Z as usize;
+    let splats = field(table, view, SPLATS);
+    let list = field(table, view, TILE_LIST);
+    let first_colour = field(table, view, FIRST_COLOUR);
     let unit = UNIT_POS as usize;
     let tile = (CUBE_POS_Y * CUBE_COUNT_X + CUBE_POS_X) as usize;
     let x = CUBE_POS_X * SIDE + UNIT_POS_X;
@@ -64,17 +78,18 @@ pub fn composite(
     let mut g = 0.0f32;
     let mut b = 0.0f32;
 
-    let mut base = start[tile] as usize;
-    let end = start[tile + 1] as usize;
+    let start = field(table, view, TILE_START);
+    let mut base = words[start + tile] as usize;
+    let end = words[start + tile + 1] as usize;
     while base < end && any_open == 1u32 {
         let count = min(end - base, PIXELS);
         if unit < count {
-            let index = list[base + unit] as usize;
+            let index = words[list + base + unit] as usize;
             for k in 0..SHAPE {
-                batch[unit * SHAPE_AND_COLOUR + k] = splats[index * SPLAT_FLOATS + k];
+                batch[unit * SHAPE_AND_COLOUR + k] = f32::reinterpret(words[splats + index * SHAPE + k]);
             }
             for k in 0..3usize {
-                batch[unit * SHAPE_AND_COLOUR + SHAPE + k] = colours[index * 3 + k];
+                batch[unit * SHAPE_AND_COLOUR + SHAPE + k] = colours[(first_colour + index) * 3 + k];
             }
         }
         if unit == 0 {
@@ -115,29 +130,24 @@ pub fn composite(
     }
     if inside {
         let area = (width * height) as usize;
-        let out = (first_pixel + y * width + x) as usize;
-        pictures[out] = r + transmittance * red;
-        pictures[out + area] = g + transmittance * green;
-        pictures[out + 2 * area] = b + transmittance * blue;
+        let out = field(table, view, PICTURE) * 3 * area + (y * width + x) as usize;
+        pictures[out] = r + transmittance * float_field(table, view, BACKGROUND);
+        pictures[out + area] = g + transmittance * float_field(table, view, BACKGROUND + 1);
+        pictures[out + 2 * area] = b + transmittance * float_field(table, view, BACKGROUND + 2);
     }
 }
 
-/// Gradient of a tile to the colours of its splats: `slots` (`[pairs][3]`) gets `sum_pixels weight * gradient`, of
-/// gradients to pictures `[views][3][height][width]`.
+/// Gradient of a tile to the colours of its splats: the group's `slots` (`[pairs][3]`) get `sum_pixels weight * gradient`,
+/// of gradients to pictures `[views][3][height][width]`.
 ///
 /// The units recompute their weights front to back for [`BATCH`] splats at a time and leave them in shared memory;
 /// then [`SUMMERS`] units a splat each sum 16 pixels, and one unit a splat sums those.
 #[cube(launch)]
-pub fn splat_gradients(
-    splats: &[f32],
-    start: &[u32],
-    list: &[u32],
-    gradient: &[f32],
-    slots: &mut [f32],
-    first_pixel: u32,
-    width: u32,
-    height: u32,
-) {
+pub fn splat_gradients(words: &[u32], table: &[u32], gradient: &[f32], slots: &mut [f32], width: u32, height: u32) {
+    let view = CUBE_POS_Z as usize;
+    let splats = field(table, view, SPLATS);
+    let list = field(table, view, TILE_LIST);
+    let first_slot = field(table, view, FIRST_SLOT);
     let unit = UNIT_POS as usize;
     let tile = (CUBE_POS_Y * CUBE_COUNT_X + CUBE_POS_X) as usize;
     let x = CUBE_POS_X * SIDE + UNIT_POS_X;
@@ -156,7 +166,7 @@ pub fn splat_gradients(
     }
     if inside {
         let area = (width * height) as usize;
-        let at = (first_pixel + y * width + x) as usize;
+        let at = field(table, view, PICTURE) * 3 * area + (y * width + x) as usize;
         for c in 0..3usize {
             pixels[unit * 3 + c] = gradient[at + c * area];
         }
@@ -165,14 +175,15 @@ pub fn splat_gradients(
     let mut any_open = 1u32;
     let mut transmittance = 1.0f32;
 
-    let mut base = start[tile] as usize;
-    let end = start[tile + 1] as usize;
+    let start = field(table, view, TILE_START);
+    let mut base = words[start + tile] as usize;
+    let end = words[start + tile + 1] as usize;
     while base < end && any_open == 1u32 {
         let count = min(end - base, BATCH);
         if unit < count {
-            let index = list[base + unit] as usize;
+            let index = words[list + base + unit] as usize;
             for k in 0..SHAPE {
-                batch[unit * SHAPE + k] = splats[index * SPLAT_FLOATS + k];
+                batch[unit * SHAPE + k] = f32::reinterpret(words[splats + index * SHAPE + k]);
             }
         }
         if unit == 0 {
@@ -232,7 +243,7 @@ pub fn splat_gradients(
                 for j in 0..SUMMERS {
                     sum += partial[(unit * SUMMERS + j) * 3 + c];
                 }
-                slots[(base + unit) * 3 + c] = sum;
+                slots[(first_slot + base + unit) * 3 + c] = sum;
             }
         }
         any_open = workgroup_uniform_load(&live[0]);
@@ -242,31 +253,43 @@ pub fn splat_gradients(
     let mut slot = base + unit;
     while slot < end {
         for c in 0..3usize {
-            slots[slot * 3 + c] = 0.0f32;
+            slots[(first_slot + slot) * 3 + c] = 0.0f32;
         }
         slot += PIXELS;
     }
 }
 
-/// Sums each Gaussian's slots in ascending order: `out` (`[count][3]`).
+/// The gradient to a visible Gaussian's colour: the sum of its slots in ascending order.
+#[cube]
+pub(super) fn sum_of_slots(words: &[u32], table: &[u32], slots: &[f32], view: usize, gaussian: usize) -> (f32, f32, f32) {
+    let start = field(table, view, SLOT_START) + gaussian;
+    let list = field(table, view, SLOT_LIST);
+    let first_slot = field(table, view, FIRST_SLOT);
+    let mut r = 0.0f32;
+    let mut g = 0.0f32;
+    let mut b = 0.0f32;
+    let mut k = words[start] as usize;
+    let end = words[start + 1] as usize;
+    while k < end {
+        let at = (first_slot + words[list + k] as usize) * 3;
+        r += slots[at];
+        g += slots[at + 1];
+        b += slots[at + 2];
+        k += 1;
+    }
+    (r, g, b)
+}
+
+/// Sums each visible Gaussian's slots: the group's `out` (`[colours][3]`).
 #[cube(launch)]
-pub fn sum_slots(slot_start: &[u32], slot_list: &[u32], slots: &[f32], out: &mut [f32], count: u32) {
-    let i = ABSOLUTE_POS;
-    if i < count as usize {
-        let mut r = 0.0f32;
-        let mut g = 0.0f32;
-        let mut b = 0.0f32;
-        let mut k = slot_start[i] as usize;
-        let end = slot_start[i + 1] as usize;
-        while k < end {
-            let at = slot_list[k] as usize * 3;
-            r += slots[at];
-            g += slots[at + 1];
-            b += slots[at + 2];
-            k += 1;
-        }
-        out[i * 3] = r;
-        out[i * 3 + 1] = g;
-        out[i * 3 + 2] = b;
+pub fn sum_slots(words: &[u32], table: &[u32], slots: &[f32], out: &mut [f32]) {
+    let view = CUBE_POS_Z as usize;
+    let gaussian = unit_of_layer();
+    if gaussian < field(table, view, VISIBLE) {
+        let (r, g, b) = sum_of_slots(words, table, slots, view, gaussian);
+        let at = (field(table, view, FIRST_COLOUR) + gaussian) * 3;
+        out[at] = r;
+        out[at + 1] = g;
+        out[at + 2] = b;
     }
 }

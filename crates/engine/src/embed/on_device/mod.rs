@@ -1,0 +1,138 @@
+//! A step on a graphics card. Pictures, the loss, gradients and offsets stay there; the host sends fresh views, and waits once
+//! for a few numbers.
+mod kernels;
+mod optimizer;
+
+use std::sync::Arc;
+
+use rand_chacha::ChaCha8Rng;
+
+use self::optimizer::{OptimizerOnDevice, totals};
+use super::adam::Penalty;
+use super::loss::{Evaluated, Loss, finite};
+use super::loss_weight_controller::LossWeightFactors;
+use super::optimise::OptimizerState;
+use super::view_pool::PooledView;
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::splat::{Buffer, GpuRasterizer, Learnable, SceneOnDevice, Shown};
+
+/// A scene on a card, and what moves its colours there.
+pub(super) struct OnDevice {
+    scene: SceneOnDevice,
+    /// None where a file keeps colours in steps: these are rounded on the host.
+    optimizer: Option<OptimizerOnDevice>,
+    gaussians: usize,
+}
+
+/// What a step needs besides views.
+pub(super) struct StepOptions {
+    /// Counts from 1.
+    pub step: usize,
+    pub factors: LossWeightFactors,
+    /// Factor on the optimiser's rates.
+    pub rate: f32,
+    pub penalty: Penalty,
+}
+
+/// A step that a device computes.
+pub(super) struct Launched {
+    /// What of it is read: numbers of the loss, and sums where offsets are moved.
+    told: Vec<Buffer>,
+    views: usize,
+    options: StepOptions,
+}
+
+impl OnDevice {
+    /// A scene of which nothing has changed yet. `optimizer` has taken no step.
+    pub fn new(rasterizer: &GpuRasterizer, scene: &Scene, learnable: &Learnable, optimizer: &OptimizerState) -> Self {
+        let on_device = SceneOnDevice::new(rasterizer, &scene.gaussians.sh, learnable);
+        Self {
+            optimizer: scene
+                .exact()
+                .then(|| OptimizerOnDevice::new(rasterizer, &on_device, optimizer)),
+            scene: on_device,
+            gaussians: scene.gaussians.len(),
+        }
+    }
+
+    /// Whether offsets are moved here, and not on the host.
+    pub fn moves(&self) -> bool {
+        self.optimizer.is_some()
+    }
+
+    /// Launches a step: the loss of `views` with the offsets as they are, and the offsets moved, or their gradient found.
+    /// Nothing is waited for.
+    ///
+    /// # Errors
+    /// A view that the device cannot hold; a failing device.
+    pub fn launch(
+        &mut self,
+        rasterizer: &GpuRasterizer,
+        loss: &Loss<'_>,
+        views: &[Arc<PooledView>],
+        options: StepOptions,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Launched> {
+        let shown: Vec<Shown<'_>> = views.iter().map(|view| view.shown()).collect();
+        let noise: Vec<&[f32]> = views.iter().map(|view| view.noise()).collect();
+        let batch = rasterizer.batch(&shown)?;
+        // To draw what is unmarked anew costs less than to keep it, or to bring it here.
+        let colours = self.scene.colours(rasterizer, &batch, &noise, false);
+        let originals = rasterizer.composite(&batch, &colours)?;
+        let colours = self.scene.colours(rasterizer, &batch, &noise, true);
+        let pictures = rasterizer.composite(&batch, &colours)?;
+        let (gradient, numbers) =
+            loss.evaluate_on_device(options.step, pictures, originals, options.factors, rng)?;
+        let slots = rasterizer.slot_gradients(&batch, gradient)?;
+        self.scene.differentiate(rasterizer, &batch, &colours, &slots);
+        let mut told = vec![rasterizer.buffer_of(numbers)?];
+        if let Some(optimizer) = &mut self.optimizer {
+            let pixels = (3 * batch.width * batch.height) as f32;
+            told.push(optimizer.step(rasterizer, &self.scene, options.rate, pixels, options.penalty));
+        }
+        Ok(Launched {
+            told,
+            views: views.len(),
+            options,
+        })
+    }
+
+    /// Waits for a step: its loss, with the offset penalty where offsets are moved here.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`](crate::Error::NotFinite) with the term; a failing device.
+    pub fn wait(&self, rasterizer: &GpuRasterizer, loss: &Loss<'_>, launched: Launched) -> Result<Evaluated> {
+        let StepOptions { step, penalty, .. } = launched.options;
+        let told = rasterizer.read(&launched.told)?;
+        let mut evaluated = loss.evaluated_on_device(step, &told[0], launched.views)?;
+        if let Some(sums) = told.get(1) {
+            let [offset, gradient] = totals(sums, penalty, self.gaussians, self.scene.columns());
+            finite(step, "gradient", gradient)?;
+            finite(step, "offset", offset)?;
+            evaluated.terms.offset = offset;
+        }
+        Ok(evaluated)
+    }
+
+    /// The offsets as they are here, `[slots][columns]`.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn read_offsets(&self, rasterizer: &GpuRasterizer, out: &mut Vec<f32>) -> Result<()> {
+        self.scene.read(rasterizer, |chunk| &chunk.offsets, out)
+    }
+
+    /// The gradient of the last step to them.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn read_gradient(&self, rasterizer: &GpuRasterizer, out: &mut Vec<f32>) -> Result<()> {
+        self.scene.read(rasterizer, |chunk| &chunk.gradient, out)
+    }
+
+    /// Takes the changes that pictures are to show.
+    pub fn set_offsets(&mut self, rasterizer: &GpuRasterizer, offsets: &[f32]) {
+        self.scene.set_offsets(rasterizer, offsets);
+    }
+}

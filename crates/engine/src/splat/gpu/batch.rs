@@ -1,0 +1,205 @@
+//! Views of one size in one buffer, so that one launch draws all of them: a view alone has fewer tiles than a card has
+//! multiprocessors.
+//!
+//! A view is packed as words: splats `[visible][6]`, offsets of tiles `[tiles + 1]`, splats of tiles `[pairs]`, offsets of
+//! slots `[visible + 1]`, slots `[pairs]`, rows `[visible]`, directions `[visible][3]`. A table says where they begin.
+use std::ops::Range;
+
+use cubecl::prelude::*;
+use super::buffer::{Buffer, grid};
+use super::kernels::append;
+use crate::error::Result;
+use crate::memory::Limits;
+use crate::splat::{PreparedView, Splat2d};
+
+/// Floats of a splat that compositing needs: the first six of `Splat2d`.
+pub(super) const SHAPE: usize = 6;
+
+/// Words of a view's row in the table.
+pub(super) const FIELDS: usize = 16;
+/// Where a view's words begin, by kind.
+pub(super) const SPLATS: usize = 0;
+pub(super) const TILE_START: usize = 1;
+pub(super) const TILE_LIST: usize = 2;
+pub(super) const SLOT_START: usize = 3;
+pub(super) const SLOT_LIST: usize = 4;
+pub(super) const ROWS: usize = 5;
+pub(super) const DIRECTIONS: usize = 6;
+/// Visible Gaussians.
+pub(super) const VISIBLE: usize = 7;
+/// Gaussians, and pairs, of the group's views before it.
+pub(super) const FIRST_COLOUR: usize = 8;
+pub(super) const FIRST_SLOT: usize = 9;
+/// Its number among all views of the batch.
+pub(super) const PICTURE: usize = 10;
+/// Coefficients a channel that it shows.
+pub(super) const TERMS: usize = 11;
+/// Bits of three floats.
+pub(super) const BACKGROUND: usize = 12;
+
+/// A view's numbers as kernels read them.
+pub(crate) struct PackedView(pub(super) Vec<u32>);
+
+impl PackedView {
+    /// Of a view.
+    pub fn new(view: &PreparedView) -> Self {
+        let tiles = &view.tiles;
+        let mut words = Vec::with_capacity(len(view));
+        for splat in &view.splats {
+            words.extend_from_slice(&bytemuck::cast_ref::<Splat2d, [u32; 8]>(splat)[..SHAPE]);
+        }
+        words.extend_from_slice(&tiles.start);
+        words.extend_from_slice(&tiles.splats);
+        words.extend_from_slice(&tiles.slot_start);
+        words.extend_from_slice(&tiles.slots);
+        words.extend_from_slice(&view.visible);
+        words.extend_from_slice(bytemuck::cast_slice(&view.directions));
+        Self(words)
+    }
+}
+
+/// Words of a packed view.
+pub(super) fn len(view: &PreparedView) -> usize {
+    let tiles = &view.tiles;
+    let lists = tiles.start.len() + tiles.splats.len() + tiles.slot_start.len() + tiles.slots.len();
+    (SHAPE + 1 + 3) * view.visible.len() + lists
+}
+
+/// Which view is drawn, over which ground.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown<'a> {
+    pub view: &'a PreparedView,
+    pub background: [f32; 3],
+}
+
+/// Views of one size, on the device.
+pub(crate) struct Batch {
+    pub groups: Vec<Group>,
+    pub views: usize,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// As many views as buffers can hold; usually all.
+pub(crate) struct Group {
+    pub words: Buffer,
+    /// `[views][FIELDS]`.
+    pub table: Buffer,
+    /// Which of the batch they are.
+    pub views: Range<usize>,
+    /// Visible Gaussians of each.
+    pub visible: Vec<usize>,
+    /// (Gaussian, tile) pairs of all.
+    pub pairs: usize,
+    pub tile_columns: u32,
+    pub tile_rows: u32,
+}
+
+impl Group {
+    /// Visible Gaussians of all views.
+    pub fn colours(&self) -> usize {
+        self.visible.iter().sum()
+    }
+
+    /// Visible Gaussians of the view that has most.
+    pub fn most_visible(&self) -> usize {
+        self.visible.iter().copied().max().unwrap_or(0)
+    }
+}
+
+/// The groups that `views` fall into, so that none of their buffers takes more than `limit` bytes.
+///
+/// # Errors
+/// [`Error::DoesNotFit`](crate::Error::DoesNotFit): a view whose buffers are larger.
+pub(super) fn groups(views: &[Shown<'_>], limit: u64) -> Result<Vec<Range<usize>>> {
+    let mut groups: Vec<Range<usize>> = Vec::new();
+    let mut bytes = [0u64; 3];
+    for (index, shown) in views.iter().enumerate() {
+        let own = bytes_of(shown.view);
+        for (what, bytes) in ["splats", "gradient slots", "colours"].iter().zip(own) {
+            Limits::of_buffers(limit).admit_buffer(&format!("the buffer of a view's {what}"), bytes)?;
+        }
+        let fits = bytes.iter().zip(own).all(|(all, own)| all + own <= limit);
+        match groups.last_mut().filter(|_| fits) {
+            Some(group) => group.end = index + 1,
+            None => {
+                groups.push(index..index + 1);
+                bytes = [0; 3];
+            }
+        }
+        bytes.iter_mut().zip(own).for_each(|(all, own)| *all += own);
+    }
+    Ok(groups)
+}
+
+/// Of a view's packed words, its gradient slots and its colours.
+fn bytes_of(view: &PreparedView) -> [u64; 3] {
+    [4 * len(view), 12 * view.tiles.pairs(), 12 * view.visible.len()].map(|bytes| bytes as u64)
+}
+
+/// Puts views whose packed words are `uploaded` beside one another.
+pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], uploaded: &[Buffer]) -> Group {
+    let of_group = &all[views.clone()];
+    let mut table = Vec::with_capacity(FIELDS * of_group.len());
+    let (mut base, mut colours, mut pairs) = (0, 0, 0);
+    for (shown, picture) in of_group.iter().zip(views.clone()) {
+        table.extend(row(shown, [base, colours, pairs, picture]));
+        base += len(shown.view);
+        colours += shown.view.visible.len();
+        pairs += shown.view.tiles.pairs();
+    }
+    let words = match uploaded {
+        [one] => one.clone(),
+        _ => {
+            let words = Buffer::empty(client, base);
+            let mut at = 0;
+            for part in uploaded {
+                let (count, dim) = grid(part.len, 1);
+                append::launch(client, count, dim, part.argument(), words.argument(), at as u32);
+                at += part.len;
+            }
+            words
+        }
+    };
+    let tiles = &of_group[0].view.tiles;
+    Group {
+        words,
+        table: Buffer::of(client, &table),
+        visible: of_group.iter().map(|shown| shown.view.visible.len()).collect(),
+        views,
+        pairs,
+        tile_columns: tiles.columns,
+        tile_rows: tiles.rows,
+    }
+}
+
+/// A view's row in the table.
+fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture]: [usize; 4]) -> [u32; FIELDS] {
+    let (visible, tiles) = (shown.view.visible.len(), &shown.view.tiles);
+    let mut row = [0; FIELDS];
+    let mut at = base;
+    for (field, len) in [
+        (SPLATS, SHAPE * visible),
+        (TILE_START, tiles.start.len()),
+        (TILE_LIST, tiles.splats.len()),
+        (SLOT_START, tiles.slot_start.len()),
+        (SLOT_LIST, tiles.slots.len()),
+        (ROWS, visible),
+        (DIRECTIONS, 3 * visible),
+    ] {
+        row[field] = at as u32;
+        at += len;
+    }
+    let terms = (shown.view.degree + 1) * (shown.view.degree + 1);
+    for (field, value) in [
+        (VISIBLE, visible),
+        (FIRST_COLOUR, first_colour),
+        (FIRST_SLOT, first_slot),
+        (PICTURE, picture),
+        (TERMS, terms),
+    ] {
+        row[field] = value as u32;
+    }
+    row[BACKGROUND..BACKGROUND + 3].copy_from_slice(&shown.background.map(f32::to_bits));
+    row
+}
