@@ -86,7 +86,15 @@ impl Options {
 impl Chosen {
     /// The engine for the key, which heeds the job's end.
     fn engine(&self, path: &std::path::Path, key: &EngineKey, context: &Context) -> Result<Engine> {
-        let mut engine = load::engine(path, key, self.clip.as_deref(), self.device, true, self.memory)?;
+        let mut engine = load::engine(
+            path,
+            key,
+            self.clip.as_deref(),
+            self.device,
+            load::Work::Marking,
+            true,
+            self.memory,
+        )?;
         engine.stop = context.stop.clone();
         Ok(engine)
     }

@@ -62,7 +62,11 @@ impl Key {
         };
         let device = device.parse().map_err(|error| exception(py, &error))?;
         let made = run(py, progress, |context| {
-            let compute = load::device(device, clip.unwrap_or_else(|| ShippedClip::for_bits(bits)))?;
+            let compute = load::device(
+                device,
+                clip.unwrap_or_else(|| ShippedClip::for_bits(bits)),
+                load::Work::Reading,
+            )?;
             let overrides = ProjectionOverrides::default();
             create(&options, overrides, clip, &compute, &context.stop, |progress| {
                 tell(context, progress);

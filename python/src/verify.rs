@@ -82,7 +82,7 @@ pub fn verify(
             level: 0,
         };
         let clip = options.clip.as_deref();
-        let mut engine = load::engine(path, inner, clip, device, false, options.memory)?;
+        let mut engine = load::engine(path, inner, clip, device, load::Work::Reading, false, options.memory)?;
         engine.stop = context.stop.clone();
         let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
             context.at("reading", done, total);

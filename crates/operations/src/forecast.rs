@@ -102,13 +102,13 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
                 training: TrainingOptions::default(),
             };
             let none = create_key::ProjectionOverrides::default();
-            let compute = load::device(wish.device, ShippedClip::for_bits(wish.bits))?;
+            let compute = load::device(wish.device, ShippedClip::for_bits(wish.bits), load::Work::Reading)?;
             let key = create_key::create(&options, none, None, &compute, &wish.stop, |_| {})?;
             (PathBuf::from("a key made for the forecast"), Arc::new(key))
         }
     };
     let bits = key.bits();
-    let mut engine = load::engine(&path, &key, None, wish.device, false, memory)?;
+    let mut engine = load::engine(&path, &key, None, wish.device, load::Work::Marking, false, memory)?;
     engine.stop = wish.stop.clone();
     let settings = Choices {
         preset: wish.preset,

@@ -16,14 +16,24 @@ pub fn cameras(path: Option<&Path>) -> Result<Vec<Camera>> {
     Ok(path.map(read_cameras).transpose()?.unwrap_or_default())
 }
 
-/// The device for the CLIP called `clip`, where `choice` was made. Shipped CLIPs are slower on a card than on the CPU beside
-/// it (docs/performance.md), so `auto` takes a card, if there is one, for all others only.
+/// What a device is wanted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Embedding: thousands of views of one scene.
+    Marking,
+    /// All else: keys are made, pictures and scenes read.
+    Reading,
+}
+
+/// The device for such work with the CLIP called `clip`, where `choice` was made. Shipped CLIPs mark faster on a card, and
+/// read faster on the CPU beside it (docs/performance.md), so `auto` takes a card, if there is one, for marking and for all
+/// other CLIPs.
 ///
 /// # Errors
 /// Those of [`open`].
-pub fn device(choice: DeviceChoice, clip: &str) -> Result<Compute> {
+pub fn device(choice: DeviceChoice, clip: &str, work: Work) -> Result<Compute> {
     match choice {
-        DeviceChoice::Auto if ShippedClip::named(clip).is_some() => open(DeviceChoice::Cpu),
+        DeviceChoice::Auto if work == Work::Reading && ShippedClip::named(clip).is_some() => open(DeviceChoice::Cpu),
         _ => open(choice),
     }
 }
@@ -48,7 +58,7 @@ fn lpips() -> Option<PathBuf> {
     Some(folder.join(WEIGHTS))
 }
 
-/// An engine for a key on the [`device`] for its CLIP. The key must belong to the CLIP, if it reads with one: the one named,
+/// An engine for a key on the [`device`] for its CLIP and for such work. The key must belong to the CLIP, if it reads with one: the one named,
 /// else the one that the key names. `path` names the key in messages, and `budget` is how many bytes of memory a job may
 /// take, if not all of the machine's.
 pub fn engine(
@@ -56,11 +66,12 @@ pub fn engine(
     key: &Key,
     clip_name: Option<&str>,
     choice: DeviceChoice,
+    work: Work,
     with_lpips: bool,
     budget: Option<u64>,
 ) -> Result<Engine> {
     let lpips = if with_lpips { lpips() } else { None };
-    let compute = device(choice, clip_name.unwrap_or(&key.clip.name))?;
+    let compute = device(choice, clip_name.unwrap_or(&key.clip.name), work)?;
     let mut engine = match &key.decoding {
         Decoding::Clip { .. } => {
             let name = clip_name.unwrap_or(&key.clip.name);
@@ -91,14 +102,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn auto_leaves_shipped_clips_to_the_cpu_and_gives_a_card_to_others() {
+    fn auto_reads_shipped_clips_on_the_cpu_and_gives_a_card_to_all_else() {
         let shipped = ShippedClip::for_bits(64);
-        assert_eq!(device(DeviceChoice::Auto, shipped).unwrap().name, "cpu");
-        let [other, any] =
-            [device(DeviceChoice::Auto, "vit-b32"), open(DeviceChoice::Auto)].map(|open| open.unwrap().name);
-        assert_eq!(other, any);
+        let auto = |clip, work| device(DeviceChoice::Auto, clip, work).unwrap().name;
+        assert_eq!(auto(shipped, Work::Reading), "cpu");
+        let any = open(DeviceChoice::Auto).unwrap().name;
+        assert_eq!(auto(shipped, Work::Marking), any);
+        assert_eq!(auto("vit-b32", Work::Reading), any);
         // Who names a device gets it, or an error.
-        let named = |clip| device(DeviceChoice::Wgpu, clip).map(|compute| compute.name).ok();
+        let named = |clip| {
+            device(DeviceChoice::Wgpu, clip, Work::Reading)
+                .map(|compute| compute.name)
+                .ok()
+        };
         assert_eq!(named(shipped), named("vit-b32"));
     }
 }

@@ -100,6 +100,7 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
         &key,
         arguments.clip.as_deref(),
         arguments.device,
+        load::Work::Marking,
         true,
         arguments.budget.bytes(),
     )?;

@@ -105,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             Extractor::Clip => load::device(
                 arguments.device,
                 arguments.clip.as_deref().unwrap_or(ShippedClip::NEWEST),
+                load::Work::Reading,
             )?,
             Extractor::Hidden => open(arguments.device)?,
         };
@@ -316,7 +317,15 @@ fn engine(
             (key, Some(start.elapsed().as_secs_f64()))
         }
     };
-    let engine = load::engine(&path, &key, clip, arguments.device, true, arguments.budget.bytes())?;
+    let engine = load::engine(
+        &path,
+        &key,
+        clip,
+        arguments.device,
+        load::Work::Reading,
+        true,
+        arguments.budget.bytes(),
+    )?;
     Ok((engine, key, seconds))
 }
 

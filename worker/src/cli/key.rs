@@ -95,6 +95,7 @@ pub fn run(command: Command) -> Result<Exit> {
         Extractor::Clip => load::device(
             arguments.device,
             clip.unwrap_or_else(|| ShippedClip::for_bits(arguments.bits)),
+            load::Work::Reading,
         )?,
         Extractor::Hidden => open(arguments.device)?,
     };

@@ -79,6 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         &key,
         arguments.clip.as_deref(),
         arguments.device,
+        load::Work::Reading,
         false,
         arguments.budget.bytes(),
     )?;

@@ -12,6 +12,7 @@ use super::convert;
 use super::error::Result;
 use super::transfer::Content;
 use guardsplat_operations::create_key::{self, ProjectionOverrides};
+use guardsplat_operations::load;
 
 /// A key, before it is stored.
 struct Made {
@@ -32,7 +33,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outc
     };
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
-        let compute = cache.compute(ShippedClip::for_bits(options.bits))?;
+        let compute = cache.compute(ShippedClip::for_bits(options.bits), load::Work::Reading)?;
         let key = create_key::create(
             &options,
             ProjectionOverrides::default(),

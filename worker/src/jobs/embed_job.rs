@@ -73,7 +73,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &EmbedSpec) -> Result<Fi
         drop(key_file);
         let message = key.message(&message)?;
         let cameras = load::cameras(cameras_file.as_deref())?;
-        let engine = cache.engine(&name, &key, rate, stop)?;
+        let engine = cache.engine(&name, &key, load::Work::Marking, rate, stop)?;
         let device = engine.compute.name.clone();
         let job = Job {
             input: &input,

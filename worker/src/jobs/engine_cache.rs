@@ -7,7 +7,7 @@ use guardsplat_engine::extract::Engine;
 use guardsplat_engine::message::Key;
 use guardsplat_engine::stop::Stop;
 
-use guardsplat_operations::load;
+use guardsplat_operations::load::{self, Work};
 
 /// A choice of device, and the engine of the last key.
 pub struct EngineCache {
@@ -31,25 +31,32 @@ impl EngineCache {
         })
     }
 
-    /// The name of the device, of the card if `auto` found one; jobs with shipped CLIPs run beside it on the CPU.
+    /// The name of the device, of the card if `auto` found one; shipped CLIPs read beside it on the CPU.
     pub fn device(&self) -> &str {
         &self.device
     }
 
-    /// The device for the CLIP of that name.
-    pub fn compute(&self, clip: &str) -> Result<Compute> {
-        load::device(self.choice, clip)
+    /// The device for such work with the CLIP of that name.
+    pub fn compute(&self, clip: &str, work: Work) -> Result<Compute> {
+        load::device(self.choice, clip, work)
     }
 
-    /// The engine for `key`, the one from before if it is the same key's; it heeds `stop`, and judges at a rate of false
-    /// positives. `name` is the key's, for messages.
-    pub fn engine(&mut self, name: &str, key: &Key, false_positive_rate: f64, stop: &Stop) -> Result<&Engine> {
+    /// The engine for `key` and such work, the one from before if it is the same key's on the same device; it heeds `stop`, and
+    /// judges at a rate of false positives. `name` is the key's, for messages.
+    pub fn engine(
+        &mut self,
+        name: &str,
+        key: &Key,
+        work: Work,
+        false_positive_rate: f64,
+        stop: &Stop,
+    ) -> Result<&Engine> {
         stop.check()?;
-        let id = key.id();
-        let kept = self.loaded.take().filter(|(loaded, _)| *loaded == id);
-        let engine = match kept {
+        let (id, device) = (key.id(), self.compute(&key.clip.name, work)?.name);
+        let same = |(loaded, engine): &(String, Engine)| *loaded == id && engine.compute.name == device;
+        let engine = match self.loaded.take().filter(same) {
             Some((_, engine)) => engine,
-            None => load::engine(Path::new(name), key, None, self.choice, true, self.budget)?,
+            None => load::engine(Path::new(name), key, None, self.choice, work, true, self.budget)?,
         };
         let (_, engine) = self.loaded.insert((id, engine));
         engine.stop = stop.clone();

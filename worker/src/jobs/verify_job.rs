@@ -54,7 +54,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         // Nothing to compare with is no message of no bits.
         let message = Some(message).filter(|text| !text.is_empty());
         let message = message.map(|text| key.message(&text)).transpose()?;
-        let engine = cache.engine(&name, &key, rate, stop)?;
+        let engine = cache.engine(&name, &key, load::Work::Reading, rate, stop)?;
         let device = engine.compute.name.clone();
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
         let mut shown = Thumbnails::default();

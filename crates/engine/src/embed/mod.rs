@@ -18,6 +18,7 @@ mod on_device;
 mod optimise;
 mod optimizer;
 mod preconditioned_sgd;
+mod preparing;
 mod preset;
 mod progress;
 mod resources;

@@ -1,5 +1,4 @@
 //! The loop: offsets on the colours of frozen Gaussians, until the message is read from views never used.
-use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::thread;
 
@@ -14,6 +13,7 @@ use super::loss_weight_controller::{LossWeightController, LossWeightFactors};
 use super::on_device::{OnDevice, StepOptions};
 use super::optimizer::Optimizer;
 use super::preconditioned_sgd::PreconditionedSgd;
+use super::preparing::Preparing;
 use super::progress::{Check, Progress, Step};
 use super::settings::{Extension, Settings};
 use super::step_timer::{Stage, StepTimer};
@@ -83,28 +83,31 @@ pub fn optimise(
         seen: coverage.count(),
         gaussians: gaussians.len(),
     });
-    let mut timing = StepTimer::new();
     let mut steps = 0;
-    while steps < run.steps {
-        engine.stop.check()?;
-        timing.start();
-        steps += 1;
-        progress(Progress::Step(run.step(steps, &mut timing)?));
-        let mut enough = false;
-        if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
-            let check;
-            run.fetch()?;
-            (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
-            run.heed(&check);
-            progress(Progress::Check(check));
+    thread::scope(|scope| {
+        let (mut timing, mut preparing) = (StepTimer::new(), Preparing::new(scope));
+        while steps < run.steps {
+            engine.stop.check()?;
+            timing.start();
+            steps += 1;
+            progress(Progress::Step(run.step(steps, &mut preparing, &mut timing)?));
+            let mut enough = false;
+            if let Some(held_out) = held_out.as_mut().filter(|h| h.due(steps)) {
+                let check;
+                run.fetch()?;
+                (check, enough) = held_out.check(engine, gaussians, run.learned.changes(), message, steps)?;
+                run.heed(&check);
+                progress(Progress::Check(check));
+            }
+            timing.lap(Stage::Check);
+            progress(Progress::Timed(timing.end_step(steps, TIMED_STEPS)));
+            if enough {
+                progress(Progress::Stopped { step: steps });
+                break;
+            }
         }
-        timing.lap(Stage::Check);
-        progress(Progress::Timed(timing.end_step(steps, TIMED_STEPS)));
-        if enough {
-            progress(Progress::Stopped { step: steps });
-            break;
-        }
-    }
+        Ok::<_, Error>(())
+    })?;
     run.fetch()?;
     Ok(Optimised {
         learned: run.learned,
@@ -190,25 +193,22 @@ impl<'a> Run<'a> {
     }
 
     /// One step; `step` counts from 1.
-    fn step(&mut self, step: usize, timing: &mut StepTimer) -> Result<Step> {
-        let views = self.pool.batch(self.engine, &self.geometry)?;
+    fn step<'scope>(
+        &mut self,
+        step: usize,
+        preparing: &mut Preparing<'scope, 'a>,
+        timing: &mut StepTimer,
+    ) -> Result<Step>
+    where
+        'a: 'scope,
+    {
+        let engine = self.engine;
+        let views = self.pool.batch(engine, &self.geometry)?;
+        preparing.begin(engine, &self.geometry, self.steps - step, |after| {
+            self.pool.upcoming(after)
+        });
         timing.lap(Stage::Prepare);
-        let mut figures = if step < self.steps {
-            // What the next step is to draw does not depend on this one.
-            let (engine, geometry, upcoming) = (self.engine, self.geometry.clone(), self.pool.upcoming());
-            let mut prepared = Vec::new();
-            let figures = thread::scope(|scope| {
-                let preparing = scope.spawn(|| upcoming.prepare(engine, &geometry));
-                self.differentiate(step, &views, timing, || {
-                    prepared = preparing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-                    PooledView::send(engine, &mut prepared)
-                })
-            });
-            self.pool.prepared(prepared);
-            figures?
-        } else {
-            self.differentiate(step, &views, timing, || Ok(()))?
-        };
+        let mut figures = self.differentiate(step, &views, timing, |pool| pool.prepared(engine, preparing.next()?))?;
         if !self.moves_on_device() {
             figures.terms.offset = self.advance(step)?;
         }
@@ -267,7 +267,7 @@ impl<'a> Run<'a> {
         step: usize,
         views: &[Arc<PooledView>],
         timing: &mut StepTimer,
-        meanwhile: impl FnOnce() -> Result<()>,
+        meanwhile: impl FnOnce(&mut ViewPool) -> Result<()>,
     ) -> Result<Step> {
         let factors = self.controller.factors();
         let options = StepOptions {
@@ -280,18 +280,18 @@ impl<'a> Run<'a> {
             (Some(rasterizer), Some(on_device)) => {
                 let launched = on_device.launch(rasterizer, &self.loss, views, options, &mut self.augmentation)?;
                 timing.lap(Stage::Loss);
-                meanwhile()?;
+                meanwhile(&mut self.pool)?;
                 timing.lap(Stage::Prepare);
                 let found = on_device.wait(rasterizer, &self.loss, launched)?;
                 if !on_device.moves() {
                     on_device.read_gradient(rasterizer, &mut self.gradient)?;
                 }
-                timing.lap(Stage::Loss);
+                timing.lap(Stage::Backward);
                 found
             }
             _ => {
                 let found = self.differentiate_on_host(step, views, factors, timing)?;
-                meanwhile()?;
+                meanwhile(&mut self.pool)?;
                 timing.lap(Stage::Prepare);
                 found
             }
@@ -438,7 +438,10 @@ mod tests {
                 run.gradient.fill(0.0);
                 // The same augmentation every time.
                 run.augmentation = ChaCha8Rng::seed_from_u64(4);
-                let t = run.differentiate(1, &views, &mut StepTimer::new(), || Ok(())).unwrap().terms;
+                let t = run
+                    .differentiate(1, &views, &mut StepTimer::new(), |_| Ok(()))
+                    .unwrap()
+                    .terms;
                 let l = &settings.lambda;
                 let reconstruction = l.l1 * t.l1 + l.ssim * t.ssim;
                 let loss = l.message * t.message + l.reconstruction * reconstruction;

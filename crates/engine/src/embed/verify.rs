@@ -6,7 +6,7 @@ use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, Quality, cover, covered, mean_psnr, measure, psnr_covered};
 use crate::scene::Gaussians;
-use crate::splat::Geometry;
+use crate::splat::{Geometry, PreparedView, WeightCache};
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Pairs of pictures that are kept to look at.
@@ -41,6 +41,48 @@ pub struct Verification {
     pub pairs: Vec<(Picture, Picture)>,
 }
 
+/// A view of both scenes.
+struct HeldOutView {
+    original: PreparedView,
+    /// As a picture of its size shows the marked scene.
+    marked: PreparedView,
+    /// As one that was averaged down does, which is read.
+    averaged: PreparedView,
+}
+
+/// What it looks like.
+struct Seen {
+    before: Picture,
+    after: Picture,
+    /// Pixels that the original covers.
+    covered: Vec<bool>,
+    /// Logits that are read of the marked scene.
+    read: Vec<f32>,
+}
+
+impl HeldOutView {
+    fn prepare(original: &Geometry<'_>, marked: &Geometry<'_>, camera: &Camera) -> Result<Self> {
+        Ok(Self {
+            original: original.prepare(camera, WeightCache::None)?,
+            marked: marked.prepare(camera, WeightCache::None)?,
+            averaged: marked.prepare_averaged(camera, stands_for(camera.width), WeightCache::None)?,
+        })
+    }
+
+    fn look(&self, engine: &Engine, original: &Geometry<'_>, marked: &Geometry<'_>) -> Result<Seen> {
+        let [before, on_black] =
+            [[1.0; 3], [0.0; 3]].map(|background| engine.drawn(original, &self.original, background));
+        let before = before?;
+        let read = engine.drawn(marked, &self.averaged, [1.0; 3])?;
+        Ok(Seen {
+            covered: covered(&before, &on_black?)?,
+            after: engine.drawn(marked, &self.marked, [1.0; 3])?,
+            read: read_rendered(engine, &read)?,
+            before,
+        })
+    }
+}
+
 /// Renders held-out views of both scenes over white, those of `cameras` if there are any, compares them as they are, and
 /// reads them as [`read_scene`](crate::extract::read_scene) does.
 ///
@@ -62,18 +104,23 @@ pub fn verify(
     let mut pairs = Vec::with_capacity(settings.verify.views);
     let mut logits = Vec::with_capacity(settings.verify.views);
     let (mut of_covered, mut shares): (Vec<Psnr>, f64) = (Vec::new(), 0.0);
-    for index in 0..settings.verify.views {
-        let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let [before, on_black] = engine.pictures(&original, &camera, [[1.0; 3], [0.0; 3]])?;
-        let after = engine.picture(&marked, &camera, [1.0; 3])?;
-        let read = engine.averaged_picture(&marked, &camera, stands_for(size), [1.0; 3])?;
-        logits.push(read_rendered(engine, &read)?);
-        let mask = covered(&before, &on_black)?;
-        of_covered.extend(psnr_covered(&before, &after, &mask)?);
-        shares += cover::share(&mask);
-        pairs.push((before, after));
-        done(index + 1);
-    }
+    engine.each_view(
+        original.len() + marked.len(),
+        settings.verify.views,
+        |index| {
+            let camera = sampler.camera(Split::HeldOut, index as u64, size);
+            HeldOutView::prepare(&original, &marked, &camera)
+        },
+        |view| view.look(engine, &original, &marked),
+        |index, seen| {
+            logits.push(seen.read);
+            of_covered.extend(psnr_covered(&seen.before, &seen.after, &seen.covered)?);
+            shares += cover::share(&seen.covered);
+            pairs.push((seen.before, seen.after));
+            done(index + 1);
+            Ok(())
+        },
+    )?;
     let quality = measure(&pairs, engine.lpips()?, &engine.compute.device, &engine.stop)?;
     pairs.truncate(KEPT_PAIRS);
     let reading = PooledLogits::new(logits)?;

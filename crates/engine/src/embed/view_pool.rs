@@ -208,12 +208,18 @@ pub(super) struct ViewPool {
     settings: Settings,
     next: u64,
     /// The next views, where they were prepared before their step.
-    ahead: Vec<PooledView>,
+    ahead: Option<Ahead>,
     kept: VecDeque<Arc<PooledView>>,
     picks: ChaCha8Rng,
 }
 
-/// The views of the next step, to be prepared while the one before is computed.
+/// Views that were prepared before their step.
+pub(super) struct Ahead {
+    numbers: Vec<u64>,
+    views: Vec<PooledView>,
+}
+
+/// The views of a step to come, to be prepared while one before is computed.
 pub(super) struct Upcoming {
     maker: Arc<ViewMaker>,
     numbers: Vec<u64>,
@@ -252,8 +258,11 @@ impl Upcoming {
     ///
     /// # Errors
     /// Those of [`Geometry::prepare`]; [`Error::Stopped`](crate::Error::Stopped).
-    pub fn prepare(&self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Vec<PooledView>> {
-        self.maker.prepare(engine, geometry, &self.numbers)
+    pub fn prepare(self, engine: &Engine, geometry: &Geometry<'_>) -> Result<Ahead> {
+        Ok(Ahead {
+            views: self.maker.prepare(engine, geometry, &self.numbers)?,
+            numbers: self.numbers,
+        })
     }
 }
 
@@ -289,7 +298,7 @@ impl ViewPool {
             }),
             settings: *settings,
             next: 0,
-            ahead: Vec::new(),
+            ahead: None,
             kept: VecDeque::new(),
             picks,
         }
@@ -339,17 +348,26 @@ impl ViewPool {
         s.views_per_step - (s.views_per_step - wanted).min(self.kept.len())
     }
 
-    /// What can be prepared of the step after the one whose views were last taken.
-    pub fn upcoming(&self) -> Upcoming {
+    /// What can be prepared of the step `after` so many more than the one whose views were last taken, if those before take
+    /// as many fresh views as the next.
+    pub fn upcoming(&self, after: usize) -> Upcoming {
+        let fresh = self.fresh();
         Upcoming {
             maker: self.maker.clone(),
-            numbers: self.numbers(self.fresh()),
+            numbers: self.numbers(self.next + (after * fresh) as u64, fresh),
         }
     }
 
-    /// Takes the views that [`ViewPool::upcoming`] told of.
-    pub fn prepared(&mut self, views: Vec<PooledView>) {
-        self.ahead = views;
+    /// Takes views that [`ViewPool::upcoming`] told of, and sends them to the card that they will be drawn on.
+    ///
+    /// # Errors
+    /// Those of the renderer.
+    pub fn prepared(&mut self, engine: &Engine, ahead: Option<Ahead>) -> Result<()> {
+        self.ahead = ahead;
+        match &mut self.ahead {
+            Some(ahead) => PooledView::send(engine, &mut ahead.views),
+            None => Ok(()),
+        }
     }
 
     /// The views of the next step.
@@ -369,19 +387,20 @@ impl ViewPool {
         Ok(batch)
     }
 
-    /// Numbers of the next views; beyond the number that the settings allow they begin again with those that did not fit in
-    /// memory.
-    fn numbers(&self, count: usize) -> Vec<u64> {
+    /// Numbers of views from one on; beyond the number that the settings allow they begin again with those that did not fit
+    /// in memory.
+    fn numbers(&self, first: u64, count: usize) -> Vec<u64> {
         let all = self.settings.views.map_or(u64::MAX, |views| views as u64);
-        (self.next..self.next + count as u64).map(|i| i % all).collect()
+        (first..first + count as u64).map(|i| i % all).collect()
     }
 
     /// The next views, with what they look like unmarked where that is needed.
     fn make(&mut self, engine: &Engine, geometry: &Geometry<'_>, count: usize) -> Result<Vec<Arc<PooledView>>> {
-        let mut views = std::mem::take(&mut self.ahead);
-        if views.len() != count {
-            views = self.maker.prepare(engine, geometry, &self.numbers(count))?;
-        }
+        let numbers = self.numbers(self.next, count);
+        let mut views = match self.ahead.take().filter(|ahead| ahead.numbers == numbers) {
+            Some(ahead) => ahead.views,
+            None => self.maker.prepare(engine, geometry, &numbers)?,
+        };
         self.next += count as u64;
         PooledView::send(engine, &mut views)?;
         if engine.rasterizer()?.on_device().is_none() {

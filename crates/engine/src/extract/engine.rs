@@ -249,8 +249,7 @@ impl Engine {
     ) -> Result<Picture> {
         self.stop.check()?;
         let view = geometry.prepare_averaged(camera, times, WeightCache::None)?;
-        let colours = sh::colours(geometry.sh(), None, &view);
-        Ok(self.rasterizer()?.render(&view, &colours, background)?.to_8_bit())
+        self.drawn(geometry, &view, background)
     }
 
     /// [`Engine::picture`] of one view over each of some backgrounds.

@@ -11,6 +11,7 @@ mod pooled;
 mod restore;
 mod suspect_kind;
 mod view_size;
+mod views;
 mod window;
 
 pub use blind::Candidate;
@@ -30,7 +31,7 @@ pub use view_size::{likeness_to_finer, size_for_scene};
 use crate::error::Result;
 use crate::picture::Picture;
 use crate::scene::Gaussians;
-use crate::splat::Geometry;
+use crate::splat::{Geometry, WeightCache};
 use crate::view::{Split, ViewSampler};
 
 /// Views that a scene is read from where nothing else is asked for.
@@ -78,11 +79,21 @@ pub fn read_scene(
 ) -> Result<PooledLogits> {
     let geometry = Geometry::new(gaussians);
     let mut logits = Vec::with_capacity(views);
-    for index in 0..views {
-        let camera = sampler.camera(Split::HeldOut, index as u64, size);
-        let picture = engine.averaged_picture(&geometry, &camera, stands_for(size), background)?;
-        logits.push(read_rendered(engine, &picture)?);
-        done(index + 1, &picture)?;
-    }
+    engine.each_view(
+        gaussians.len(),
+        views,
+        |index| {
+            let camera = sampler.camera(Split::HeldOut, index as u64, size);
+            geometry.prepare_averaged(&camera, stands_for(size), WeightCache::None)
+        },
+        |view| {
+            let picture = engine.drawn(&geometry, &view, background)?;
+            Ok((read_rendered(engine, &picture)?, picture))
+        },
+        |index, (read, picture)| {
+            logits.push(read);
+            done(index + 1, &picture)
+        },
+    )?;
     PooledLogits::new(logits)
 }

@@ -62,7 +62,15 @@ impl Given {
             None => (folder.path().join("key"), made(arguments.device)?),
         };
         // Without LPIPS, which some have and others don't.
-        let engine = load::engine(&path, &key, None, arguments.device, false, arguments.budget.bytes())?;
+        let engine = load::engine(
+            &path,
+            &key,
+            None,
+            arguments.device,
+            load::Work::Marking,
+            false,
+            arguments.budget.bytes(),
+        )?;
         let digits = key.bits().div_ceil(4);
         Ok(Self {
             // The first digit may have only one bit.
@@ -86,7 +94,7 @@ fn made(device: DeviceChoice) -> Result<Key> {
         training: TrainingOptions::default(),
     };
     let overrides = create_key::ProjectionOverrides::default();
-    let compute = load::device(device, ShippedClip::for_bits(BITS))?;
+    let compute = load::device(device, ShippedClip::for_bits(BITS), load::Work::Reading)?;
     create_key::create(&options, overrides, None, &compute, &Stop::default(), |_| {})
 }
 

@@ -59,6 +59,7 @@ impl Arguments {
             key,
             self.clip.as_deref(),
             self.device,
+            load::Work::Reading,
             false,
             self.budget.bytes(),
         )?)

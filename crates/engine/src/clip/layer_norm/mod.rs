@@ -158,7 +158,9 @@ mod tests {
         };
         let input = tensor(&x).reshape([1, ROWS, width]).require_grad();
         let out = norm.forward(input.clone());
-        let found = (out.clone() * tensor(&gradient).reshape([1, ROWS, width])).sum().backward();
+        let found = (out.clone() * tensor(&gradient).reshape([1, ROWS, width]))
+            .sum()
+            .backward();
         let found = [out.into_data(), input.grad(&found).unwrap().into_data()];
         let want = reference(&x, &gamma, &beta, &gradient, 1e-3);
         for (found, want) in found.iter().zip(want) {
@@ -175,7 +177,9 @@ mod tests {
             agrees(&open(DeviceChoice::Cpu).unwrap().device, width);
         }
         match open(DeviceChoice::Wgpu) {
-            Ok(compute) => [2, 8, 300, 768].into_iter().for_each(|width| agrees(&compute.device, width)),
+            Ok(compute) => [2, 8, 300, 768]
+                .into_iter()
+                .for_each(|width| agrees(&compute.device, width)),
             Err(error) => {
                 assert!(std::env::var_os("CI").is_none(), "{error}");
                 eprintln!("skipped: {error}");

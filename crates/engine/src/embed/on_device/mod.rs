@@ -46,7 +46,7 @@ pub(super) struct Launched {
 impl OnDevice {
     /// A scene of which nothing has changed yet. `optimizer` has taken no step.
     pub fn new(rasterizer: &GpuRasterizer, scene: &Scene, learnable: &Learnable, optimizer: &OptimizerState) -> Self {
-        let on_device = SceneOnDevice::new(rasterizer, &scene.gaussians.sh, learnable);
+        let on_device = SceneOnDevice::new(rasterizer, &scene.gaussians, learnable);
         Self {
             optimizer: scene
                 .exact()
@@ -82,8 +82,7 @@ impl OnDevice {
         let originals = rasterizer.composite(&batch, &colours)?;
         let colours = self.scene.colours(rasterizer, &batch, &noise, true);
         let pictures = rasterizer.composite(&batch, &colours)?;
-        let (gradient, numbers) =
-            loss.evaluate_on_device(options.step, pictures, originals, options.factors, rng)?;
+        let (gradient, numbers) = loss.evaluate_on_device(options.step, pictures, originals, options.factors, rng)?;
         let slots = rasterizer.slot_gradients(&batch, gradient)?;
         self.scene.differentiate(rasterizer, &batch, &colours, &slots);
         let mut told = vec![rasterizer.buffer_of(numbers)?];

@@ -3,8 +3,8 @@ use cubecl::prelude::*;
 
 use super::kernels::{STATE, SUMS, accelerate, adam_step, advance, scale_of_step, sums_of_offsets};
 use crate::embed::adam::{Adam, AdamOptions, Correction, Penalty};
-use crate::embed::preconditioned_sgd::{PreconditionedSgd, PreconditionedSgdOptions};
 use crate::embed::optimise::OptimizerState;
+use crate::embed::preconditioned_sgd::{PreconditionedSgd, PreconditionedSgdOptions};
 use crate::splat::{Buffer, CUBE, Chunk, GpuRasterizer, SceneOnDevice, cubes, grid};
 
 /// Steps of Adam that corrections are worked out for at a time.
@@ -53,7 +53,11 @@ fn first_cubes(scene: &SceneOnDevice) -> Vec<usize> {
 
 /// Chunks of which something is learned, with their numbers.
 fn learned(scene: &SceneOnDevice) -> impl Iterator<Item = (usize, &Chunk)> {
-    scene.chunks().iter().enumerate().filter(|(_, chunk)| !chunk.slots.is_empty())
+    scene
+        .chunks()
+        .iter()
+        .enumerate()
+        .filter(|(_, chunk)| !chunk.slots.is_empty())
 }
 
 /// Zeros for each offset of each chunk.
@@ -236,7 +240,7 @@ pub(super) fn totals(sums: &[f32], penalty: Penalty, gaussians: usize, columns: 
 mod tests {
     use super::*;
     use crate::device::{DeviceChoice, open};
-    use crate::scene::Sh;
+    use crate::scene::{Gaussians, Sh};
     use crate::splat::Learnable;
 
     const GAUSSIANS: usize = 700;
@@ -269,9 +273,13 @@ mod tests {
         };
         let rasterizer = GpuRasterizer::new(&compute.device).unwrap();
         let learnable = Learnable::new(&(0..GAUSSIANS).map(|row| row % 5 != 2).collect::<Vec<_>>(), 1);
-        let sh = Sh {
-            degree: 1,
-            coefficients: vec![0.0; 12 * GAUSSIANS],
+        let scene = Gaussians {
+            positions: vec![[0.0; 3]; GAUSSIANS],
+            sh: Sh {
+                degree: 1,
+                coefficients: vec![0.0; 12 * GAUSSIANS],
+            },
+            ..Gaussians::default()
         };
         // Every second slot has no gradient at some steps.
         let gradient_at = |step: usize| -> Vec<f32> {
@@ -281,15 +289,15 @@ mod tests {
                 .collect()
         };
         for mut host in optimizers(&learnable) {
-            let mut scene = SceneOnDevice::new(&rasterizer, &sh, &learnable);
-            let mut on_device = OptimizerOnDevice::new(&rasterizer, &scene, &host);
+            let mut on_card = SceneOnDevice::new(&rasterizer, &scene, &learnable);
+            let mut on_device = OptimizerOnDevice::new(&rasterizer, &on_card, &host);
             let mut offsets = vec![0.0; learnable.len()];
             for step in 1..=4 {
                 let (mut gradient, rate) = (gradient_at(step), 1.0 / step as f32);
                 let value = PENALTY.value(&offsets, learnable.columns(), GAUSSIANS) as f32;
                 let sizes = gradient.iter().map(|g| g.abs()).sum::<f32>();
-                scene.set_gradient(&rasterizer, &gradient);
-                let sums = on_device.step(&rasterizer, &scene, rate, 4800.0, PENALTY);
+                on_card.set_gradient(&rasterizer, &gradient);
+                let sums = on_device.step(&rasterizer, &on_card, rate, 4800.0, PENALTY);
                 let sums = rasterizer.read(&[sums]).unwrap().concat();
                 let found = totals(&sums, PENALTY, GAUSSIANS, learnable.columns());
                 for (found, want) in found.into_iter().zip([value, sizes]) {
@@ -300,9 +308,13 @@ mod tests {
                     OptimizerState::PreconditionedSgd(sgd) => sgd.step(rate, 4800.0, &mut offsets, &mut gradient),
                 }
                 let mut found = Vec::new();
-                scene.read(&rasterizer, |chunk| &chunk.offsets, &mut found).unwrap();
+                on_card.read(&rasterizer, |chunk| &chunk.offsets, &mut found).unwrap();
                 let largest = offsets.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
-                let off = found.iter().zip(&offsets).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                let off = found
+                    .iter()
+                    .zip(&offsets)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f32::max);
                 assert!(largest > 0.0 && off < 1e-4 * largest, "step {step}: {off} of {largest}");
             }
         }

@@ -2,21 +2,22 @@
 //! multiprocessors.
 //!
 //! A view is packed as words: splats `[visible][6]`, offsets of tiles `[tiles + 1]`, splats of tiles `[pairs]`, offsets of
-//! slots `[visible + 1]`, slots `[pairs]`, rows `[visible]`, directions `[visible][3]`. A table says where they begin.
+//! slots `[visible + 1]`, slots `[pairs]`, rows `[visible]`. A table says where they begin.
 use std::ops::Range;
 
-use cubecl::prelude::*;
 use super::buffer::{Buffer, grid};
 use super::kernels::append;
 use crate::error::Result;
 use crate::memory::Limits;
 use crate::splat::{PreparedView, Splat2d};
+use crate::view::Camera;
+use cubecl::prelude::*;
 
 /// Floats of a splat that compositing needs: the first six of `Splat2d`.
 pub(super) const SHAPE: usize = 6;
 
 /// Words of a view's row in the table.
-pub(super) const FIELDS: usize = 16;
+pub(super) const FIELDS: usize = 24;
 /// Where a view's words begin, by kind.
 pub(super) const SPLATS: usize = 0;
 pub(super) const TILE_START: usize = 1;
@@ -24,18 +25,22 @@ pub(super) const TILE_LIST: usize = 2;
 pub(super) const SLOT_START: usize = 3;
 pub(super) const SLOT_LIST: usize = 4;
 pub(super) const ROWS: usize = 5;
-pub(super) const DIRECTIONS: usize = 6;
 /// Visible Gaussians.
-pub(super) const VISIBLE: usize = 7;
+pub(super) const VISIBLE: usize = 6;
 /// Gaussians, and pairs, of the group's views before it.
-pub(super) const FIRST_COLOUR: usize = 8;
-pub(super) const FIRST_SLOT: usize = 9;
+pub(super) const FIRST_COLOUR: usize = 7;
+pub(super) const FIRST_SLOT: usize = 8;
 /// Its number among all views of the batch.
-pub(super) const PICTURE: usize = 10;
+pub(super) const PICTURE: usize = 9;
 /// Coefficients a channel that it shows.
-pub(super) const TERMS: usize = 11;
-/// Bits of three floats.
-pub(super) const BACKGROUND: usize = 12;
+pub(super) const TERMS: usize = 10;
+/// Three floats.
+pub(super) const BACKGROUND: usize = 11;
+/// The camera's centre as two floats a coordinate, of which the second is what the first lacks.
+pub(super) const CENTRE: usize = 14;
+pub(super) const CENTRE_REST: usize = 17;
+/// The camera's axis: the direction to what is at its centre.
+pub(super) const AXIS: usize = 20;
 
 /// A view's numbers as kernels read them.
 pub(crate) struct PackedView(pub(super) Vec<u32>);
@@ -53,7 +58,6 @@ impl PackedView {
         words.extend_from_slice(&tiles.slot_start);
         words.extend_from_slice(&tiles.slots);
         words.extend_from_slice(&view.visible);
-        words.extend_from_slice(bytemuck::cast_slice(&view.directions));
         Self(words)
     }
 }
@@ -62,7 +66,7 @@ impl PackedView {
 pub(super) fn len(view: &PreparedView) -> usize {
     let tiles = &view.tiles;
     let lists = tiles.start.len() + tiles.splats.len() + tiles.slot_start.len() + tiles.slots.len();
-    (SHAPE + 1 + 3) * view.visible.len() + lists
+    (SHAPE + 1) * view.visible.len() + lists
 }
 
 /// Which view is drawn, over which ground.
@@ -185,7 +189,6 @@ fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture]: [usize; 4])
         (SLOT_START, tiles.slot_start.len()),
         (SLOT_LIST, tiles.slots.len()),
         (ROWS, visible),
-        (DIRECTIONS, 3 * visible),
     ] {
         row[field] = at as u32;
         at += len;
@@ -200,6 +203,21 @@ fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture]: [usize; 4])
     ] {
         row[field] = value as u32;
     }
-    row[BACKGROUND..BACKGROUND + 3].copy_from_slice(&shown.background.map(f32::to_bits));
+    let centre = centre_of(&shown.view.camera);
+    let rest = centre.map(|c| (c - f64::from(c as f32)) as f32);
+    for (field, values) in [
+        (BACKGROUND, shown.background),
+        (CENTRE, centre.map(|c| c as f32)),
+        (CENTRE_REST, rest),
+        (AXIS, shown.view.camera.rotation[2]),
+    ] {
+        row[field..field + 3].copy_from_slice(&values.map(f32::to_bits));
+    }
     row
+}
+
+/// A camera's centre in world coordinates.
+fn centre_of(camera: &Camera) -> [f64; 3] {
+    let part = |row: usize, k: usize| f64::from(camera.rotation[row][k]) * f64::from(camera.translation[row]);
+    std::array::from_fn(|k| -(0..3).map(|row| part(row, k)).sum::<f64>())
 }

@@ -2,7 +2,6 @@
 use cubecl::prelude::*;
 use cubecl::server::Handle;
 
-
 /// Units of a cube in kernels without tiles.
 pub(crate) const CUBE: u32 = 256;
 /// Cubes a dimension that every device allows.

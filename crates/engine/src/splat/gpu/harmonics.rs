@@ -5,9 +5,9 @@
 #![allow(missing_docs)]
 use cubecl::prelude::*;
 
-use super::batch::{DIRECTIONS, FIRST_COLOUR, ROWS, TERMS, VISIBLE};
+use super::batch::{AXIS, CENTRE, CENTRE_REST, FIRST_COLOUR, ROWS, TERMS, VISIBLE};
 use super::buffer::unit_of_layer;
-use super::kernels::{field, sum_of_slots};
+use super::kernels::{field, float_field, sum_of_slots};
 use crate::splat::sh::{C0, C1, C2, C3, C4};
 
 /// The slot of a Gaussian that is not learned.
@@ -59,25 +59,46 @@ fn basis(x: f32, y: f32, z: f32, #[comptime] degree: usize) -> Array<f32> {
     b
 }
 
-/// The direction to a visible Gaussian of a view.
+/// A coordinate from a view's camera to a Gaussian, whose own is `position`; exact to a rounding, however far both are
+/// from the origin.
 #[cube]
-fn direction_to(words: &[u32], table: &[u32], view: usize, gaussian: usize) -> (f32, f32, f32) {
-    let at = field(table, view, DIRECTIONS) + 3 * gaussian;
-    (
-        f32::reinterpret(words[at]),
-        f32::reinterpret(words[at + 1]),
-        f32::reinterpret(words[at + 2]),
-    )
+fn from_camera(table: &[u32], view: usize, position: f32, #[comptime] k: usize) -> f32 {
+    position - float_field(table, view, CENTRE + k) - float_field(table, view, CENTRE_REST + k)
+}
+
+/// The unit vector from a view's camera to a Gaussian of `positions` (`[rows][3]`); along its axis where the two coincide.
+#[cube]
+fn direction_to(positions: &[f32], table: &[u32], view: usize, row: usize) -> (f32, f32, f32) {
+    let mut x = from_camera(table, view, positions[3 * row], 0usize);
+    let mut y = from_camera(table, view, positions[3 * row + 1], 1usize);
+    let mut z = from_camera(table, view, positions[3 * row + 2], 2usize);
+    let largest = max(max(f32::abs(x), f32::abs(y)), f32::abs(z));
+    if largest > 0.0f32 {
+        // Squares of what is far or near beyond measure would be no numbers.
+        x /= largest;
+        y /= largest;
+        z /= largest;
+        let length = f32::sqrt(x * x + y * y + z * z);
+        x /= length;
+        y /= length;
+        z /= length;
+    } else {
+        x = float_field(table, view, AXIS);
+        y = float_field(table, view, AXIS + 1);
+        z = float_field(table, view, AXIS + 2);
+    }
+    (x, y, z)
 }
 
 /// Colours of the visible Gaussians of a group that are of a chunk of rows: the group's `colours` (`[colours][3]`).
 ///
-/// `coefficients` are the chunk's, `[rows][columns of the degree]`. `offsets` (`[slots][learned]`) are added where a row has a
+/// `positions` (`[rows][3]`) and `coefficients` (`[rows][columns of the degree]`) are the chunk's. `offsets` (`[slots][learned]`) are added where a row has a
 /// slot, unless `learned` is 0; `noise` is added to the colours if `noisy`.
 #[cube(launch)]
 pub fn colours_of_rows(
     words: &[u32],
     table: &[u32],
+    positions: &[f32],
     coefficients: &[f32],
     slots: &[u32],
     offsets: &[f32],
@@ -97,7 +118,7 @@ pub fn colours_of_rows(
             let columns = comptime!(3 * (degree + 1) * (degree + 1));
             let at = row * columns;
             let terms = field(table, view, TERMS);
-            let (x, y, z) = direction_to(words, table, view, gaussian);
+            let (x, y, z) = direction_to(positions, table, view, row);
             let values = basis(x, y, z, degree);
             let slot = slots[row];
             let mut r = 0.5f32;
@@ -139,7 +160,7 @@ pub fn colours_of_rows(
 }
 
 /// A unit for each slot of a chunk: what the gradients of a group's views mean for its coefficients, view by view, to
-/// `gradient` (`[slots][learned]`), which keeps what it holds if `add`.
+/// `gradient` (`[slots][learned]`), which keeps what it holds if `add`. `positions` are the chunk's, from `first_row` on.
 ///
 /// Where a colour is 0 it was clamped, and its gradient is 0.
 #[cube(launch)]
@@ -148,8 +169,10 @@ pub fn coefficient_gradients(
     table: &[u32],
     slot_gradients: &[f32],
     colours: &[f32],
+    positions: &[f32],
     rows: &[u32],
     gradient: &mut [f32],
+    first_row: u32,
     views: u32,
     #[comptime] degree: usize,
     #[comptime] add: bool,
@@ -202,7 +225,7 @@ pub fn coefficient_gradients(
                     b = to_b;
                 }
                 let terms = field(table, view, TERMS);
-                let (x, y, z) = direction_to(words, table, view, low);
+                let (x, y, z) = direction_to(positions, table, view, (row - first_row) as usize);
                 let values = basis(x, y, z, degree);
                 #[unroll]
                 for k in 0..count {

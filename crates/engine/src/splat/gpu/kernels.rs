@@ -8,7 +8,8 @@
 use cubecl::prelude::*;
 
 use super::batch::{
-    BACKGROUND, FIELDS, FIRST_COLOUR, FIRST_SLOT, PICTURE, SHAPE, SLOT_LIST, SLOT_START, SPLATS, TILE_LIST, TILE_START, VISIBLE,
+    BACKGROUND, FIELDS, FIRST_COLOUR, FIRST_SLOT, PICTURE, SHAPE, SLOT_LIST, SLOT_START, SPLATS, TILE_LIST, TILE_START,
+    VISIBLE,
 };
 use super::buffer::unit_of_layer;
 use crate::splat::composite::{ALPHA_MAX, TRANSMITTANCE_MIN};
@@ -32,7 +33,7 @@ pub(super) fn field(table: &[u32], view: usize, #[comptime] which: usize) -> usi
 
 /// A field that is a float.
 #[cube]
-fn float_field(table: &[u32], view: usize, #[comptime] which: usize) -> f32 {
+pub(super) fn float_field(table: &[u32], view: usize, #[comptime] which: usize) -> f32 {
     f32::reinterpret(table[view * FIELDS + which])
 }
 
@@ -261,7 +262,13 @@ pub fn splat_gradients(words: &[u32], table: &[u32], gradient: &[f32], slots: &m
 
 /// The gradient to a visible Gaussian's colour: the sum of its slots in ascending order.
 #[cube]
-pub(super) fn sum_of_slots(words: &[u32], table: &[u32], slots: &[f32], view: usize, gaussian: usize) -> (f32, f32, f32) {
+pub(super) fn sum_of_slots(
+    words: &[u32],
+    table: &[u32],
+    slots: &[f32],
+    view: usize,
+    gaussian: usize,
+) -> (f32, f32, f32) {
     let start = field(table, view, SLOT_START) + gaussian;
     let list = field(table, view, SLOT_LIST);
     let first_slot = field(table, view, FIRST_SLOT);

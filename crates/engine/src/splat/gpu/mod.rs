@@ -24,7 +24,7 @@ use crate::picture::Picture;
 use crate::quality::unbatch;
 
 pub(crate) use self::batch::{Batch, Group, PackedView, Shown};
-pub(crate) use self::buffer::{Buffer, CUBE, cubes, grid, unit_of_layer, cube_of_layer};
+pub(crate) use self::buffer::{Buffer, CUBE, cube_of_layer, cubes, grid, unit_of_layer};
 pub(crate) use self::scene::{Chunk, SceneOnDevice};
 
 /// Draws with CubeCL kernels; weights are recomputed at every use, so views need none cached.
@@ -240,7 +240,8 @@ impl GpuRasterizer {
     }
 
     fn upload(&self, view: &PreparedView) -> Buffer {
-        self.uploads().get_or_insert(view.id, || self.words(PackedView::new(view)))
+        self.uploads()
+            .get_or_insert(view.id, || self.words(PackedView::new(view)))
     }
 
     fn uploads(&self) -> MutexGuard<'_, Uploads> {
@@ -331,10 +332,10 @@ impl Rasterizer for GpuRasterizer {
 
 #[cfg(test)]
 mod tests {
-    use crate::splat::checks::{camera, conforms, scene};
-    use crate::splat::{CpuRasterizer, WeightCache, prepare, sh};
     use super::*;
     use crate::device::{DeviceChoice, open};
+    use crate::splat::checks::{camera, conforms, scene};
+    use crate::splat::{CpuRasterizer, WeightCache, prepare, sh};
 
     /// The Vulkan device, or `None` with a message where there is none; in CI that is a failure.
     fn device() -> Option<Device> {

@@ -6,7 +6,7 @@ use super::batch::{Batch, Group};
 use super::buffer::{Buffer, grid};
 use super::harmonics::{NO_SLOT, coefficient_gradients, colours_of_rows};
 use crate::error::Result;
-use crate::scene::Sh;
+use crate::scene::Gaussians;
 use crate::splat::Learnable;
 
 /// Coefficients of a scene and changes of some, in chunks whose buffers the device can bind.
@@ -19,6 +19,8 @@ pub(crate) struct SceneOnDevice {
 /// Some rows of a scene, and what is learned of them.
 pub(crate) struct Chunk {
     first_row: u32,
+    /// `[rows][3]`.
+    positions: Buffer,
     /// `[rows][columns of the scene's degree]`.
     coefficients: Buffer,
     /// The chunk's slot of each row, or [`NO_SLOT`].
@@ -34,8 +36,9 @@ pub(crate) struct Chunk {
 }
 
 impl SceneOnDevice {
-    /// Of a scene's coefficients, of which those that are `learnable` change; by 0 so far.
-    pub fn new(rasterizer: &GpuRasterizer, sh: &Sh, learnable: &Learnable) -> Self {
+    /// Of a scene, of whose coefficients those that are `learnable` change; by 0 so far.
+    pub fn new(rasterizer: &GpuRasterizer, gaussians: &Gaussians, learnable: &Learnable) -> Self {
+        let sh = &gaussians.sh;
         let (client, stride, columns) = (rasterizer.client(), sh.per_gaussian(), learnable.columns());
         let rows_of_chunk = (rasterizer.limit() / (4 * stride.max(columns)) as u64).clamp(1, 1 << 30) as usize;
         let mut chunks = Vec::new();
@@ -51,6 +54,7 @@ impl SceneOnDevice {
             let slots = first_slot..first_slot + count;
             chunks.push(Chunk {
                 first_row: first_row as u32,
+                positions: Buffer::of(client, gaussians.positions[rows].as_flattened()),
                 coefficients: Buffer::of(client, coefficients),
                 slot_of_row: Buffer::of(client, &slot_of_row),
                 row_of_slot: Buffer::of(client, &learnable.rows()[slots.clone()]),
@@ -92,6 +96,7 @@ impl SceneOnDevice {
                     dim,
                     group.words.argument(),
                     group.table.argument(),
+                    chunk.positions.argument(),
                     chunk.coefficients.argument(),
                     chunk.slot_of_row.argument(),
                     chunk.offsets.argument(),
@@ -122,8 +127,10 @@ impl SceneOnDevice {
                     group.table.argument(),
                     slots[index].argument(),
                     colours[index].argument(),
+                    chunk.positions.argument(),
                     chunk.row_of_slot.argument(),
                     chunk.gradient.argument(),
+                    chunk.first_row,
                     group.views.len() as u32,
                     self.learned_degree,
                     index > 0,
@@ -187,7 +194,6 @@ mod tests {
     use crate::device::{DeviceChoice, open};
     use crate::picture::Picture;
     use crate::quality::{batch, unbatch};
-    use crate::scene::Gaussians;
     use crate::splat::checks::{camera, scene};
     use crate::splat::{Changes, CpuRasterizer, Drawing, PreparedView, Rasterizer, Shown, WeightCache, prepare, sh};
 
@@ -216,7 +222,9 @@ mod tests {
         let seen: Vec<bool> = (0..g.len()).map(|row| row % 3 != 1).collect();
         let learnable = Learnable::new(&seen, 1);
         Case {
-            offsets: (0..learnable.len()).map(|i| ((i * 31 % 17) as f32 - 8.0) * 0.03).collect(),
+            offsets: (0..learnable.len())
+                .map(|i| ((i * 31 % 17) as f32 - 8.0) * 0.03)
+                .collect(),
             noise: noise.collect(),
             views,
             learnable,
@@ -228,7 +236,10 @@ mod tests {
         assert_eq!(found.len(), want.len(), "{what}");
         let largest = want.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
         let off = found.iter().zip(want).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(largest > 0.0 && off < 1e-4 * largest.max(1.0), "{what}: {off} of {largest}");
+        assert!(
+            largest > 0.0 && off < 1e-4 * largest.max(1.0),
+            "{what}: {off} of {largest}"
+        );
     }
 
     /// Also where buffers hold but one view, and a few rows of the scene.
@@ -281,12 +292,15 @@ mod tests {
         for limit in [u64::MAX, 60_000] {
             let mut rasterizer = GpuRasterizer::new(&device).unwrap();
             rasterizer.limit = rasterizer.limit.min(limit);
-            let mut on_device = SceneOnDevice::new(&rasterizer, &g.sh, &learnable);
+            let mut on_device = SceneOnDevice::new(&rasterizer, &g, &learnable);
             on_device.set_offsets(&rasterizer, &offsets);
             let shown: Vec<Shown<'_>> = drawings.iter().map(Shown::from).collect();
             let all = rasterizer.batch(&shown).unwrap();
             let split = limit < u64::MAX;
-            assert_eq!((all.groups.len(), on_device.chunks.len() > 1), (if split { 3 } else { 1 }, split));
+            assert_eq!(
+                (all.groups.len(), on_device.chunks.len() > 1),
+                (if split { 3 } else { 1 }, split)
+            );
             let of_noise: [&[f32]; 3] = [&[], &[], &noise];
             let colours = on_device.colours(&rasterizer, &all, &of_noise, true);
             let drawn = unbatch(rasterizer.composite(&all, &colours).unwrap()).unwrap();
@@ -297,12 +311,18 @@ mod tests {
             let slots = rasterizer.slot_gradients(&all, of_pictures).unwrap();
             on_device.differentiate(&rasterizer, &all, &colours, &slots);
             let mut found = Vec::new();
-            on_device.read(&rasterizer, |chunk| &chunk.gradient, &mut found).unwrap();
+            on_device
+                .read(&rasterizer, |chunk| &chunk.gradient, &mut found)
+                .unwrap();
             close(&found, &gradient, "gradient");
             // Without the changes.
             let plain = on_device.colours(&rasterizer, &all, &[], false);
             let plain: Vec<f32> = rasterizer.read(&plain).unwrap().concat();
-            close(&plain, &sh::colours_of_views(&g.sh, None, &prepared).concat(), "colours");
+            close(
+                &plain,
+                &sh::colours_of_views(&g.sh, None, &prepared).concat(),
+                "colours",
+            );
         }
     }
 }

@@ -1,0 +1,56 @@
+//! Views of the next steps, prepared while a step is computed: what they show does not depend on it.
+use std::collections::VecDeque;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::thread::{Scope, ScopedJoinHandle};
+
+use super::view_pool::{Ahead, Upcoming};
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::splat::Geometry;
+
+/// Steps that are prepared at a time. One is not enough where there are many cores: parts of a view's preparation follow
+/// one another.
+const STEPS: usize = 2;
+
+/// Threads that prepare views, of the nearest step first.
+pub(super) struct Preparing<'scope, 'env> {
+    scope: &'scope Scope<'scope, 'env>,
+    running: VecDeque<ScopedJoinHandle<'scope, Result<Ahead>>>,
+}
+
+impl<'scope, 'env: 'scope> Preparing<'scope, 'env> {
+    /// Nothing is prepared yet.
+    pub fn new(scope: &'scope Scope<'scope, 'env>) -> Self {
+        Self {
+            scope,
+            running: VecDeque::with_capacity(STEPS),
+        }
+    }
+
+    /// Begins with what is next: views of `steps` to come at most, as `upcoming` tells of the one after so many.
+    pub fn begin(
+        &mut self,
+        engine: &'env Engine,
+        geometry: &Arc<Geometry<'env>>,
+        steps: usize,
+        upcoming: impl Fn(usize) -> Upcoming,
+    ) {
+        while self.running.len() < steps.min(STEPS) {
+            let (upcoming, geometry) = (upcoming(self.running.len()), geometry.clone());
+            let running = self.scope.spawn(move || upcoming.prepare(engine, &geometry));
+            self.running.push_back(running);
+        }
+    }
+
+    /// Waits for the views of the next step, if any are prepared.
+    ///
+    /// # Errors
+    /// Those of [`Upcoming::prepare`].
+    pub fn next(&mut self) -> Result<Option<Ahead>> {
+        let Some(running) = self.running.pop_front() else {
+            return Ok(None);
+        };
+        running.join().unwrap_or_else(|panic| resume_unwind(panic)).map(Some)
+    }
+}
