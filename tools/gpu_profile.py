@@ -21,7 +21,7 @@ UNITS = {"ns": 1e-6, "µs": 1e-3, "ms": 1.0, "s": 1e3}
 
 def kind(path: str) -> str:
     """The part of a kernel's path that tells what it does."""
-    parts = [part for part in path.split("::") if part]
+    parts = [part.strip(":") for part in path.split("::") if part.strip(":")]
     crate = parts[0].removeprefix("guardsplat_")
     return f"{crate}: {parts[-1]}"
 

@@ -4,6 +4,7 @@ pub mod device;
 pub mod embed;
 pub mod error;
 pub mod extract;
+mod launch;
 pub mod memory;
 pub mod message;
 pub mod models;

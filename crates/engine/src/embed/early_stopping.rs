@@ -1,7 +1,7 @@
 //! Looks at held-out views during an embedding, and decides when the margin is enough.
+use super::pooled_view::PooledView;
 use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
-use super::view_pool::PooledView;
 use crate::error::Result;
 use crate::extract::{Engine, PooledLogits, default_size, read_rendered, stands_for};
 use crate::message::Message;

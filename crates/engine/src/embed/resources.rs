@@ -1,6 +1,6 @@
 //! How much memory an embedding will need, by its settings.
+use super::pooled_view::PooledView;
 use super::settings::Settings;
-use super::view_pool::PooledView;
 use crate::error::Result;
 use crate::extract::{Engine, cpu_weight_cache};
 use crate::memory::{EmbeddingWorkload, MemoryRequirements, ModelBytes, SceneSize, ViewSize, embedding_requirements};

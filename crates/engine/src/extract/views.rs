@@ -40,6 +40,8 @@ impl Engine {
                 views.into_iter().map(&look).collect::<Result<_>>()?
             };
             for (index, seen) in (first..).zip(seen) {
+                // Who was told of a view may have asked for the end.
+                self.stop.check()?;
                 done(index, seen)?;
             }
         }

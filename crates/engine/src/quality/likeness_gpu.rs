@@ -14,12 +14,9 @@ use super::likeness::LikenessWeights;
 use super::ssim::{C1, C2};
 use super::window::{RADIUS, weight};
 use crate::error::{Error, Result};
+use crate::launch::{CUBE, a_cube_each, cube_of_layer, grid, sum_of_cube};
 
-/// Units of a cube.
-const CUBE: u32 = 256;
 const UNITS: usize = CUBE as usize;
-/// Cubes a dimension that every device allows.
-const MAX_CUBES: u32 = 65_535;
 
 /// Averages along rows of x, y, x squared, y squared and x y: `across` is `[5][planes][height][width]`.
 #[cube(launch)]
@@ -172,7 +169,7 @@ fn to_marked(
 /// A cube for each row of `values` (`[rows][len]`): its mean.
 #[cube(launch)]
 fn means_of_rows(values: &[f32], means: &mut [f32], len: u32, scale: f32) {
-    let row = CUBE_POS_X as usize;
+    let row = cube_of_layer();
     let unit = UNIT_POS as usize;
     let mut sums = Shared::<[f32]>::new_slice(UNITS);
     let mut sum = 0.0f32;
@@ -181,18 +178,9 @@ fn means_of_rows(values: &[f32], means: &mut [f32], len: u32, scale: f32) {
         sum += values[row * len as usize + at];
         at += UNITS;
     }
-    sums[unit] = sum;
-    #[unroll]
-    for level in 0..comptime!(UNITS.ilog2() as usize) {
-        sync_cube();
-        let half = comptime!(UNITS >> (level + 1));
-        if unit < half {
-            let other = sums[unit + half];
-            sums[unit] += other;
-        }
-    }
+    let sum = sum_of_cube(sum, &mut sums);
     if unit == 0 {
-        means[row] = sums[0] * scale;
+        means[row] = sum * scale;
     }
 }
 
@@ -226,17 +214,17 @@ impl LikenessOnDevice {
         let pictures = || (argument(&x.handle, count), argument(&y.handle, count));
 
         let (of_x, of_y) = pictures();
-        let (cubes, dim) = grid(count);
+        let (cubes, dim) = grid(count, 1);
         let moments = argument(&across, 5 * count);
         moments_along_rows::launch(&client, cubes, dim, of_x, of_y, taps(), moments, w);
-        let (cubes, dim) = grid(count);
+        let (cubes, dim) = grid(count, 1);
         let [of_across, of_values, of_slopes] = [(&across, 5), (&values, 3), (&slopes, 3)].map(parts(count));
         similarity::launch(&client, cubes, dim, of_across, taps(), of_values, of_slopes, w, h);
-        let (cubes, dim) = grid(3 * count);
+        let (cubes, dim) = grid(3 * count, 1);
         let [of_slopes, of_across] = [(&slopes, 3), (&across, 3)].map(parts(count));
         slopes_along_rows::launch(&client, cubes, dim, of_slopes, taps(), of_across, w);
         let (of_x, of_y) = pictures();
-        let (cubes, dim) = grid(count);
+        let (cubes, dim) = grid(count, 1);
         let [of_across, of_values, of_gradient] = [(&across, 3), (&values, 3), (&gradient, 1)].map(parts(count));
         to_marked::launch(
             &client,
@@ -256,10 +244,11 @@ impl LikenessOnDevice {
         );
         let (rows, len) = (3 * views, channels * height * width);
         let means = client.empty(4 * rows);
+        let (cubes, dim) = a_cube_each(rows);
         means_of_rows::launch(
             &client,
-            CubeCount::Static(rows as u32, 1, 1),
-            CubeDim::new_1d(CUBE),
+            cubes,
+            dim,
             argument(&values, rows * len),
             argument(&means, rows),
             len as u32,
@@ -297,16 +286,6 @@ fn parts(count: usize) -> impl Fn((&Handle, usize)) -> BufferArg {
 fn argument(handle: &Handle, len: usize) -> BufferArg {
     // SAFETY: buffers are at least as long as every caller says, and the kernels stay within what is said.
     unsafe { BufferArg::from_raw_parts(handle.clone(), len) }
-}
-
-/// One unit for each of `units`.
-fn grid(units: usize) -> (CubeCount, CubeDim) {
-    let cubes = (units as u32).div_ceil(CUBE);
-    let columns = cubes.clamp(1, MAX_CUBES);
-    (
-        CubeCount::Static(columns, cubes.div_ceil(columns).max(1), 1),
-        CubeDim::new_1d(CUBE),
-    )
 }
 
 #[cfg(test)]

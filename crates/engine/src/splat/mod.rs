@@ -25,9 +25,7 @@ use crate::picture::Picture;
 pub use cpu::CpuRasterizer;
 pub use geometry::Geometry;
 pub use gpu::GpuRasterizer;
-pub(crate) use gpu::{
-    Buffer, CUBE, Chunk, PackedView, SceneOnDevice, Shown, cube_of_layer, cubes, grid, unit_of_layer,
-};
+pub(crate) use gpu::{Chunk, PackedView, SceneOnDevice, Shown};
 pub use learnable::{Changes, Learnable};
 pub use prepare::{PrepareTimes, PreparedView, WeightCache, prepare};
 pub use project::Splat2d;

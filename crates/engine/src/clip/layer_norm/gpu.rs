@@ -4,42 +4,18 @@
 use burn::backend::{Cube, TensorMetadata};
 use burn::tensor::Shape;
 use burn_cubecl::kernel::into_contiguous;
-use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
 use super::{FloatTensor, LayerNormalized, Normalization};
+use crate::launch::{CUBE, a_cube_each, cube_of_layer, empty_tensor, sum_of_cube};
 
-/// Units of a cube.
-const CUBE: u32 = 128;
 const UNITS: usize = CUBE as usize;
-/// Cubes a dimension that every device allows.
-const MAX_CUBES: u32 = 65_535;
-
-/// The sum of `value` over the units of a cube, which all get.
-#[cube]
-fn sum_of_cube(value: f32, shared: &mut Shared<[f32]>) -> f32 {
-    let unit = UNIT_POS as usize;
-    shared[unit] = value;
-    #[unroll]
-    for level in 0..comptime!(UNITS.ilog2() as usize) {
-        sync_cube();
-        let half = comptime!(UNITS >> (level + 1));
-        if unit < half {
-            let other = shared[unit + half];
-            shared[unit] += other;
-        }
-    }
-    sync_cube();
-    let sum = shared[0];
-    sync_cube();
-    sum
-}
 
 /// Rows of `x` (`[rows][width]`) normalised to `out`; their means and one over their deviations to `moments` (`[rows][2]`).
 #[cube(launch)]
 fn normalize_rows(x: &[f32], gamma: &[f32], beta: &[f32], out: &mut [f32], moments: &mut [f32], epsilon: f32) {
     let width = gamma.len();
-    let row = (CUBE_POS_Y * CUBE_COUNT_X + CUBE_POS_X) as usize;
+    let row = cube_of_layer();
     let mut shared = Shared::<[f32]>::new_slice(UNITS);
     let first = row * width;
     let inside = 2 * row < moments.len();
@@ -80,7 +56,7 @@ fn normalize_rows(x: &[f32], gamma: &[f32], beta: &[f32], out: &mut [f32], momen
 #[cube(launch)]
 fn rows_backward(x: &[f32], gamma: &[f32], moments: &[f32], gradient: &[f32], out: &mut [f32]) {
     let width = gamma.len();
-    let row = (CUBE_POS_Y * CUBE_COUNT_X + CUBE_POS_X) as usize;
+    let row = cube_of_layer();
     let mut shared = Shared::<[f32]>::new_slice(UNITS);
     let first = row * width;
     let inside = 2 * row < moments.len();
@@ -133,9 +109,9 @@ impl Normalization for Cube {
         let [x, gamma, beta] = [x, gamma, beta].map(into_contiguous);
         let rows = x.shape().num_elements() / gamma.shape()[0];
         let client = x.client.clone();
-        let out = empty(&x, x.shape());
-        let moments = empty(&x, Shape::new([rows, 2]));
-        let (count, dim) = grid(rows);
+        let out = empty_tensor(&x, x.shape());
+        let moments = empty_tensor(&x, Shape::new([rows, 2]));
+        let (count, dim) = a_cube_each(rows);
         normalize_rows::launch(
             &client,
             count,
@@ -158,8 +134,8 @@ impl Normalization for Cube {
     ) -> FloatTensor<Self> {
         let [x, gamma, gradient] = [x, gamma, gradient].map(into_contiguous);
         let client = x.client.clone();
-        let out = empty(&x, x.shape());
-        let (count, dim) = grid(moments.shape()[0]);
+        let out = empty_tensor(&x, x.shape());
+        let (count, dim) = a_cube_each(moments.shape()[0]);
         rows_backward::launch(
             &client,
             count,
@@ -172,19 +148,4 @@ impl Normalization for Cube {
         );
         out
     }
-}
-
-/// A new tensor on the device of `like`.
-fn empty(like: &CubeTensor, shape: Shape) -> CubeTensor {
-    let handle = like.client.empty(shape.num_elements() * 4);
-    CubeTensor::new_contiguous(like.client.clone(), like.device.clone(), shape, handle, like.dtype)
-}
-
-/// One cube for each of `rows`.
-fn grid(rows: usize) -> (CubeCount, CubeDim) {
-    let columns = (rows as u32).clamp(1, MAX_CUBES);
-    (
-        CubeCount::Static(columns, (rows as u32).div_ceil(columns).max(1), 1),
-        CubeDim::new_1d(CUBE),
-    )
 }

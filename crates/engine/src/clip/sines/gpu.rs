@@ -9,20 +9,45 @@ use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
 use super::density::{CORNERS, GRID, LEAST};
+use super::kernel::SINE;
 use super::{FloatTensor, MeanSines, TURN, WeightedSines};
+use crate::launch::{empty_tensor, grid_of};
 
 /// Units of a cube.
 const CUBE: u32 = 64;
-/// Cubes a dimension that every device allows.
-const MAX_CUBES: u32 = 65_535;
 /// Pixels that one unit adds up.
 const CHUNK: usize = 256;
 
-/// `angle` less whole turns.
+/// One over a turn.
+const TURNS: f32 = std::f32::consts::FRAC_1_PI / 2.0;
+
+/// `angle` less whole turns, in turns: from -1/2 to 1/2.
 #[cube]
-fn reduce(angle: f32) -> f32 {
-    let turns = f32::round(angle * 0.159_154_94f32);
-    angle - turns * TURN[0] - turns * TURN[1]
+fn turns(angle: f32) -> f32 {
+    let whole = f32::round(angle * TURNS);
+    (angle - whole * TURN[0] - whole * TURN[1]) * TURNS
+}
+
+/// The sine of at most half a turn, by the same polynomial as on the CPU: a device's own may be slow, and differs from
+/// device to device.
+#[cube]
+fn sine_of(turns: f32) -> f32 {
+    let square = turns * turns;
+    let high = square * (square * SINE[5] + SINE[4]) + SINE[3];
+    turns * (square * (square * (square * high + SINE[2]) + SINE[1]) + SINE[0])
+}
+
+/// The sine of `angle`, in radians.
+#[cube]
+fn sine(angle: f32) -> f32 {
+    sine_of(turns(angle))
+}
+
+/// The cosine of `angle`: the sine a quarter turn on.
+#[cube]
+fn cosine(angle: f32) -> f32 {
+    let on = turns(angle) + 0.25f32;
+    sine_of(on - f32::round(on))
 }
 
 /// A unit for each picture, chunk of pixels and wave: `sums` is `[views][chunks][waves]`. Weights are `[views][pixels]`,
@@ -58,11 +83,11 @@ fn chunk_sums(
                 + green * pictures[at + pixels as usize]
                 + blue * pictures[at + 2 * pixels as usize]
                 + phase;
-            let mut sine = f32::sin(reduce(angle));
+            let mut value = sine(angle);
             if weighted {
-                sine *= weights[view * pixels as usize + pixel];
+                value *= weights[view * pixels as usize + pixel];
             }
-            sum += sine;
+            sum += value;
             pixel += 1;
         }
         sums[unit] = sum;
@@ -117,7 +142,7 @@ fn to_pixels(
             let green = filters[3 * wave + 1];
             let blue = filters[3 * wave + 2];
             let angle = red * r + green * g + blue * b + phases[wave];
-            let slope = f32::cos(reduce(angle)) * gradient[view * waves + wave] * share;
+            let slope = cosine(angle) * gradient[view * waves + wave] * share;
             to_r += red * slope;
             to_g += green * slope;
             to_b += blue * slope;
@@ -134,31 +159,45 @@ fn place(value: f32) -> f32 {
     f32::clamp(value - LEAST, 0.0f32, (CORNERS - 1) as f32)
 }
 
+/// The corner at or below a place, and not the last.
+#[cube]
+fn below(place: f32) -> usize {
+    min(place as usize, CORNERS - 2)
+}
+
 /// What a corner of the grid has of a colour in one channel.
 #[cube]
 fn share(place: f32, corner: usize) -> f32 {
     max(1.0f32 - f32::abs(place - corner as f32), 0.0f32)
 }
 
-/// A unit for each picture, chunk of pixels and corner: what the corner has of the chunk's pixels, `[views][chunks][GRID]`.
+/// A unit for each picture, chunk of pixels and corner of red and green: what its corners of blue have of the chunk's pixels,
+/// `[views][chunks][GRID]`.
 #[cube(launch)]
 fn chunk_counts(pictures: &[f32], counts: &mut [f32], pixels: u32, chunks: u32) {
     let unit = ABSOLUTE_POS;
-    if unit < counts.len() {
-        let corner = unit % GRID;
-        let chunk = unit / GRID % chunks as usize;
-        let picture = unit / GRID / chunks as usize * 3 * pixels as usize;
+    if unit * CORNERS < counts.len() {
+        let red = unit / CORNERS % CORNERS;
+        let green = unit % CORNERS;
+        let chunk = unit / (CORNERS * CORNERS) % chunks as usize;
+        let picture = unit / (CORNERS * CORNERS) / chunks as usize * 3 * pixels as usize;
         let mut pixel = chunk * CHUNK;
         let end = min(pixel + CHUNK, pixels as usize);
-        let mut sum = 0.0f32;
+        let mut sums = Array::<f32>::new(CORNERS);
         while pixel < end {
             let at = picture + pixel;
-            sum += share(place(pictures[at]), corner / CORNERS / CORNERS)
-                * share(place(pictures[at + pixels as usize]), corner / CORNERS % CORNERS)
-                * share(place(pictures[at + 2 * pixels as usize]), corner % CORNERS);
+            let both = share(place(pictures[at]), red) * share(place(pictures[at + pixels as usize]), green);
+            let blue = place(pictures[at + 2 * pixels as usize]);
+            #[unroll]
+            for corner in 0..CORNERS {
+                sums[corner] += both * share(blue, corner);
+            }
             pixel += 1;
         }
-        counts[unit] = sum;
+        #[unroll]
+        for corner in 0..CORNERS {
+            counts[unit * CORNERS + corner] = sums[corner];
+        }
     }
 }
 
@@ -173,11 +212,13 @@ fn rarities(pictures: &[f32], grid: &[f32], out: &mut [f32], pixels: u32, equali
         let green = place(pictures[at + pixels as usize]);
         let blue = place(pictures[at + 2 * pixels as usize]);
         let mut density = 0.0f32;
-        for corner in 0..GRID {
-            density += grid[view * GRID + corner]
-                * share(red, corner / CORNERS / CORNERS)
-                * share(green, corner / CORNERS % CORNERS)
-                * share(blue, corner % CORNERS);
+        // All other corners have no share of it.
+        for corner in 0..8usize {
+            let r = below(red) + corner / 4;
+            let g = below(green) + corner / 2 % 2;
+            let b = below(blue) + corner % 2;
+            density +=
+                grid[view * GRID + (r * CORNERS + g) * CORNERS + b] * share(red, r) * share(green, g) * share(blue, b);
         }
         out[unit] = f32::powf(max(density, 0.125f32), -equalization);
     }
@@ -237,7 +278,7 @@ impl WeightedSines for Cube {
         let (views, pixels) = (shape[0], shape[2] * shape[3]);
         let chunks = pixels.div_ceil(CHUNK);
         let client = pictures.client.clone();
-        let new = |shape: &[usize]| empty(&pictures, Shape::from(shape.to_vec()));
+        let new = |shape: &[usize]| empty_tensor(&pictures, Shape::from(shape.to_vec()));
         let counts = new(&[views, chunks, GRID]);
         let grid_of_colours = new(&[views, GRID]);
         let rarity = new(&[views, pixels]);
@@ -245,9 +286,9 @@ impl WeightedSines for Cube {
         let weights = new(&[views, pixels]);
         let (pixels, chunks) = (pixels as u32, chunks as u32);
         let arg = |tensor: &CubeTensor| tensor.clone().into_buffer_arg();
-        let (count, dim) = grid(counts.shape().num_elements());
+        let (count, dim) = grid_of(counts.shape().num_elements() / CORNERS, 1, CUBE);
         chunk_counts::launch(&client, count, dim, arg(&pictures), arg(&counts), pixels, chunks);
-        let (count, dim) = grid(views * GRID);
+        let (count, dim) = grid_of(views * GRID, 1, CUBE);
         mean_of_chunks::launch(
             &client,
             count,
@@ -258,7 +299,7 @@ impl WeightedSines for Cube {
             chunks,
             1.0,
         );
-        let (count, dim) = grid(views * pixels as usize);
+        let (count, dim) = grid_of(views * pixels as usize, 1, CUBE);
         rarities::launch(
             &client,
             count,
@@ -269,9 +310,9 @@ impl WeightedSines for Cube {
             pixels,
             equalization,
         );
-        let (count, dim) = grid(views * chunks as usize);
+        let (count, dim) = grid_of(views * chunks as usize, 1, CUBE);
         chunk_totals::launch(&client, count, dim, arg(&rarity), arg(&totals), pixels, chunks);
-        let (count, dim) = grid(views * pixels as usize);
+        let (count, dim) = grid_of(views * pixels as usize, 1, CUBE);
         shares_of_all::launch(
             &client,
             count,
@@ -301,9 +342,9 @@ impl WeightedSines for Cube {
         let pixels = shape[2] * shape[3];
         let chunks = pixels.div_ceil(CHUNK);
         let client = pictures.client.clone();
-        let sums = empty(&pictures, Shape::new([views, chunks, waves]));
-        let means = empty(&pictures, Shape::new([views, waves]));
-        let (count, dim) = grid(views * chunks * waves);
+        let sums = empty_tensor(&pictures, Shape::new([views, chunks, waves]));
+        let means = empty_tensor(&pictures, Shape::new([views, waves]));
+        let (count, dim) = grid_of(views * chunks * waves, 1, CUBE);
         chunk_sums::launch(
             &client,
             count,
@@ -317,7 +358,7 @@ impl WeightedSines for Cube {
             chunks as u32,
             weighted,
         );
-        let (count, dim) = grid(views * waves);
+        let (count, dim) = grid_of(views * waves, 1, CUBE);
         let scale = if weighted { 1.0 } else { 1.0 / pixels as f32 };
         let (sums, out) = (sums.into_buffer_arg(), means.clone().into_buffer_arg());
         mean_of_chunks::launch(&client, count, dim, sums, out, waves as u32, chunks as u32, scale);
@@ -340,8 +381,8 @@ impl WeightedSines for Cube {
         let shape = pictures.shape();
         let pixels = shape[2] * shape[3];
         let client = pictures.client.clone();
-        let out = empty(&pictures, shape.clone());
-        let (count, dim) = grid(shape[0] * pixels);
+        let out = empty_tensor(&pictures, shape.clone());
+        let (count, dim) = grid_of(shape[0] * pixels, 1, CUBE);
         to_pixels::launch(
             &client,
             count,
@@ -369,20 +410,4 @@ fn averaged(pictures: CubeTensor, side: usize) -> CubeTensor {
         1 => pictures,
         n => Cube::avg_pool2d(pictures, [n; 2], [n; 2], [0; 2], true, false),
     }
-}
-
-/// A new tensor on the device of `like`.
-fn empty(like: &CubeTensor, shape: Shape) -> CubeTensor {
-    let handle = like.client.empty(shape.num_elements() * 4);
-    CubeTensor::new_contiguous(like.client.clone(), like.device.clone(), shape, handle, like.dtype)
-}
-
-/// One unit for each of `units`.
-fn grid(units: usize) -> (CubeCount, CubeDim) {
-    let cubes = (units as u32).div_ceil(CUBE);
-    let columns = cubes.clamp(1, MAX_CUBES);
-    (
-        CubeCount::Static(columns, cubes.div_ceil(columns).max(1), 1),
-        CubeDim::new_1d(CUBE),
-    )
 }

@@ -9,7 +9,7 @@ use crate::simd::{Vectorised, multiply_add};
 pub(super) const LANES: usize = 32;
 
 /// Coefficients of r, r^3, r^5... of sin 2 pi r: the minimax polynomial over [-1/2, 1/2], within 9.6e-8, in f32 within 8e-7.
-const SINE: [f32; 6] = [6.283_182_6, -41.341_42, 81.596_18, -76.580_1, 41.205_395, -12.271_263];
+pub(super) const SINE: [f32; 6] = [6.283_182_6, -41.341_42, 81.596_18, -76.580_1, 41.205_395, -12.271_263];
 
 pub(super) type Lanes = [f32; LANES];
 

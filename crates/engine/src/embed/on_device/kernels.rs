@@ -5,7 +5,7 @@
 use cubecl::prelude::*;
 
 use super::super::preconditioned_sgd::MEAN_SQUARE;
-use crate::splat::{CUBE, cube_of_layer, unit_of_layer};
+use crate::launch::{CUBE, cube_of_layer, sum_of_cube, unit_of_layer};
 
 const UNITS: usize = CUBE as usize;
 
@@ -17,26 +17,6 @@ const SCALE: usize = 2;
 
 /// Sums of a penalty: squares of constant offsets, of all others, and sizes of gradients.
 pub(super) const SUMS: usize = 3;
-
-/// The sum of `value` over the units of a cube, which all get.
-#[cube]
-fn sum_of_cube(value: f32, shared: &mut Shared<[f32]>) -> f32 {
-    let unit = UNIT_POS as usize;
-    shared[unit] = value;
-    #[unroll]
-    for level in 0..comptime!(UNITS.ilog2() as usize) {
-        sync_cube();
-        let half = comptime!(UNITS >> (level + 1));
-        if unit < half {
-            let other = shared[unit + half];
-            shared[unit] += other;
-        }
-    }
-    sync_cube();
-    let sum = shared[0];
-    sync_cube();
-    sum
-}
 
 /// Adds a step along the gradient to the velocity of each slot; `energies` gets each cube's sum of squares over inverse
 /// energies, from `first_cube` on.

@@ -11,11 +11,12 @@ use self::optimizer::{OptimizerOnDevice, totals};
 use super::adam::Penalty;
 use super::loss::{Evaluated, Loss, finite};
 use super::loss_weight_controller::LossWeightFactors;
-use super::optimise::OptimizerState;
-use super::view_pool::PooledView;
+use super::pooled_view::PooledView;
+use super::run::OptimizerState;
 use crate::error::Result;
+use crate::launch::Buffer;
 use crate::scene::Scene;
-use crate::splat::{Buffer, GpuRasterizer, Learnable, SceneOnDevice, Shown};
+use crate::splat::{GpuRasterizer, Learnable, SceneOnDevice, Shown};
 
 /// A scene on a card, and what moves its colours there.
 pub(super) struct OnDevice {

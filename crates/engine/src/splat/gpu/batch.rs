@@ -5,9 +5,9 @@
 //! slots `[visible + 1]`, slots `[pairs]`, rows `[visible]`. A table says where they begin.
 use std::ops::Range;
 
-use super::buffer::{Buffer, grid};
 use super::kernels::append;
 use crate::error::Result;
+use crate::launch::{Buffer, grid};
 use crate::memory::Limits;
 use crate::splat::{PreparedView, Splat2d};
 use crate::view::Camera;

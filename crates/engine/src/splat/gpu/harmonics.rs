@@ -6,8 +6,8 @@
 use cubecl::prelude::*;
 
 use super::batch::{AXIS, CENTRE, CENTRE_REST, FIRST_COLOUR, ROWS, TERMS, VISIBLE};
-use super::buffer::unit_of_layer;
 use super::kernels::{field, float_field, sum_of_slots};
+use crate::launch::unit_of_layer;
 use crate::splat::sh::{C0, C1, C2, C3, C4};
 
 /// The slot of a Gaussian that is not learned.

@@ -11,7 +11,7 @@ use super::batch::{
     BACKGROUND, FIELDS, FIRST_COLOUR, FIRST_SLOT, PICTURE, SHAPE, SLOT_LIST, SLOT_START, SPLATS, TILE_LIST, TILE_START,
     VISIBLE,
 };
-use super::buffer::unit_of_layer;
+use crate::launch::unit_of_layer;
 use crate::splat::composite::{ALPHA_MAX, TRANSMITTANCE_MIN};
 use crate::splat::project::ALPHA_MIN;
 use crate::splat::tiles;

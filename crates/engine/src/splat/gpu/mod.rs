@@ -1,11 +1,12 @@
 //! Rasteriser for GPUs: CubeCL kernels on the wgpu device that burn uses.
 mod batch;
-mod buffer;
 mod harmonics;
+mod host_colours;
 mod kernels;
 mod scene;
 mod uploads;
 
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use burn::backend::Cube;
@@ -15,16 +16,15 @@ use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use self::kernels::{composite, splat_gradients, sum_slots};
+use self::kernels::{composite, splat_gradients};
 use self::uploads::Uploads;
+use super::PreparedView;
 use super::tiles::TILE;
-use super::{Drawing, PreparedView, Rasterizer};
 use crate::error::{Error, Result};
-use crate::picture::Picture;
-use crate::quality::unbatch;
+use crate::launch::Buffer;
+use crate::memory::Limits;
 
 pub(crate) use self::batch::{Batch, Group, PackedView, Shown};
-pub(crate) use self::buffer::{Buffer, CUBE, cube_of_layer, cubes, grid, unit_of_layer};
 pub(crate) use self::scene::{Chunk, SceneOnDevice};
 
 /// Draws with CubeCL kernels; weights are recomputed at every use, so views need none cached.
@@ -78,7 +78,7 @@ impl GpuRasterizer {
         let (width, height) = size_of_all(views)?;
         let groups = batch::groups(views, self.limit)?;
         let uploaded: Vec<Buffer> = views.iter().map(|shown| self.upload(shown.view)).collect();
-        let group = |range: std::ops::Range<usize>| batch::group(&self.client, range.clone(), views, &uploaded[range]);
+        let group = |range: Range<usize>| batch::group(&self.client, range.clone(), views, &uploaded[range]);
         Ok(Batch {
             groups: groups.into_iter().map(group).collect(),
             views: views.len(),
@@ -95,7 +95,7 @@ impl GpuRasterizer {
     pub(crate) fn composite(&self, batch: &Batch, colours: &[Buffer]) -> Result<Tensor<4>> {
         let shape = [batch.views, 3, batch.height as usize, batch.width as usize];
         let len: usize = shape.iter().product();
-        let limits = crate::memory::Limits::of_buffers(self.limit);
+        let limits = Limits::of_buffers(self.limit);
         limits.admit_buffer("the buffer of a batch's pictures", 4 * len as u64)?;
         let pictures = Buffer::empty(&self.client, len);
         for (group, colours) in batch.groups.iter().zip(colours) {
@@ -145,54 +145,6 @@ impl GpuRasterizer {
             slots
         };
         Ok(batch.groups.iter().map(of_group).collect())
-    }
-
-    /// Pictures of views with colours of the host, on the device.
-    fn draw(&self, drawings: &[Drawing<'_>]) -> Result<Tensor<4>> {
-        let shown: Vec<Shown<'_>> = drawings.iter().map(Shown::from).collect();
-        for Drawing { view, colours, .. } in drawings {
-            view.check("colours", colours.len(), 3 * view.visible.len())?;
-        }
-        let batch = self.batch(&shown)?;
-        let of_group = |group: &Group| {
-            let parts = drawings[group.views.clone()].iter().map(|drawing| drawing.colours);
-            Buffer::of(&self.client, &parts.collect::<Vec<_>>().concat())
-        };
-        let colours: Vec<Buffer> = batch.groups.iter().map(of_group).collect();
-        self.composite(&batch, &colours)
-    }
-
-    /// Takes gradients to pictures of views of one size back to their colours, and waits for them.
-    fn draw_backward(&self, views: &[&PreparedView], gradient: Tensor<4>) -> Result<Vec<Vec<f32>>> {
-        let background = [0.0; 3];
-        let shown: Vec<Shown<'_>> = views.iter().map(|&view| Shown { view, background }).collect();
-        let batch = self.batch(&shown)?;
-        let slots = self.slot_gradients(&batch, gradient)?;
-        let sums = batch.groups.iter().zip(&slots).map(|(group, slots)| {
-            let out = Buffer::empty(&self.client, 3 * group.colours());
-            let (count, dim) = grid(group.most_visible(), group.views.len());
-            sum_slots::launch(
-                &self.client,
-                count,
-                dim,
-                group.words.argument(),
-                group.table.argument(),
-                slots.argument(),
-                out.argument(),
-            );
-            out
-        });
-        let of_groups = self.read(&sums.collect::<Vec<_>>())?;
-        let mut gradients = Vec::with_capacity(views.len());
-        for (group, numbers) in batch.groups.iter().zip(of_groups) {
-            let mut rest = &numbers[..];
-            for visible in &group.visible {
-                let own;
-                (own, rest) = rest.split_at(3 * visible);
-                gradients.push(own.to_vec());
-            }
-        }
-        Ok(gradients)
     }
 
     /// The numbers of some buffers, in one transfer. Waits for all that was launched.
@@ -277,121 +229,5 @@ fn size_of_all(views: &[Shown<'_>]) -> Result<(u32, u32)> {
     }
 }
 
-impl<'a> From<&Drawing<'a>> for Shown<'a> {
-    fn from(drawing: &Drawing<'a>) -> Self {
-        Self {
-            view: drawing.view,
-            background: drawing.background,
-        }
-    }
-}
-
-impl Rasterizer for GpuRasterizer {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn on_device(&self) -> Option<&GpuRasterizer> {
-        Some(self)
-    }
-
-    fn render(&self, view: &PreparedView, colours: &[f32], background: [f32; 3]) -> Result<Picture> {
-        let drawing = Drawing {
-            view,
-            colours,
-            background,
-        };
-        Ok(unbatch(self.draw(&[drawing])?)?.swap_remove(0))
-    }
-
-    fn backward(&self, view: &PreparedView, picture_gradient: &[f32]) -> Result<Vec<f32>> {
-        view.check("picture gradient", picture_gradient.len(), view.picture_len())?;
-        let gradient = Picture {
-            width: view.camera.width,
-            height: view.camera.height,
-            pixels: picture_gradient.to_vec(),
-        };
-        Ok(self.backward_all(&[view], &[gradient])?.swap_remove(0))
-    }
-
-    fn render_all(&self, drawings: &[Drawing<'_>]) -> Result<Vec<Picture>> {
-        let size = |drawing: &Drawing<'_>| (drawing.view.camera.width, drawing.view.camera.height);
-        let mut pictures = Vec::with_capacity(drawings.len());
-        for same in drawings.chunk_by(|a, b| size(a) == size(b)) {
-            pictures.extend(unbatch(self.draw(same)?)?);
-        }
-        Ok(pictures)
-    }
-
-    fn backward_all(&self, views: &[&PreparedView], gradients: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        let device = Device::from(self.device.clone());
-        let pictures: Vec<&Picture> = gradients.iter().collect();
-        self.draw_backward(views, crate::quality::batch(&pictures, &device)?)
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::device::{DeviceChoice, open};
-    use crate::splat::checks::{camera, conforms, scene};
-    use crate::splat::{CpuRasterizer, WeightCache, prepare, sh};
-
-    /// The Vulkan device, or `None` with a message where there is none; in CI that is a failure.
-    fn device() -> Option<Device> {
-        match open(DeviceChoice::Wgpu) {
-            Ok(compute) => Some(compute.device),
-            Err(error) => {
-                assert!(std::env::var_os("CI").is_none(), "{error}");
-                eprintln!("skipped: {error}");
-                None
-            }
-        }
-    }
-
-    #[test]
-    fn the_gpu_agrees_with_the_reference() {
-        let Some(device) = device() else { return };
-        let rasterizer = GpuRasterizer::new(&device).unwrap();
-        conforms(&rasterizer, WeightCache::None);
-        // Lists without the pairs that turned out to be hidden give the same picture.
-        let (g, camera) = (scene(2000, 1), camera(75));
-        let [all, pruned] = [WeightCache::None, WeightCache::Weights].map(|cache| {
-            let view = prepare(&g, &camera, cache).unwrap();
-            let picture = rasterizer
-                .render(&view, &sh::colours(&g.sh, None, &view), [1.0; 3])
-                .unwrap();
-            (view.visible.len(), picture)
-        });
-        assert!(pruned.0 < all.0);
-        assert_eq!(pruned.1, all.1);
-    }
-
-    #[test]
-    fn the_gpu_repeats_itself_to_the_byte() {
-        let Some(device) = device() else { return };
-        let g = scene(1500, 0);
-        let view = prepare(&g, &camera(64), WeightCache::None).unwrap();
-        let colours = sh::colours(&g.sh, None, &view);
-        let run = || {
-            // A new rasteriser each time: the second run must not depend on buffers that the first left.
-            let rasterizer = GpuRasterizer::new(&device).unwrap();
-            let picture = rasterizer.render(&view, &colours, [0.0; 3]).unwrap();
-            let gradient = rasterizer.backward(&view, &picture.pixels).unwrap();
-            (picture, gradient)
-        };
-        let first = run();
-        assert!(first.1.iter().any(|v| *v != 0.0));
-        assert_eq!(first, run());
-        assert_eq!(
-            first.1.len(),
-            CpuRasterizer.backward(&view, &first.0.pixels).unwrap().len()
-        );
-    }
-
-    #[test]
-    fn another_device_is_an_error() {
-        let error = GpuRasterizer::new(&Device::flex()).err().map(|e| e.to_string());
-        assert!(error.is_some_and(|e| e.contains("needs a wgpu device")));
-    }
-}
+mod tests;

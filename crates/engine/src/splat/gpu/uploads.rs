@@ -1,7 +1,7 @@
 //! Views on the device: the words of those drawn last are kept, because a step draws a view several times.
 use std::collections::VecDeque;
 
-use super::buffer::Buffer;
+use crate::launch::Buffer;
 use crate::splat::prepare::ViewId;
 
 /// Device memory for kept views: those that an embedding draws from at the size of its pool.

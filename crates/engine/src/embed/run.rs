@@ -1,0 +1,299 @@
+//! A run of the loop: one step after the other, on the host or on a card.
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::adam::{Adam, Penalty};
+use super::learned_offsets::LearnedOffsets;
+use super::loss::{Evaluated, Loss, finite};
+use super::loss_weight_controller::{LossWeightController, LossWeightFactors};
+use super::on_device::{OnDevice, StepOptions};
+use super::optimizer::Optimizer;
+use super::pooled_view::PooledView;
+use super::preconditioned_sgd::PreconditionedSgd;
+use super::preparing::Preparing;
+use super::progress::{Check, Step};
+use super::settings::{Extension, Settings};
+use super::step_timer::{Stage, StepTimer};
+use super::view_pool::{Coverage, ViewPool};
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::message::Message;
+use crate::picture::Picture;
+use crate::scene::Scene;
+use crate::splat::{Changes, Geometry, Learnable, PreparedView, sh};
+use crate::view::ViewSampler;
+
+/// dB that held-out views may lack of the target without more steps: to hold them takes bits.
+const SHORT_DB: f64 = 0.5;
+
+/// What moves the offsets.
+pub(super) enum OptimizerState {
+    Adam(Adam),
+    PreconditionedSgd(PreconditionedSgd),
+}
+
+/// The state of a run.
+pub(super) struct Run<'a> {
+    engine: &'a Engine,
+    scene: &'a Scene,
+    geometry: Arc<Geometry<'a>>,
+    settings: &'a Settings,
+    /// Most steps, by the settings or as they were extended.
+    steps: usize,
+    /// What is done at the next look, where bits are wrong.
+    extension: Option<Extension>,
+    loss: Loss<'a>,
+    pool: ViewPool,
+    optimiser: OptimizerState,
+    controller: LossWeightController,
+    augmentation: ChaCha8Rng,
+    learned: LearnedOffsets,
+    gradient: Vec<f32>,
+    /// Where the engine computes on a card.
+    on_device: Option<OnDevice>,
+}
+
+impl<'a> Run<'a> {
+    /// Finds what views show, and stands before the first step.
+    ///
+    /// # Errors
+    /// A failing device; [`Error::Stopped`](crate::Error::Stopped).
+    pub fn new(
+        engine: &'a Engine,
+        scene: &'a Scene,
+        geometry: Geometry<'a>,
+        message: &Message,
+        settings: &'a Settings,
+        sampler: ViewSampler,
+    ) -> Result<(Self, Coverage)> {
+        let of_parts = sampler.shows_parts();
+        let mut pool = ViewPool::new(sampler, settings);
+        let coverage = pool.cover(engine, &geometry)?;
+        let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
+        let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
+        augmentation.set_stream(u64::MAX - 1);
+        let (rows, columns) = (learnable.rows().len(), learnable.columns());
+        let optimiser = match settings.optimizer {
+            Optimizer::PreconditionedSgd(options) => {
+                let energies: Vec<f32> = learnable
+                    .rows()
+                    .iter()
+                    .map(|r| coverage.energies[*r as usize])
+                    .collect();
+                OptimizerState::PreconditionedSgd(PreconditionedSgd::new(options, columns, &energies, of_parts))
+            }
+            Optimizer::Adam(options) => OptimizerState::Adam(Adam::new(options, rows, columns, scene.gaussians.len())),
+        };
+        let rasterizer = engine.rasterizer()?.on_device();
+        let on_device = rasterizer.map(|rasterizer| OnDevice::new(rasterizer, scene, &learnable, &optimiser));
+        let run = Self {
+            engine,
+            on_device,
+            scene,
+            geometry: Arc::new(geometry),
+            settings,
+            steps: settings.steps,
+            extension: settings.extension,
+            loss: Loss::new(engine, settings, message),
+            pool,
+            optimiser,
+            controller: LossWeightController::new(settings.balance, coverage.covered),
+            augmentation,
+            gradient: vec![0.0; learnable.len()],
+            learned: LearnedOffsets::new(scene, learnable),
+        };
+        Ok((run, coverage))
+    }
+
+    /// One step; `step` counts from 1.
+    pub fn step<'scope>(
+        &mut self,
+        step: usize,
+        preparing: &mut Preparing<'scope, 'a>,
+        timing: &mut StepTimer,
+    ) -> Result<Step>
+    where
+        'a: 'scope,
+    {
+        let engine = self.engine;
+        let views = self.pool.batch(engine, &self.geometry)?;
+        preparing.begin(engine, &self.geometry, self.steps - step, |after| {
+            self.pool.upcoming(after)
+        });
+        timing.lap(Stage::Prepare);
+        let mut figures = self.differentiate(step, &views, timing, |pool| pool.prepared(engine, preparing.next()?))?;
+        if !self.moves_on_device() {
+            figures.terms.offset = self.advance(step)?;
+        }
+        let ssim = 1.0 - f64::from(figures.terms.ssim);
+        self.controller.update(figures.psnr_db, figures.bit_accuracy, ssim);
+        timing.lap(Stage::Adam);
+        Ok(figures)
+    }
+
+    /// Most steps, by the settings or as they were extended.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// The changes that pictures of the written file will show, as [`Run::fetch`] brought them.
+    pub fn changes(&self) -> Changes<'_> {
+        self.learned.changes()
+    }
+
+    /// What was learned.
+    pub fn into_learned(self) -> LearnedOffsets {
+        self.learned
+    }
+
+    fn moves_on_device(&self) -> bool {
+        self.on_device.as_ref().is_some_and(OnDevice::moves)
+    }
+
+    /// Brings the offsets from where they are moved.
+    pub fn fetch(&mut self) -> Result<()> {
+        match (&self.on_device, self.engine.rasterizer()?.on_device()) {
+            (Some(on_device), Some(rasterizer)) if on_device.moves() => {
+                on_device.read_offsets(rasterizer, &mut self.learned.values)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn penalty(&self) -> Penalty {
+        Penalty {
+            dc: self.settings.lambda.offset_dc,
+            rest: self.settings.lambda.offset_rest,
+        }
+    }
+
+    /// Moves the offsets along `self.gradient`, which is all zero afterwards; returns the penalty of where they were.
+    fn advance(&mut self, step: usize) -> Result<f32> {
+        let (penalty, rate) = (self.penalty(), self.rate(step));
+        let (columns, gaussians) = (self.learned.learnable.columns(), self.scene.gaussians.len());
+        let offset = penalty.value(&self.learned.values, columns, gaussians) as f32;
+        finite(step, "offset", offset)?;
+        let (offsets, gradient) = (&mut self.learned.values, &mut self.gradient);
+        match &mut self.optimiser {
+            OptimizerState::Adam(adam) => adam.step(rate, penalty, offsets, gradient),
+            OptimizerState::PreconditionedSgd(sgd) => {
+                let pixels = 3.0 * (self.settings.size as f32).powi(2);
+                sgd.step(rate, pixels, offsets, gradient);
+            }
+        }
+        self.learned.quantize(self.scene);
+        if let (Some(on_device), Some(rasterizer)) = (&mut self.on_device, self.engine.rasterizer()?.on_device()) {
+            on_device.set_offsets(rasterizer, self.learned.changes().values);
+        }
+        Ok(offset)
+    }
+
+    /// Draws `views` with the offsets as they are, and adds the gradient of the loss, without the offset penalty, to
+    /// `self.gradient`. On a card the offsets are moved as well, if they are moved there; `meanwhile` is done while it computes.
+    fn differentiate(
+        &mut self,
+        step: usize,
+        views: &[Arc<PooledView>],
+        timing: &mut StepTimer,
+        meanwhile: impl FnOnce(&mut ViewPool) -> Result<()>,
+    ) -> Result<Step> {
+        let factors = self.controller.factors();
+        let options = StepOptions {
+            step,
+            factors,
+            rate: self.rate(step),
+            penalty: self.penalty(),
+        };
+        let found = match (self.engine.rasterizer()?.on_device(), &mut self.on_device) {
+            (Some(rasterizer), Some(on_device)) => {
+                let launched = on_device.launch(rasterizer, &self.loss, views, options, &mut self.augmentation)?;
+                timing.lap(Stage::Loss);
+                meanwhile(&mut self.pool)?;
+                timing.lap(Stage::Prepare);
+                let found = on_device.wait(rasterizer, &self.loss, launched)?;
+                if !on_device.moves() {
+                    on_device.read_gradient(rasterizer, &mut self.gradient)?;
+                }
+                timing.lap(Stage::Backward);
+                found
+            }
+            _ => {
+                let found = self.differentiate_on_host(step, views, factors, timing)?;
+                meanwhile(&mut self.pool)?;
+                timing.lap(Stage::Prepare);
+                found
+            }
+        };
+        Ok(Step {
+            step,
+            total: self.steps,
+            bit_accuracy: found.bit_accuracy,
+            psnr_db: found.psnr_db,
+            terms: found.terms,
+            balance: factors.reconstruction,
+        })
+    }
+
+    fn differentiate_on_host(
+        &mut self,
+        step: usize,
+        views: &[Arc<PooledView>],
+        factors: LossWeightFactors,
+        timing: &mut StepTimer,
+    ) -> Result<Evaluated> {
+        let engine = self.engine;
+        let changes = self.learned.changes();
+        let colours = PooledView::colours(views, &self.scene.gaussians.sh, Some(changes));
+        timing.lap(Stage::Colours);
+        let references: Vec<&Picture> = views.iter().map(|v| &v.reference).collect();
+        let pictures = PooledView::draw_all(engine, views, &colours)?;
+        timing.lap(Stage::Render);
+        let pictures: Vec<&Picture> = pictures.iter().collect();
+        let rng = &mut self.augmentation;
+        let (found, gradients) = self.loss.evaluate(step, &pictures, &references, factors, rng)?;
+        timing.lap(Stage::Loss);
+        let prepared: Vec<&PreparedView> = views.iter().map(|v| &v.view).collect();
+        let gradients = engine.rasterizer()?.backward_all(&prepared, &gradients)?;
+        timing.lap(Stage::Backward);
+        let of_views = views.iter().zip(&colours).zip(&gradients);
+        let of_views: Vec<sh::ColourGradient<'_>> = of_views
+            .map(|((v, colours), gradient)| sh::ColourGradient {
+                view: &v.view,
+                colours,
+                gradient,
+            })
+            .collect();
+        sh::backward_of_views(&self.learned.learnable, &of_views, &mut self.gradient);
+        timing.lap(Stage::ShBackward);
+        Ok(found)
+    }
+
+    /// Heeds what held-out views showed. Where they show the mark more than they may, its PSNR is held higher. Where they
+    /// still do at the first look that decides, or have wrong bits, the run takes more steps, in which weak bits weigh more;
+    /// the rate then follows the longer curve.
+    pub fn heed(&mut self, check: &Check) {
+        let lacking = self.settings.target.psnr_db - check.psnr_db;
+        self.controller.held_out(lacking);
+        if let Some(extension) = self.extension.filter(|extension| check.step >= extension.after) {
+            self.extension = None;
+            if check.bit_accuracy < extension.below || lacking > SHORT_DB {
+                self.steps = self.steps.saturating_mul(extension.times as usize);
+                self.loss.set_temperature(extension.temperature);
+                self.extension = extension.next();
+            }
+        }
+    }
+
+    /// Factor on the learning rates: a half cosine from 1 to the final rate.
+    fn rate(&self, step: usize) -> f32 {
+        let s = self.settings;
+        let last = s.optimizer.final_rate();
+        let turn = std::f32::consts::PI * (step - 1) as f32 / self.steps as f32;
+        last + (1.0 - last) * 0.5 * (1.0 + turn.cos())
+    }
+}
+
+#[cfg(test)]
+mod tests;
