@@ -30,7 +30,13 @@ fn main() -> Result<(), Failure> {
     let gaussians = Scene::read(path.as_ref())?.gaussians;
     let geometry = Geometry::new(&gaussians);
     let sampler = ViewSampler::new(&gaussians, 1)?;
-    for (size, cache) in [(160, WeightCache::Weights), (224, WeightCache::None)] {
+    // As a CPU, a card, and who reads a scene prepare them.
+    let kinds = [
+        (160, WeightCache::Weights),
+        (160, WeightCache::None),
+        (224, WeightCache::None),
+    ];
+    for (size, cache) in kinds {
         let (mut ms, mut hash) = (0.0, DefaultHasher::new());
         let (mut visible, mut pairs, mut weights) = (0, 0, 0);
         for index in 0..views {

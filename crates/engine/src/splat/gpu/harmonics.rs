@@ -131,8 +131,8 @@ pub fn colours_of_rows(
                     let mut green = coefficients[at + 3 * k + 1];
                     let mut blue = coefficients[at + 3 * k + 2];
                     if comptime!(3 * k < learned) {
+                        let from = slot as usize * learned + 3 * k;
                         if slot != NO_SLOT {
-                            let from = slot as usize * learned + 3 * k;
                             red += offsets[from];
                             green += offsets[from + 1];
                             blue += offsets[from + 2];
