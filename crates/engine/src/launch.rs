@@ -43,6 +43,14 @@ impl Buffer {
         Self::of(client, &vec![0.0_f32; len])
     }
 
+    /// The first `len` of them, at most as many as there are.
+    pub fn first(&self, len: usize) -> Self {
+        Self {
+            handle: self.handle.clone(),
+            len: len.min(self.len),
+        }
+    }
+
     /// As a kernel's argument.
     #[allow(unsafe_code)]
     pub fn argument(&self) -> BufferArg {

@@ -6,7 +6,7 @@ use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
 use guardsplat_distortion::RobustTo;
 use guardsplat_engine::clip::{Clip, ClipConfig, ClipModel, Parts};
-use guardsplat_engine::device::{Compute, DeviceChoice, open};
+use guardsplat_engine::device::Compute;
 use guardsplat_engine::embed::{Augmentation, Job, Outcome, Preset, Progress, Settings, embed, optimise};
 use guardsplat_engine::extract::{Engine, rasterizer, read_rendered, read_scene};
 use guardsplat_engine::message::key::{KeyProgress, create_key, natural_images};
@@ -15,7 +15,7 @@ use guardsplat_engine::sample::sample;
 use guardsplat_engine::scene::{BadRows, Gaussians, Scene};
 use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::stop::Stop;
-use guardsplat_engine::testing::scene_path;
+use guardsplat_engine::testing::{scene_path, wgpu};
 use guardsplat_engine::view::{Split, ViewSampler};
 use guardsplat_engine::{Error, Result};
 
@@ -341,14 +341,7 @@ fn a_whole_embedding_runs_on_wgpu() {
     let Some(input) = scene_path("playbot_8k.ply") else {
         return;
     };
-    let compute = match open(DeviceChoice::Wgpu) {
-        Ok(compute) => compute,
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-    };
+    let Some(compute) = wgpu() else { return };
     let clip = clip(&compute);
     let engine = Engine::new(compute, clip, key(), None).unwrap();
     let folder = tempfile::tempdir().unwrap();

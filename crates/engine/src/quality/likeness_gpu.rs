@@ -14,7 +14,7 @@ use super::likeness::LikenessWeights;
 use super::ssim::{C1, C2};
 use super::window::{RADIUS, weight};
 use crate::error::{Error, Result};
-use crate::launch::{CUBE, a_cube_each, cube_of_layer, grid, sum_of_cube};
+use crate::launch::{Buffer, CUBE, a_cube_each, cube_of_layer, grid, sum_of_cube};
 
 const UNITS: usize = CUBE as usize;
 
@@ -205,37 +205,46 @@ impl LikenessOnDevice {
         let taps: Vec<f32> = (0..2 * RADIUS + 1)
             .map(|tap| weight(tap.abs_diff(RADIUS)) as f32)
             .collect();
-        let taps = client.create_from_slice(bytemuck::cast_slice(&taps));
-        let [across, values, slopes] = [5, 3, 3].map(|parts| client.empty(4 * parts * count));
-        let gradient = client.empty(4 * count);
+        let taps = Buffer::of(&client, &taps);
+        let [across, values, slopes, gradient] = [5, 3, 3, 1].map(|parts| Buffer::empty(&client, parts * count));
         let (w, h) = (width as u32, height as u32);
         let scale = 1.0 / count as f32;
-        let taps = || argument(&taps, 2 * RADIUS + 1);
-        let pictures = || (argument(&x.handle, count), argument(&y.handle, count));
+        let pictures = || [&x, &y].map(|tensor| tensor.clone().into_buffer_arg());
 
-        let (of_x, of_y) = pictures();
+        let [of_x, of_y] = pictures();
         let (cubes, dim) = grid(count, 1);
-        let moments = argument(&across, 5 * count);
-        moments_along_rows::launch(&client, cubes, dim, of_x, of_y, taps(), moments, w);
+        let [taps_of, moments] = [&taps, &across].map(Buffer::argument);
+        moments_along_rows::launch(&client, cubes, dim, of_x, of_y, taps_of, moments, w);
         let (cubes, dim) = grid(count, 1);
-        let [of_across, of_values, of_slopes] = [(&across, 5), (&values, 3), (&slopes, 3)].map(parts(count));
-        similarity::launch(&client, cubes, dim, of_across, taps(), of_values, of_slopes, w, h);
+        let [of_across, of_values, of_slopes] = [&across, &values, &slopes].map(Buffer::argument);
+        similarity::launch(
+            &client,
+            cubes,
+            dim,
+            of_across,
+            taps.argument(),
+            of_values,
+            of_slopes,
+            w,
+            h,
+        );
+        // Averages of slopes take the place of those of pictures.
+        let across = across.first(3 * count);
         let (cubes, dim) = grid(3 * count, 1);
-        let [of_slopes, of_across] = [(&slopes, 3), (&across, 3)].map(parts(count));
-        slopes_along_rows::launch(&client, cubes, dim, of_slopes, taps(), of_across, w);
-        let (of_x, of_y) = pictures();
+        let [of_slopes, of_across] = [&slopes, &across].map(Buffer::argument);
+        slopes_along_rows::launch(&client, cubes, dim, of_slopes, taps.argument(), of_across, w);
+        let [of_x, of_y] = pictures();
         let (cubes, dim) = grid(count, 1);
-        let [of_across, of_values, of_gradient] = [(&across, 3), (&values, 3), (&gradient, 1)].map(parts(count));
         to_marked::launch(
             &client,
             cubes,
             dim,
             of_x,
             of_y,
-            of_across,
-            taps(),
-            of_values,
-            of_gradient,
+            across.argument(),
+            taps.argument(),
+            values.argument(),
+            gradient.argument(),
             w,
             h,
             scale * weights.l1,
@@ -243,20 +252,20 @@ impl LikenessOnDevice {
             scale * weights.ssim,
         );
         let (rows, len) = (3 * views, channels * height * width);
-        let means = client.empty(4 * rows);
+        let means = Buffer::empty(&client, rows);
         let (cubes, dim) = a_cube_each(rows);
         means_of_rows::launch(
             &client,
             cubes,
             dim,
-            argument(&values, rows * len),
-            argument(&means, rows),
+            values.argument(),
+            means.argument(),
             len as u32,
             1.0 / len as f32,
         );
         Ok(Self {
-            means: tensor(&y, means, [3, views]),
-            gradient: tensor(&y, gradient, [views, channels, height, width]),
+            means: tensor(&y, means.handle, [3, views]),
+            gradient: tensor(&y, gradient.handle, [views, channels, height, width]),
         })
     }
 }
@@ -276,35 +285,17 @@ fn tensor<const D: usize>(like: &CubeTensor, handle: Handle, shape: [usize; D]) 
     Tensor::from_primitive::<Cube>(CubeTensor::new_contiguous(client, device, shape, handle, DType::F32))
 }
 
-/// Kernel arguments of so many parts of `count` numbers.
-fn parts(count: usize) -> impl Fn((&Handle, usize)) -> BufferArg {
-    move |(handle, parts)| argument(handle, parts * count)
-}
-
-/// A kernel argument: `len` elements of `handle`.
-#[allow(unsafe_code)]
-fn argument(handle: &Handle, len: usize) -> BufferArg {
-    // SAFETY: buffers are at least as long as every caller says, and the kernels stay within what is said.
-    unsafe { BufferArg::from_raw_parts(handle.clone(), len) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{DeviceChoice, open};
     use crate::picture::Picture;
     use crate::quality::{batch, likeness_with_gradient, unbatch};
+    use crate::testing::wgpu;
 
     #[test]
     fn a_card_and_the_cpu_agree() {
-        let device = match open(DeviceChoice::Wgpu) {
-            Ok(compute) => compute.device,
-            Err(error) => {
-                assert!(std::env::var_os("CI").is_none(), "{error}");
-                eprintln!("skipped: {error}");
-                return;
-            }
-        };
+        let Some(compute) = wgpu() else { return };
+        let device = compute.device;
         let picture = |seed: u32| Picture {
             width: 37,
             height: 21,

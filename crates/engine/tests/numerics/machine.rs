@@ -2,6 +2,7 @@
 use guardsplat_engine::device::{Compute, DeviceChoice, open};
 use guardsplat_engine::extract::rasterizer;
 use guardsplat_engine::splat::{Rasterizer, WeightCache};
+use guardsplat_engine::testing::wgpu;
 
 /// A device with its renderer.
 pub struct Machine {
@@ -29,14 +30,7 @@ impl Machine {
 
     /// The Vulkan device, or `None` with a message where there is none; in CI that is a failure.
     fn wgpu() -> Option<Self> {
-        match open(DeviceChoice::Wgpu) {
-            Ok(compute) => Some(Self::new(compute, &[WeightCache::None])),
-            Err(error) => {
-                assert!(std::env::var_os("CI").is_none(), "{error}");
-                eprintln!("skipped on wgpu: {error}");
-                None
-            }
-        }
+        wgpu().map(|compute| Self::new(compute, &[WeightCache::None]))
     }
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::device::{DeviceChoice, open};
+use crate::testing::wgpu;
 use burn::tensor::{Device, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -152,12 +152,8 @@ fn the_cpu_agrees_with_the_formula() {
 
 #[test]
 fn wgpu_agrees_with_the_formula() {
-    match open(DeviceChoice::Wgpu) {
-        Ok(compute) => agrees(&compute.device),
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("skipped: {error}");
-        }
+    if let Some(compute) = wgpu() {
+        agrees(&compute.device);
     }
 }
 

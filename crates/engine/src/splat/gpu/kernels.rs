@@ -46,13 +46,16 @@ pub fn append(part: &[u32], words: &mut [u32], at: u32) {
     }
 }
 
-/// Opacity of a splat at a pixel `dx`, `dy` from its centre; see [`super::Splat2d`] for the formula.
+/// Opacity at a pixel `px`, `py` of the splat whose shape is in `batch` from `at` on; see [`crate::splat::Splat2d`] for the
+/// formula.
 #[cube]
-fn alpha_at(dx: f32, dy: f32, inverse_x: f32, slope: f32, inverse_y: f32, opacity: f32) -> f32 {
-    let u = (dx - slope * dy) * inverse_x;
-    let v = dy * inverse_y;
+fn alpha_at(px: f32, py: f32, batch: &Shared<[f32]>, at: usize) -> f32 {
+    let dx = px - batch[at];
+    let dy = py - batch[at + 1];
+    let u = (dx - batch[at + 3] * dy) * batch[at + 2];
+    let v = dy * batch[at + 4];
     let power = -0.5f32 * (u * u + v * v);
-    min(opacity * f32::exp(max(power, -80.0f32)), ALPHA_MAX)
+    min(batch[at + 5] * f32::exp(max(power, -80.0f32)), ALPHA_MAX)
 }
 
 /// Draws a tile: `pictures` (`[views][3][height][width]`) from the tile's list, front to back, with the group's `colours`.
@@ -100,14 +103,7 @@ pub fn composite(words: &[u32], table: &[u32], colours: &[f32], pictures: &mut [
         let mut k = 0usize;
         while k < count && open {
             let at = k * SHAPE_AND_COLOUR;
-            let alpha = alpha_at(
-                px - batch[at],
-                py - batch[at + 1],
-                batch[at + 2],
-                batch[at + 3],
-                batch[at + 4],
-                batch[at + 5],
-            );
+            let alpha = alpha_at(px, py, &batch, at);
             if alpha >= ALPHA_MIN {
                 let left = transmittance * (1.0f32 - alpha);
                 if left < TRANSMITTANCE_MIN {
@@ -194,15 +190,7 @@ pub fn splat_gradients(words: &[u32], table: &[u32], gradient: &[f32], slots: &m
         for k in 0..count {
             let mut weight = 0.0f32;
             if open {
-                let at = k * SHAPE;
-                let alpha = alpha_at(
-                    px - batch[at],
-                    py - batch[at + 1],
-                    batch[at + 2],
-                    batch[at + 3],
-                    batch[at + 4],
-                    batch[at + 5],
-                );
+                let alpha = alpha_at(px, py, &batch, k * SHAPE);
                 if alpha >= ALPHA_MIN {
                     let left = transmittance * (1.0f32 - alpha);
                     if left < TRANSMITTANCE_MIN {

@@ -1,24 +1,12 @@
 use super::*;
-use crate::device::{DeviceChoice, open};
 use crate::splat::checks::{camera, conforms, scene};
 use crate::splat::{CpuRasterizer, Rasterizer, WeightCache, prepare, sh};
-
-/// The Vulkan device, or `None` with a message where there is none; in CI that is a failure.
-fn device() -> Option<Device> {
-    match open(DeviceChoice::Wgpu) {
-        Ok(compute) => Some(compute.device),
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
-}
+use crate::testing::wgpu;
 
 #[test]
 fn the_gpu_agrees_with_the_reference() {
-    let Some(device) = device() else { return };
-    let rasterizer = GpuRasterizer::new(&device).unwrap();
+    let Some(compute) = wgpu() else { return };
+    let rasterizer = GpuRasterizer::new(&compute.device).unwrap();
     conforms(&rasterizer, WeightCache::None);
     // Lists without the pairs that turned out to be hidden give the same picture.
     let (g, camera) = (scene(2000, 1), camera(75));
@@ -35,13 +23,13 @@ fn the_gpu_agrees_with_the_reference() {
 
 #[test]
 fn the_gpu_repeats_itself_to_the_byte() {
-    let Some(device) = device() else { return };
+    let Some(compute) = wgpu() else { return };
     let g = scene(1500, 0);
     let view = prepare(&g, &camera(64), WeightCache::None).unwrap();
     let colours = sh::colours(&g.sh, None, &view);
     let run = || {
         // A new rasteriser each time: the second run must not depend on buffers that the first left.
-        let rasterizer = GpuRasterizer::new(&device).unwrap();
+        let rasterizer = GpuRasterizer::new(&compute.device).unwrap();
         let picture = rasterizer.render(&view, &colours, [0.0; 3]).unwrap();
         let gradient = rasterizer.backward(&view, &picture.pixels).unwrap();
         (picture, gradient)

@@ -34,15 +34,12 @@ impl Uploads {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{DeviceChoice, open};
     use crate::splat::GpuRasterizer;
+    use crate::testing::wgpu;
 
     #[test]
     fn the_latest_views_are_kept_within_the_budget() {
-        // Handles come from any device; where there is none, the GPU's own tests say so.
-        let Ok(compute) = open(DeviceChoice::Wgpu) else {
-            return;
-        };
+        let Some(compute) = wgpu() else { return };
         let rasterizer = GpuRasterizer::new(&compute.device).unwrap();
         let one = Buffer::of(rasterizer.client(), &[1u32]);
         let made = |bytes: usize| Buffer {

@@ -1,7 +1,7 @@
 use super::*;
-use crate::device::{DeviceChoice, open};
 use crate::scene::{Gaussians, Sh};
 use crate::splat::Learnable;
+use crate::testing::wgpu;
 
 const GAUSSIANS: usize = 700;
 const PENALTY: Penalty = Penalty { dc: 10.0, rest: 5.0 };
@@ -23,14 +23,7 @@ fn optimizers(learnable: &Learnable) -> Vec<OptimizerState> {
 
 #[test]
 fn optimisers_move_offsets_as_on_the_host() {
-    let compute = match open(DeviceChoice::Wgpu) {
-        Ok(compute) => compute,
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-    };
+    let Some(compute) = wgpu() else { return };
     let rasterizer = GpuRasterizer::new(&compute.device).unwrap();
     let learnable = Learnable::new(&(0..GAUSSIANS).map(|row| row % 5 != 2).collect::<Vec<_>>(), 1);
     let scene = Gaussians {

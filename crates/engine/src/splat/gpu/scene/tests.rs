@@ -1,9 +1,9 @@
 use super::*;
-use crate::device::{DeviceChoice, open};
 use crate::picture::Picture;
 use crate::quality::{batch, unbatch};
 use crate::splat::checks::{camera, scene};
 use crate::splat::{Changes, CpuRasterizer, Drawing, PreparedView, Rasterizer, Shown, WeightCache, prepare, sh};
+use crate::testing::wgpu;
 
 const BACKGROUNDS: [[f32; 3]; 3] = [[1.0; 3], [0.0; 3], [0.2, 0.6, 1.0]];
 
@@ -53,14 +53,8 @@ fn close(found: &[f32], want: &[f32], what: &str) {
 /// Also where buffers hold but one view, and a few rows of the scene.
 #[test]
 fn a_scene_on_a_card_is_drawn_and_differentiated_as_on_the_cpu() {
-    let device = match open(DeviceChoice::Wgpu) {
-        Ok(compute) => compute.device,
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-    };
+    let Some(compute) = wgpu() else { return };
+    let device = compute.device;
     let Case {
         g,
         views,
