@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("--gaussians", type=float, default=101_407)
     parser.add_argument("--columns", type=float, default=3)
     parser.add_argument("--launches", type=float, default=161)
-    parser.add_argument("--launch-us", type=float, default=41, help="processor time of the host for one")
+    parser.add_argument("--launch-us", type=float, default=60, help="of the host for one: launching by a step's log, over launches")
     parser.add_argument("--copy", type=float, default=5e9, help="bytes a second that the host copies to where the card fetches them")
     a = parser.parse_args()
     parts = kernels(a.visible, a.pairs, a.gaussians, a.columns)
