@@ -63,7 +63,7 @@ impl ImageAugmentation {
     /// Draws outside of their limits, which checked settings rule out.
     pub fn logits(&self, engine: &Engine, pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Result<Tensor<2>> {
         if self.layer.robust_to.of_pictures().next().is_none() {
-            return engine.logits(pictures);
+            return engine.logits_at_sizes(pictures);
         }
         let draws = self.draws(pictures.dims()[0], rng);
         // One kind after the other, so that no picture is put into another order while it is large.
@@ -81,7 +81,7 @@ impl ImageAugmentation {
         let mut parts = Vec::new();
         for (kind, positions) in &alike {
             if kind.is_none() {
-                parts.push(engine.logits(some(positions))?);
+                parts.push(engine.logits_at_sizes(some(positions))?);
                 continue;
             }
             let chosen: Vec<Draw> = positions.iter().map(|&i| draws[i].clone()).collect();

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::extractor::{ClipExtractor, Extractor};
 use super::hypothesis::searched_hypotheses;
+use super::sizes::larger_sides;
 use crate::clip::{Clip, resize};
 use crate::device::Compute;
 use crate::error::{Error, Result};
@@ -168,6 +169,22 @@ impl Engine {
         self.extractor.logits(pictures)
     }
 
+    /// Mean logits `[b, bits]` of square pictures `[b, 3, side, side]` at the extractor's own side and [`larger_sides`], as
+    /// pictures are read; differentiable.
+    ///
+    /// # Errors
+    /// Those of the extractor.
+    pub fn logits_at_sizes(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        let side = pictures.dims()[3];
+        let mut sum = self.logits(pictures.clone())?;
+        let mut readings = 1.0;
+        for larger in larger_sides(self.extractor.as_ref(), side) {
+            sum = sum + self.extractor.square_logits(resize(pictures.clone(), larger, larger))?;
+            readings += 1.0;
+        }
+        Ok(sum / readings)
+    }
+
     /// Logits of each picture, `bits` numbers a picture. Sizes may differ.
     ///
     /// # Errors
@@ -182,6 +199,20 @@ impl Engine {
     /// Those of [`Engine::read_logits`].
     pub(super) fn read_square_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
         self.read_with(pictures, |pictures| self.extractor.square_logits(pictures))
+    }
+
+    /// Logits of pictures that are made `side` pixels wide and high first: the extractor's own side, or another one where
+    /// it looks at squares one by one.
+    ///
+    /// # Errors
+    /// Those of [`Engine::read_logits`].
+    pub(super) fn read_logits_at(&self, side: usize, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
+        if side == self.extractor.side() {
+            return self.read_logits(pictures);
+        }
+        self.read_with(pictures, |pictures| {
+            self.extractor.square_logits(resize(pictures, side, side))
+        })
     }
 
     fn read_with(&self, pictures: &[Picture], read: impl Fn(Tensor<4>) -> Result<Tensor<2>>) -> Result<Vec<Vec<f32>>> {
@@ -202,7 +233,14 @@ impl Engine {
     /// # Errors
     /// A picture without pixels, or a failing device.
     pub fn resized(&self, picture: &Picture) -> Result<Picture> {
-        let side = self.extractor.side();
+        self.resized_to(self.extractor.side(), picture)
+    }
+
+    /// A picture made `side` pixels wide and high.
+    ///
+    /// # Errors
+    /// Those of [`Engine::resized`].
+    pub(super) fn resized_to(&self, side: usize, picture: &Picture) -> Result<Picture> {
         let pictures = resize(batch(&[picture], &self.compute.device)?, side, side);
         Ok(unbatch(pictures)?.swap_remove(0))
     }

@@ -9,6 +9,7 @@ mod picture_logits;
 mod pictures;
 mod pooled;
 mod restore;
+mod sizes;
 mod suspect_kind;
 mod view_size;
 mod views;

@@ -3,7 +3,7 @@ use super::parts::Part;
 use super::sample::Sample;
 use super::score::{self, Spread};
 use super::search::{self, Read};
-use super::{BATCH, Candidate, joint};
+use super::{BATCH, Candidate, joint, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::extract::photometric::{ToneChange, ground};
@@ -182,10 +182,7 @@ impl<'a> Search<'a> {
         small: &'b Picture,
     ) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, 'b> {
         let whole = self.whole;
-        let undone = move |change: &ToneChange| {
-            let undone = change.undone(small, whole)?;
-            Some(ground::whitened(&undone).unwrap_or(undone))
-        };
+        let undone = move |change: &ToneChange| undone_on_white(change, small, whole);
         reader(self.engine, undone, Engine::read_logits)
     }
 }

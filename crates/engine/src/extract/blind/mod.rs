@@ -5,6 +5,7 @@
 //! and one reading is paid for, however many were looked at. A mark makes the logits of the right reading large ([`score`]),
 //! and pictures of one scene carry the same message, so that the right readings of several agree ([`joint`]).
 mod candidates;
+mod finer;
 mod joint;
 mod parts;
 mod sample;
@@ -16,7 +17,7 @@ mod tests;
 use std::fmt;
 
 use super::Engine;
-use super::photometric::ToneChange;
+use super::photometric::{ToneChange, ground};
 use crate::error::Result;
 use crate::picture::Picture;
 use candidates::Search;
@@ -60,6 +61,13 @@ impl Candidate {
     }
 }
 
+/// A part of the picture `whole` before that was done to it, its ground made white where it shows one; `None` where it can't
+/// have been done.
+fn undone_on_white(change: &ToneChange, part: &Picture, whole: &Picture) -> Option<Picture> {
+    let undone = change.undone(part, whole)?;
+    Some(ground::whitened(&undone).unwrap_or(undone))
+}
+
 /// In words.
 impl fmt::Display for Candidate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -98,7 +106,7 @@ impl BlindReading {
         Ok(Self {
             bits: engine.bits,
             is_clear: search.is_certain(),
-            candidates: search.best(),
+            candidates: finer::read(engine, picture, &whole, search.best())?,
         })
     }
 

@@ -1,4 +1,6 @@
 //! Parts of a picture that may be all that shows the scene.
+use std::borrow::Cow;
+
 use guardsplat_codeword::Window;
 
 use crate::error::Result;
@@ -21,6 +23,15 @@ pub(super) enum Part {
 }
 
 impl Part {
+    /// What it is of a picture.
+    pub(super) fn of<'a>(&self, picture: &'a Picture) -> Cow<'a, Picture> {
+        match self {
+            Self::Whole => Cow::Borrowed(picture),
+            Self::Trimmed => without_borders(picture).map_or(Cow::Borrowed(picture), Cow::Owned),
+            Self::Window(window) => Cow::Owned(crop(*window, picture)),
+        }
+    }
+
     /// What a part must gain to be believed: there are many, and any shows some colours.
     pub(super) fn cost(&self) -> f64 {
         match self {

@@ -17,6 +17,7 @@ use std::borrow::Cow;
 
 use super::Engine;
 use super::photometric::ground;
+use super::sizes::read_at_sizes;
 use crate::error::Result;
 use crate::picture::Picture;
 
@@ -45,7 +46,7 @@ pub(super) fn read_restored(engine: &Engine, restored: &Picture) -> Result<Vec<f
         false => None,
     };
     let picture = on_white.as_ref().unwrap_or(restored);
-    Ok(engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0))
+    read_at_sizes(engine, picture)
 }
 
 /// Logits of a view that the engine rendered: as [`read_given`], but for noise. A render has none, and what is taken for it
@@ -58,9 +59,7 @@ pub fn read_rendered(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
         true => without_plain_areas(Cow::Borrowed(picture)),
         false => Cow::Borrowed(picture),
     };
-    Ok(engine
-        .read_logits(std::slice::from_ref(restored.as_ref()))?
-        .swap_remove(0))
+    read_at_sizes(engine, &restored)
 }
 
 /// The picture as it is read; as it is where there is nothing to take out, or the extractor does not read exact colours.

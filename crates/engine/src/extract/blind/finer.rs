@@ -1,0 +1,55 @@
+//! The best candidates read at several sizes, as a picture is that is read as it was given.
+use super::{Candidate, score, undone_on_white};
+use crate::error::Result;
+use crate::extract::Engine;
+use crate::extract::sizes::{larger_sides, mean, shorter_side};
+use crate::picture::Picture;
+
+/// Candidates for what was done to `picture`, which is `whole` at the side that the extractor takes in, with the mean of
+/// their logits at all sizes; best first, but the last of those given stays the last.
+///
+/// # Errors
+/// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
+pub(super) fn read(
+    engine: &Engine,
+    picture: &Picture,
+    whole: &Picture,
+    mut candidates: Vec<Candidate>,
+) -> Result<Vec<Candidate>> {
+    let mut readings: Vec<Vec<Vec<f32>>> = candidates.iter().map(|found| vec![found.logits.clone()]).collect();
+    for place in 0..candidates.len() {
+        let part = candidates[place].part;
+        if candidates[..place].iter().any(|before| before.part == part) {
+            continue;
+        }
+        let shown = part.of(picture);
+        for side in larger_sides(engine.extractor.as_ref(), shorter_side(&shown)) {
+            let shown = engine.resized_to(side, &shown)?;
+            let of_part = (place..candidates.len()).filter(|other| candidates[*other].part == part);
+            let places: Vec<usize> = of_part.collect();
+            let undone = engine.each(&places, |place| Ok(undone(&candidates[*place], &shown, whole)))?;
+            let possible: Vec<Picture> = undone.iter().flatten().cloned().collect();
+            let mut read = engine.read_logits_at(side, &possible)?.into_iter();
+            for (place, _) in places.iter().zip(&undone).filter(|(_, undone)| undone.is_some()) {
+                readings[*place].extend(read.next());
+            }
+        }
+    }
+    for (candidate, readings) in candidates.iter_mut().zip(readings) {
+        let cost = score::of_logits(&candidate.logits) - candidate.score;
+        candidate.logits = mean(&readings);
+        candidate.score = score::of_logits(&candidate.logits) - cost;
+    }
+    if let Some((_, best)) = candidates.split_last_mut() {
+        best.sort_by(|a, b| b.score.total_cmp(&a.score));
+    }
+    Ok(candidates)
+}
+
+/// What a candidate reads of a part that is shown at some size; `None` where it can't be read so.
+fn undone(candidate: &Candidate, shown: &Picture, whole: &Picture) -> Option<Picture> {
+    match candidate.white {
+        true => undone_on_white(&candidate.change, shown, whole),
+        false => Some(shown.clone()),
+    }
+}
