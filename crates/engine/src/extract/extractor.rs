@@ -36,8 +36,8 @@ pub trait Extractor: Send + Sync {
         None
     }
 
-    /// Logits of pictures that were put together from such squares. They may be smaller than [`Extractor::side`], and are
-    /// not resized.
+    /// Logits of pictures that were put together from such squares. They may be smaller or larger than [`Extractor::side`],
+    /// and are not resized.
     ///
     /// # Errors
     /// As [`Extractor::logits`].

@@ -19,6 +19,7 @@ pub(super) fn read(
     let mut readings: Vec<Vec<Vec<f32>>> = candidates.iter().map(|found| vec![found.logits.clone()]).collect();
     for place in 0..candidates.len() {
         let part = candidates[place].part;
+        // Each part is made small once, for all of its candidates.
         if candidates[..place].iter().any(|before| before.part == part) {
             continue;
         }
@@ -28,10 +29,11 @@ pub(super) fn read(
             let of_part = (place..candidates.len()).filter(|other| candidates[*other].part == part);
             let places: Vec<usize> = of_part.collect();
             let undone = engine.each(&places, |place| Ok(undone(&candidates[*place], &shown, whole)))?;
-            let possible: Vec<Picture> = undone.iter().flatten().cloned().collect();
-            let mut read = engine.read_logits_at(side, &possible)?.into_iter();
-            for (place, _) in places.iter().zip(&undone).filter(|(_, undone)| undone.is_some()) {
-                readings[*place].extend(read.next());
+            let possible = places.into_iter().zip(undone);
+            let (places, pictures): (Vec<usize>, Vec<Picture>) =
+                possible.filter_map(|(place, undone)| Some((place, undone?))).unzip();
+            for (place, logits) in places.into_iter().zip(engine.read_logits_at(side, &pictures)?) {
+                readings[place].push(logits);
             }
         }
     }
