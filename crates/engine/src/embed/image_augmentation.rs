@@ -63,7 +63,7 @@ impl ImageAugmentation {
     /// Draws outside of their limits, which checked settings rule out.
     pub fn logits(&self, engine: &Engine, pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Result<Tensor<2>> {
         if self.layer.robust_to.of_pictures().next().is_none() {
-            return engine.logits_at_sizes(pictures);
+            return read_each_at_one_size(engine, pictures, rng);
         }
         let draws = self.draws(pictures.dims()[0], rng);
         // One kind after the other, so that no picture is put into another order while it is large.
@@ -71,36 +71,63 @@ impl ImageAugmentation {
         for (position, draw) in draws.iter().enumerate() {
             alike.entry(draw.kind()).or_default().push(position);
         }
-        let device = pictures.device();
-        let some = |positions: &[usize]| {
-            let positions: Vec<i64> = positions.iter().map(|i| *i as i64).collect();
-            let count = positions.len();
-            let positions = Tensor::<1, Int>::from_data(TensorData::new(positions, [count]), &device);
-            pictures.clone().select(0, positions)
-        };
+        let some = |positions: &[usize]| chosen(&pictures, positions);
         let mut parts = Vec::new();
         for (kind, positions) in &alike {
             if kind.is_none() {
-                parts.push(engine.logits_at_sizes(some(positions))?);
+                parts.push(read_each_at_one_size(engine, some(positions), rng)?);
                 continue;
             }
-            let chosen: Vec<Draw> = positions.iter().map(|&i| draws[i].clone()).collect();
+            let done_to: Vec<Draw> = positions.iter().map(|&i| draws[i].clone()).collect();
             let large = resize(some(positions), self.side, self.side);
-            let done = self.layer.apply_with(&chosen, large.clone(), CORNERS);
+            let done = self.layer.apply_with(&done_to, large.clone(), CORNERS);
             let done = done.map_err(|e| Error::BadOption {
                 field: "distortions",
                 reason: e.to_string(),
             })?;
-            parts.push(engine.logits(with_ground(&large, done, &chosen))?);
+            parts.push(engine.logits(with_ground(&large, done, &done_to))?);
         }
-        // Back in order: where each picture's row is among the parts.
-        let mut order = vec![0_i64; draws.len()];
-        for (row, &position) in alike.values().flatten().enumerate() {
-            order[position] = row as i64;
-        }
-        let order = Tensor::<1, Int>::from_data(TensorData::new(order, [draws.len()]), &device);
-        Ok(Tensor::cat(parts, 0).select(0, order))
+        Ok(in_order(parts, alike.values().flatten()))
     }
+}
+
+/// Logits of pictures, each at one of the sizes at which pictures are read. All sizes have their turn in a step of as many
+/// views, and the next step gives them to other views: every view at every size costs four times as much.
+fn read_each_at_one_size(engine: &Engine, pictures: Tensor<4>, rng: &mut ChaCha8Rng) -> Result<Tensor<2>> {
+    let [count, _, _, pixels] = pictures.dims();
+    let sides = engine.sides(pixels);
+    if sides.len() == 1 {
+        return engine.logits(pictures);
+    }
+    let first = rng.random_range(0..sides.len());
+    let mut groups = vec![Vec::new(); sides.len()];
+    for position in 0..count {
+        groups[(first + position) % sides.len()].push(position);
+    }
+    let mut parts = Vec::new();
+    for (&side, positions) in sides.iter().zip(&groups).filter(|(_, positions)| !positions.is_empty()) {
+        parts.push(engine.logits_at(side, chosen(&pictures, positions))?);
+    }
+    Ok(in_order(parts, groups.iter().flatten()))
+}
+
+/// The pictures at these positions.
+fn chosen(pictures: &Tensor<4>, positions: &[usize]) -> Tensor<4> {
+    let indices: Vec<i64> = positions.iter().map(|i| *i as i64).collect();
+    let indices = Tensor::<1, Int>::from_data(TensorData::new(indices, [positions.len()]), &pictures.device());
+    pictures.clone().select(0, indices)
+}
+
+/// The rows of all parts, where their pictures were; `positions` says that of each row.
+fn in_order<'a>(parts: Vec<Tensor<2>>, positions: impl Iterator<Item = &'a usize>) -> Tensor<2> {
+    let rows = Tensor::cat(parts, 0);
+    let mut order = vec![0_i64; rows.dims()[0]];
+    for (row, &position) in positions.enumerate() {
+        order[position] = row as i64;
+    }
+    let order = TensorData::new(order, [rows.dims()[0]]);
+    let order = Tensor::<1, Int>::from_data(order, &rows.device());
+    rows.select(0, order)
 }
 
 /// Distorted pictures with the ground that they had, where it is black or white and has not moved: whoever reads a picture

@@ -169,20 +169,23 @@ impl Engine {
         self.extractor.logits(pictures)
     }
 
-    /// Mean logits `[b, bits]` of square pictures `[b, 3, side, side]` at the extractor's own side and [`larger_sides`], as
-    /// pictures are read; differentiable.
+    /// Sides at which a square picture of that many `pixels` a side is read: the extractor's own, and [`larger_sides`].
+    pub fn sides(&self, pixels: usize) -> Vec<usize> {
+        let extractor = self.extractor.as_ref();
+        std::iter::once(extractor.side())
+            .chain(larger_sides(extractor, pixels))
+            .collect()
+    }
+
+    /// [`Engine::logits`] of square pictures `[b, 3, n, n]` made `side` pixels wide and high, one of [`Engine::sides`].
     ///
     /// # Errors
     /// Those of the extractor.
-    pub fn logits_at_sizes(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
-        let side = pictures.dims()[3];
-        let mut sum = self.logits(pictures.clone())?;
-        let mut readings = 1.0;
-        for larger in larger_sides(self.extractor.as_ref(), side) {
-            sum = sum + self.extractor.square_logits(resize(pictures.clone(), larger, larger))?;
-            readings += 1.0;
+    pub fn logits_at(&self, side: usize, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        if side == self.extractor.side() {
+            return self.logits(pictures);
         }
-        Ok(sum / readings)
+        self.extractor.square_logits(resize(pictures, side, side))
     }
 
     /// Logits of each picture, `bits` numbers a picture. Sizes may differ.
@@ -207,12 +210,7 @@ impl Engine {
     /// # Errors
     /// Those of [`Engine::read_logits`].
     pub(super) fn read_logits_at(&self, side: usize, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        if side == self.extractor.side() {
-            return self.read_logits(pictures);
-        }
-        self.read_with(pictures, |pictures| {
-            self.extractor.square_logits(resize(pictures, side, side))
-        })
+        self.read_with(pictures, |pictures| self.logits_at(side, pictures))
     }
 
     fn read_with(&self, pictures: &[Picture], read: impl Fn(Tensor<4>) -> Result<Tensor<2>>) -> Result<Vec<Vec<f32>>> {

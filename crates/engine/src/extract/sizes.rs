@@ -26,14 +26,13 @@ pub(super) fn larger_sides(extractor: &dyn Extractor, pixels: usize) -> impl Ite
 /// # Errors
 /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub(super) fn read_at_sizes(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
-    let extractor = engine.extractor.as_ref();
-    let sides = std::iter::once(extractor.side()).chain(larger_sides(extractor, shorter_side(picture)));
     let read = |side| {
         Ok(engine
             .read_logits_at(side, std::slice::from_ref(picture))?
             .swap_remove(0))
     };
-    Ok(mean(&sides.map(read).collect::<Result<Vec<_>>>()?))
+    let sides = engine.sides(shorter_side(picture));
+    Ok(mean(&sides.into_iter().map(read).collect::<Result<Vec<_>>>()?))
 }
 
 /// Pixels along the shorter side of a picture.

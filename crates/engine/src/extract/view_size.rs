@@ -26,11 +26,15 @@ pub fn size_for_scene(engine: &Engine, geometry: &Geometry<'_>, sampler: &ViewSa
     sufficient_side(geometry, sampler, default_size(engine))
 }
 
-/// `side`, or twice that where views of `side` pixels are too coarse for the scene. The same on every device.
+/// `side`, or twice that where views of `side` pixels are too coarse for the scene, or each shows another part of it: then
+/// few views show a surface, and more pixels of it make up for that. The same on every device.
 ///
 /// # Errors
 /// A side or cameras out of range.
 pub(crate) fn sufficient_side(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u32) -> Result<u32> {
+    if sampler.shows_parts() {
+        return Ok(2 * side);
+    }
     let likeness = likeness_to_finer(geometry, sampler, side)?;
     Ok(if likeness < ALIKE_DB { 2 * side } else { side })
 }
@@ -80,7 +84,8 @@ fn halved(picture: &Picture) -> Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample::sample;
+    use crate::sample::{sample, sample_of};
+    use crate::view::{SceneKind, Viewpoints};
 
     #[test]
     fn four_pixels_become_one() {
@@ -104,5 +109,19 @@ mod tests {
             sufficient_side(&Geometry::new(&scene), &sampler, 40).unwrap()
         };
         assert_eq!([side(300), side(20_000)], [40, 80]);
+    }
+
+    #[test]
+    fn views_of_parts_of_a_scene_are_larger() {
+        let scene = sample_of(SceneKind::Room, 3000, 0, 3).unwrap().gaussians;
+        let side = |kind| {
+            let viewpoints = Viewpoints {
+                kind: Some(kind),
+                cameras: &[],
+            };
+            let sampler = ViewSampler::seen_from(&scene, 1, viewpoints).unwrap();
+            sufficient_side(&Geometry::new(&scene), &sampler, 40).unwrap()
+        };
+        assert_eq!([SceneKind::Object, SceneKind::Room].map(side), [40, 80]);
     }
 }
