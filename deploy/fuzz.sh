@@ -1,5 +1,8 @@
 #!/usr/bin/env bash
-# Fuzzes everything that reads what a stranger may have written: deploy/fuzz.sh [SECONDS a target (60)] [TARGET...]
+# Fuzzes everything that reads what a stranger may have written.
+#
+#     deploy/fuzz.sh [SECONDS a target (60)] [TARGET...]
+#     deploy/fuzz.sh --build                              only builds
 #
 # Own crates are built for it on stable Rust (deploy/fuzz-rustc.sh); cargo-fuzz and nightly are not needed. What is found
 # on the way is kept in target/fuzz/corpus and goes on from there the next time; tests/fuzz/corpus is where it starts.
@@ -11,6 +14,8 @@ if ! command -v c++ >/dev/null; then
     echo "fuzz: the fuzzer is built with a C++ compiler, and there is none; Debian's package is g++" >&2
     exit 1
 fi
+only_build=''
+[[ ${1:-} != --build ]] || { only_build=yes && shift; }
 seconds=${1:-60}
 shift $(($# > 0))
 targets=("$@")
@@ -30,6 +35,7 @@ done
 echo "building ${#targets[@]} programs"
 RUSTC_WORKSPACE_WRAPPER=$PWD/deploy/fuzz-rustc.sh \
     cargo build --release --workspace --locked --features guardsplat-fuzz/fuzzing "${programs[@]}"
+[[ -z $only_build ]] || exit 0
 
 mkdir -p "$fuzz/artifacts" "$fuzz/logs"
 

@@ -24,13 +24,11 @@ stage() {
 run_tests() {
     local output
     output=$(mktemp)
-    # The path is expanded now: the variable is gone by the time the script ends.
-    # shellcheck disable=SC2064
-    trap "rm -f '$output'" EXIT
     local status=0
     cargo test --release --workspace --locked "${kinds[@]}" --no-fail-fast 2>&1 | tee "$output" || status=$?
     awk '/^test result:/ { passed += $4; failed += $6; ignored += $8 }
-         END { printf "%d passed, %d failed, %d skipped\n", passed, failed, ignored; exit passed == 0 }' "$output"
+         END { printf "%d passed, %d failed, %d skipped\n", passed, failed, ignored; exit passed == 0 }' "$output" || status=1
+    rm -f "$output"
     return "$status"
 }
 
@@ -39,6 +37,22 @@ check_queries() {
     local tool=(--locked --manifest-path tools/promql/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}/promql")
     cargo test --quiet "${tool[@]}"
     cargo run --quiet "${tool[@]}" -- deploy/monitoring/{dashboard.json,alerts.yaml} deploy/kubernetes/scaling.yaml
+}
+
+# Tests wait for servers and timers half of the time. Meanwhile is built what later stages need, at low priority.
+start_building_beside() {
+    beside_log=$(mktemp)
+    # Cargo looks whether the tests are built before it runs them, and builds nothing else meanwhile: they come first.
+    # A group of its own, so that nothing of it is left behind.
+    setsid nice -n 15 bash -c 'sleep 30 && bash deploy/fuzz.sh --build && bash deploy/credentials.sh build' >"$beside_log" 2>&1 &
+    beside=$!
+    trap 'kill -- "-$beside" 2>/dev/null || true; rm -f "$beside_log"' EXIT
+}
+
+finish_building_beside() {
+    wait "$beside" && return
+    cat "$beside_log"
+    return 1
 }
 
 stage setup setup
@@ -57,7 +71,9 @@ stage queries check_queries
 stage dependencies bash deploy/check-dependencies.sh
 stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
+start_building_beside
 stage tests run_tests
+stage "build beside the tests" finish_building_beside
 TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
 stage page bash deploy/page.sh
 stage credentials bash deploy/credentials.sh

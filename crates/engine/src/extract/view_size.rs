@@ -84,8 +84,8 @@ fn halved(picture: &Picture) -> Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample::{sample, sample_of};
-    use crate::view::{SceneKind, Viewpoints};
+    use crate::sample::sample;
+    use crate::view::Viewpoints;
 
     #[test]
     fn four_pixels_become_one() {
@@ -113,15 +113,18 @@ mod tests {
 
     #[test]
     fn views_of_parts_of_a_scene_are_larger() {
-        let scene = sample_of(SceneKind::Room, 3000, 0, 3).unwrap().gaussians;
-        let side = |kind| {
-            let viewpoints = Viewpoints {
-                kind: Some(kind),
-                cameras: &[],
-            };
-            let sampler = ViewSampler::seen_from(&scene, 1, viewpoints).unwrap();
-            sufficient_side(&Geometry::new(&scene), &sampler, 40).unwrap()
-        };
-        assert_eq!([SceneKind::Object, SceneKind::Room].map(side), [40, 80]);
+        let scene = sample(300, 0, 3).unwrap().gaussians;
+        let around = ViewSampler::new(&scene, 1).unwrap();
+        let cameras = [0, 1, 2].map(|index| around.camera(Split::Training, index, 40));
+        let given = ViewSampler::seen_from(
+            &scene,
+            1,
+            Viewpoints {
+                kind: None,
+                cameras: &cameras,
+            },
+        );
+        let side = |sampler: &ViewSampler| sufficient_side(&Geometry::new(&scene), sampler, 40).unwrap();
+        assert_eq!([side(&around), side(&given.unwrap())], [40, 80]);
     }
 }
