@@ -216,6 +216,27 @@ mod tests {
     }
 
     #[test]
+    fn views_with_pixels_to_spare_are_read_at_one_size_each_in_turns() {
+        let engine = engine();
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let count = 5;
+        let values: Vec<f32> = (0..count * 3 * 240 * 240).map(|_| rng.random()).collect();
+        let pictures = Tensor::<4>::from_data(TensorData::new(values, [count, 3, 240, 240]), &engine.compute.device);
+        let sides = engine.sides(240);
+        assert_eq!(sides, [160, 176, 200, 224]);
+        let first = rng.clone().random_range(0..sides.len());
+        let read = read_each_at_one_size(&engine, pictures.clone(), &mut rng).unwrap();
+        let read = read.try_into_vec_as::<f32>().unwrap();
+        for (position, row) in read.chunks_exact(8).enumerate() {
+            let side = sides[(first + position) % sides.len()];
+            let alone = engine.logits_at(side, chosen(&pictures, &[position])).unwrap();
+            let alone = alone.try_into_vec_as::<f32>().unwrap();
+            let apart = row.iter().zip(&alone).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(apart < 1e-4, "view {position} at {side} px: {row:?} {alone:?}");
+        }
+    }
+
+    #[test]
     fn no_more_views_are_distorted_than_the_settings_say_and_all_have_their_turn() {
         let settings = Settings {
             robust_to: "jpeg,noise".parse().unwrap(),
