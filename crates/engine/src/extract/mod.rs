@@ -39,8 +39,8 @@ use crate::view::{Split, ViewSampler};
 pub const DEFAULT_VIEWS: usize = 20;
 
 /// Side of views in pixels where nothing else is asked for: what the extractor takes in, between 128 and 512. The presets
-/// train at the shipped CLIP's size, and a mark is read best at the size it was trained at. Scenes of fine splats take
-/// twice that ([`size_for_scene`]).
+/// train at the shipped CLIP's size, and a mark is read best at the size it was trained at. Scenes of fine splats, and
+/// views of which each shows another part, take twice that ([`size_for_scene`]).
 pub fn default_size(engine: &Engine) -> u32 {
     engine.extractor.side().clamp(128, 512) as u32
 }
