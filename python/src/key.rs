@@ -42,7 +42,7 @@ impl Key {
     /// Makes a key for messages of so many bits, 1 to 150.
     ///
     /// Without a seed it is random. With one it can be made again, and is no more secret than the seed.
-    /// `clip` names a CLIP, shipped or added by `guardsplat-worker models add`, instead of the shipped one for messages of that length.
+    /// `clip` names a CLIP, shipped or added by `guardsplat-worker models add`, instead of the newest shipped one.
     #[staticmethod]
     #[pyo3(signature = (bits=32, seed=None, *, clip=None, device="auto", progress=None))]
     fn create(
@@ -55,6 +55,7 @@ impl Key {
     ) -> PyResult<Self> {
         let options = KeyOptions {
             bits,
+            coded: true,
             bits_per_token: None,
             seed,
             robust_to: RobustTo::none(),
@@ -62,11 +63,7 @@ impl Key {
         };
         let device = device.parse().map_err(|error| exception(py, &error))?;
         let made = run(py, progress, |context| {
-            let compute = load::device(
-                device,
-                clip.unwrap_or_else(|| ShippedClip::for_bits(bits)),
-                load::Work::Reading,
-            )?;
+            let compute = load::device(device, clip.unwrap_or(ShippedClip::NEWEST), load::Work::Reading)?;
             let overrides = ProjectionOverrides::default();
             create(&options, overrides, clip, &compute, &context.stop, |progress| {
                 tell(context, progress);

@@ -88,7 +88,7 @@ pub fn verify(
             context.at("reading", done, total);
         })?;
         json(&VerifyReport {
-            findings: VerificationReport::of(&compared)?,
+            findings: VerificationReport::of(&engine.message_code, &compared)?,
             seconds: start.elapsed().as_secs_f64(),
             device: &engine.compute.name,
             clip: &inner.clip.name,

@@ -331,7 +331,7 @@ fn changed(picture: &image::RgbImage) -> image::RgbImage {
 }
 
 #[test]
-fn short_messages_are_read_in_changed_pictures_though_they_never_match() {
+fn short_messages_match_in_changed_pictures_also_where_nobody_says_which() {
     let environment = TestEnvironment::new();
     environment.exits("sample in.ply --gaussians 5000 --sh-degree 1 --seed 4", 0);
     environment.exits("key create --bits 16 --seed 5 -o k.key --device cpu", 0);
@@ -341,18 +341,29 @@ fn short_messages_are_read_in_changed_pictures_though_they_never_match() {
     );
     environment.exits("render out.ply views --views 3 --size 400 --device cpu", 0);
     let verify = "verify views --key k.key --message c0ff --device cpu --json";
-    let as_given = environment.json(verify, 3);
-    assert_eq!(as_given["clip"], "guardsplat-short");
-    assert_eq!(
-        (&as_given["matched_bits"], &as_given["framing"]),
-        (&16.into(), &Value::Null)
-    );
+    let as_given = environment.json(verify, 0);
+    assert_eq!(as_given["clip"], "guardsplat-2");
+    // The message is in a word of 64 bits.
+    assert_eq!((&as_given["bits"], &as_given["framing"]), (&64.into(), &Value::Null));
     for view in 0..3 {
         let name = format!("views/view_00{view}.png");
         let picture = image::load_from_memory(&environment.read(&name)).unwrap().to_rgb8();
         changed(&picture).save(environment.path(&name)).unwrap();
     }
-    let read = environment.json(verify, 3);
-    assert_eq!(read["verdict"], "inconclusive");
-    assert!(read["matched_bits"].as_u64().unwrap() >= 15, "{read}");
+    let read = environment.json(verify, 0);
+    assert_eq!((&read["verdict"], &read["message"]), (&"match".into(), &"c0ff".into()));
+    assert_eq!(read["bit_accuracy"], 1.0, "{read}");
+    // Whoever does not know the message reads it, and pays for all that it could have been.
+    let blind = environment.json("verify views --key k.key --device cpu --json", 0);
+    assert_eq!(
+        (&blind["verdict"], &blind["message"]),
+        (&"match".into(), &"c0ff".into())
+    );
+    assert!(blind["p_value"].as_f64() > read["p_value"].as_f64(), "{blind}");
+    environment.json("verify views --key k.key --message c0fe --device cpu --json", 2);
+    environment.json("verify in.ply --key k.key --device cpu --json", 2);
+    // Bit by bit sixteen are too few for a match.
+    environment.exits("key create --bits 16 --seed 5 --uncoded -o bits.key --device cpu", 0);
+    let short = environment.json("verify views --key bits.key --message c0ff --device cpu --json", 3);
+    assert_eq!(short["bits"], 16);
 }

@@ -29,7 +29,7 @@ pub enum Preset {
     Draft,
     /// What is recommended
     Standard,
-    /// For messages of 16 bits: a third more steps, and a mark that shows a little more
+    /// For messages of 16 bits: a third more steps, and a mark that shows as much as it may
     Robust,
     /// Twice the work, for more bits that are right
     Thorough,

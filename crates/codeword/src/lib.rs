@@ -1,9 +1,10 @@
 //! What a mark says, how it is protected from errors, and the exact test that a copyright claim rests on.
 //!
-//! A [`Payload`] is packed into a codeword of a [`Code`]; the codeword is whitened by a secret pad ([`Whitening`]) and
-//! embedded. What is read back are logits, summed per bit over views, under each [`Hypothesis`] about what was done to a
-//! picture. A [`Claim`] compares the words that they decide for with whitened words, and asks the [`AcceptanceRule`] whether
-//! chance explains so many matches of bits read so clearly: error correction reads the payload and never decides. [`Index`] finds the nearest of many registered words.
+//! A [`MessageCode`] puts the short messages of a key into longer words. Of an asset a [`Payload`] is packed into a codeword
+//! of a [`Code`], and whitened by a secret pad ([`Whitening`]). What is read back are logits, summed per bit over views, under
+//! each [`Hypothesis`] about what was done to a picture. A [`Claim`] compares the words that they decide for with whitened
+//! words, and asks the [`AcceptanceRule`] whether chance explains so many matches of bits read so clearly: error correction
+//! reads the payload and never decides. [`Index`] finds the nearest of many registered words.
 //!
 //! Nothing here needs tensors, threads or files, so that server, worker and client all use the same code.
 mod acceptance;
@@ -15,6 +16,7 @@ mod error;
 mod hypothesis;
 mod limits;
 mod message;
+mod message_code;
 mod reading;
 mod search;
 mod shares;
@@ -32,6 +34,7 @@ pub use error::{Error, Result};
 pub use hypothesis::{Hypothesis, PhotometricCorrection, Tone, WINDOW_STEPS, Window, tint_without_ground};
 pub use limits::{MAX_BITS, VERSION};
 pub use message::{Message, MessageLength};
+pub use message_code::{CODED_MESSAGE_BITS, MessageCode};
 pub use reading::Reading;
 pub use search::{Hit, Index};
 pub use shares::shares;

@@ -113,6 +113,14 @@ impl Message {
         message
     }
 
+    /// The lowest bits of an integer, as many as the length, of which there are at most 64.
+    pub(crate) fn from_integer(value: u64, length: MessageLength) -> Self {
+        let mut message = Self::zeros(length);
+        let unused = 64_u32.saturating_sub(length.bits());
+        message.limbs[0] = value << unused >> unused;
+        message
+    }
+
     /// The integer of a message of 64 bits; `None` for other lengths.
     pub fn to_u64(&self) -> Option<u64> {
         (self.length == MessageLength::CODED).then_some(self.limbs[0])

@@ -42,6 +42,7 @@ fn new_key(compute: &Compute, seed: u64) -> Result<Key> {
 fn new_key_until(compute: &Compute, seed: u64, stop: &Stop, progress: impl FnMut(KeyProgress)) -> Result<Key> {
     let options = KeyOptions {
         bits: BITS,
+        coded: false,
         bits_per_token: None,
         seed: Some(seed),
         robust_to: RobustTo::none(),
@@ -206,7 +207,9 @@ fn the_same_seed_gives_the_same_bytes_and_a_file_that_reads_as_verified() {
     .unwrap();
     let found = &outcome.verification;
     assert_eq!(
-        reading.compare(&message(), &engine.acceptance_rule(1)).unwrap(),
+        reading
+            .compare(&engine.message_code, &message(), &engine.acceptance_rule(1))
+            .unwrap(),
         found.comparison
     );
     let sampler = ViewSampler::new(&scene, 3).unwrap();

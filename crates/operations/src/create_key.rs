@@ -1,4 +1,5 @@
 //! Makes a key for the CLIP of a name.
+use guardsplat_codeword::{MessageCode, MessageLength};
 use guardsplat_engine::Result;
 use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::Compute;
@@ -22,7 +23,8 @@ pub struct ProjectionOverrides {
     pub keep: Option<usize>,
 }
 
-/// Makes a key for the CLIP called `clip`, without a name for the shipped one that is for messages of that length.
+/// Makes a key for the CLIP called `clip`, without a name for the newest shipped one. Messages are
+/// coded where that is asked for and the shipped ones, or such as them, read them.
 pub fn create(
     options: &KeyOptions,
     overrides: ProjectionOverrides,
@@ -31,7 +33,7 @@ pub fn create(
     stop: &Stop,
     progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
-    let name = clip.unwrap_or_else(|| ShippedClip::for_bits(options.bits));
+    let name = clip.unwrap_or(ShippedClip::NEWEST);
     let (clip, identity) = load::clip(name, compute, Parts::Both)?;
     let ranked = clip.config.is_ranked();
     let kind = overrides.decoder.unwrap_or(match ranked {
@@ -40,6 +42,9 @@ pub fn create(
     });
     let mut options = options.clone();
     options.training.kind = kind;
+    // Of features that are not ranked it was never tried, and fewer dimensions than a word has bits would not tell them apart.
+    let room = clip.dim() >= MessageLength::CODED.bits() as usize;
+    options.coded &= ranked && room && kind == DecoderKind::Linear && MessageCode::is_for(options.bits);
     // A perceptron needs more dimensions than bits to tell texts apart; a linear decoder reads the strongest ones best.
     let ranked = ranked && kind == DecoderKind::Linear;
     let projection = FitOptions {
@@ -48,7 +53,7 @@ pub fn create(
             .unwrap_or(FitOptions::default().remove.min(clip.dim() / 8)),
         keep: overrides
             .keep
-            .or(ranked.then(|| ranked_dimensions(options.bits, clip.dim()))),
+            .or(ranked.then(|| ranked_dimensions(options.word_bits(), clip.dim()))),
         ranked,
     };
     stop.check()?;
@@ -56,7 +61,7 @@ pub fn create(
     create_key(&options, projection, &clip, identity, compute, pictures, stop, progress)
 }
 
-/// Dimensions of ranked features that a message of so many bits is read from: every further one is weaker than those
+/// Dimensions of ranked features that a word of so many bits is read from: every further one is weaker than those
 /// before it.
 fn ranked_dimensions(bits: usize, width: usize) -> usize {
     bits.max(8).min(width)

@@ -96,13 +96,14 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
         None => {
             let options = KeyOptions {
                 bits: wish.bits,
+                coded: true,
                 bits_per_token: None,
                 seed: Some(SEED),
                 robust_to: RobustTo::none(),
                 training: TrainingOptions::default(),
             };
             let none = create_key::ProjectionOverrides::default();
-            let compute = load::device(wish.device, ShippedClip::for_bits(wish.bits), load::Work::Reading)?;
+            let compute = load::device(wish.device, ShippedClip::NEWEST, load::Work::Reading)?;
             let key = create_key::create(&options, none, None, &compute, &wish.stop, |_| {})?;
             (PathBuf::from("a key made for the forecast"), Arc::new(key))
         }

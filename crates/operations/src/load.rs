@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn auto_reads_shipped_clips_on_the_cpu_and_gives_a_card_to_all_else() {
-        let shipped = ShippedClip::for_bits(64);
+        let shipped = ShippedClip::NEWEST;
         let auto = |clip, work| device(DeviceChoice::Auto, clip, work).unwrap().name;
         assert_eq!(auto(shipped, Work::Reading), "cpu");
         let any = open(DeviceChoice::Auto).unwrap().name;

@@ -55,7 +55,7 @@ fn nearest(engine: &Engine, reading: &PooledLogits, messages: &[Message], tries:
     let rule = engine.acceptance_rule(tries.saturating_mul(messages.len()));
     let mut best: Option<Nearest> = None;
     for (index, message) in messages.iter().enumerate() {
-        let comparison = reading.compare(message, &rule)?;
+        let comparison = reading.compare(&engine.message_code, message, &rule)?;
         let nearer = |best: &Nearest| comparison.decision.rank_sum > best.comparison.decision.rank_sum;
         if best.as_ref().is_none_or(nearer) {
             best = Some(Nearest { index, comparison });

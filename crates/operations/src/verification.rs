@@ -166,7 +166,7 @@ pub fn read_hypotheses(
 pub struct Compared {
     /// What was read under the hypothesis that agrees best.
     pub reading: PooledLogits,
-    /// How it compares, if there is a message.
+    /// How it compares, if there is a message, or a coded one is read.
     pub comparison: Option<Comparison>,
     /// What was undone for it.
     pub hypothesis: Hypothesis,
@@ -181,7 +181,7 @@ pub struct Compared {
 /// Reads `suspect` and compares it with `message`. Pictures that do not match as they are given are read under every other
 /// hypothesis besides, and so are those of a message that is too short to match, unless all of it is right. Each hypothesis
 /// pays by its share of the rate ([`shares`]): half is for pictures as they are, so that those who change nothing hardly pay
-/// for those who do.
+/// for those who do. Without a message a coded one is compared with what it reads itself, and pays for all messages.
 pub fn read_and_compare(
     engine: &Engine,
     suspect: &Suspect,
@@ -200,14 +200,24 @@ pub fn read_and_compare(
         estimates: Vec::new(),
         ignored,
     };
-    let Some(message) = message else {
-        return Ok(best);
+    let compare = |reading: &PooledLogits, tries: u64| {
+        let code = &engine.message_code;
+        let (message, tries) = match (message, code.messages()) {
+            (Some(message), _) => (*message, tries),
+            (None, Some(messages)) => (code.read(&reading.summed)?, tries.saturating_mul(messages)),
+            (None, None) => return Ok(None),
+        };
+        reading
+            .compare(code, &message, &engine.acceptance_rule(tries as usize))
+            .map(Some)
     };
     // Without pictures there is nothing to guess. With them the first reading has what it would have among all.
     let given = if suspect.pictures.is_empty() { 1 } else { 2 };
-    let as_given = best.reading.compare(message, &engine.acceptance_rule(given))?;
+    let Some(as_given) = compare(&best.reading, given)? else {
+        return Ok(best);
+    };
     // Of a message that is too short for a match the best reading is told all the same.
-    let all = as_given.decision.matched_bits as usize == message.len();
+    let all = as_given.decision.matched_bits == as_given.decision.bits;
     let decided = given == 1 || all || as_given.decision.verdict == Verdict::Match;
     let mut p_value = as_given.decision.p_value;
     best.comparison = Some(as_given);
@@ -222,8 +232,7 @@ pub fn read_and_compare(
     (best.hypotheses, best.estimates) = (read.len(), estimates);
     let tries = shares(&read.iter().map(|(hypothesis, _)| *hypothesis).collect::<Vec<_>>());
     for ((hypothesis, reading), tries) in read.into_iter().zip(tries).skip(1) {
-        let comparison = reading.compare(message, &engine.acceptance_rule(tries as usize))?;
-        if comparison.decision.p_value < p_value {
+        if let Some(comparison) = compare(&reading, tries)?.filter(|found| found.decision.p_value < p_value) {
             p_value = comparison.decision.p_value;
             (best.reading, best.hypothesis, best.comparison) = (reading, hypothesis, Some(comparison));
         }

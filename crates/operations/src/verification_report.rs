@@ -1,5 +1,5 @@
 //! What users are told of a verification: the fields of its JSON.
-use guardsplat_codeword::{Hypothesis, Verdict};
+use guardsplat_codeword::{Hypothesis, MessageCode, Verdict};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{Comparison, PooledLogits};
 use guardsplat_engine::scene::Ignored;
@@ -25,7 +25,7 @@ pub struct VerificationReport {
     pub rank_sum: Option<u32>,
     /// The rank sum that a match needs.
     pub needed_rank_sum: Option<u32>,
-    /// Bits compared.
+    /// Bits compared: of the word that a message is put into.
     pub bits: usize,
     /// Views or pictures read.
     pub views: usize,
@@ -56,8 +56,8 @@ pub struct VerificationReport {
 
 impl VerificationReport {
     /// What a comparison says.
-    pub fn of(compared: &Compared) -> Result<Self> {
-        let found = Self::new(&compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
+    pub fn of(code: &MessageCode, compared: &Compared) -> Result<Self> {
+        let found = Self::new(code, &compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
         let as_given = compared.hypothesis == Hypothesis::default();
         Ok(Self {
             hypotheses: compared.hypotheses,
@@ -69,7 +69,12 @@ impl VerificationReport {
 
     /// What a reading and its comparison with a claimed message, if there was one, say; and how many rows of the scene
     /// were ignored for it.
-    pub fn new(reading: &PooledLogits, comparison: Option<&Comparison>, ignored: &[Ignored]) -> Result<Self> {
+    pub fn new(
+        code: &MessageCode,
+        reading: &PooledLogits,
+        comparison: Option<&Comparison>,
+        ignored: &[Ignored],
+    ) -> Result<Self> {
         let decision = comparison.map(|c| &c.decision);
         Ok(Self {
             verdict: decision.map_or(Verdict::Inconclusive, |d| d.verdict),
@@ -80,7 +85,7 @@ impl VerificationReport {
             needed_rank_sum: decision.and_then(|d| d.needed_rank_sum),
             bits: reading.summed.len(),
             views: reading.views.len(),
-            message: reading.message().to_string(),
+            message: code.read(&reading.summed)?.to_string(),
             bit_accuracy: comparison.map(|c| c.bit_accuracy),
             bit_accuracy_worst_view: comparison.map(|c| c.bit_accuracy_worst_view),
             mean_abs_logit: reading.mean_abs_logit(),

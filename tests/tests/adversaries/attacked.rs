@@ -89,7 +89,11 @@ impl Attacked {
             read_scene(&self.engine, scene, &sampler, DEFAULT_VIEWS, size, WHITE, |_, _| Ok(())).unwrap()
         };
         let decision = read
-            .compare(&self.message, &self.engine.acceptance_rule(1))
+            .compare(
+                &self.engine.message_code,
+                &self.message,
+                &self.engine.acceptance_rule(1),
+            )
             .unwrap()
             .decision;
         Left {

@@ -26,8 +26,8 @@ fn cancel_ends_a_running_embedding_soon() {
     assert_eq!(watched["job"]["state"], "cancelled", "{watched}");
     // Nothing but the scene and the key is kept, and the worker goes on.
     service.keeps(2);
-    let read = service.json("verify in.ply --key site --views 1", 3);
-    assert_eq!(read["verdict"], "inconclusive");
+    let read = service.json("verify in.ply --key site --views 1", 2);
+    assert_eq!(read["verdict"], "no_match");
 }
 
 #[test]

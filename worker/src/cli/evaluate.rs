@@ -271,7 +271,7 @@ fn engine(
     let start = Instant::now();
     let stop = Stop::default();
     let name = match arguments.extractor {
-        Extractor::Clip => clip.unwrap_or_else(|| ShippedClip::for_bits(bits)),
+        Extractor::Clip => clip.unwrap_or(ShippedClip::NEWEST),
         Extractor::Hidden => HIDDEN,
     };
     let hidden = HiddenKeyOptions {
@@ -297,6 +297,7 @@ fn engine(
                 Extractor::Clip => {
                     let options = KeyOptions {
                         bits,
+                        coded: true,
                         bits_per_token: None,
                         seed: Some(seed),
                         robust_to: RobustTo::none(),

@@ -28,6 +28,9 @@ pub struct Create {
     /// Bits of its messages, 1 to 150
     #[arg(long)]
     bits: usize,
+    /// Embeds messages of up to 16 bits as they are, instead of in words of 64 bits of which a fifth may be read wrong
+    #[arg(long, hide_short_help = true)]
+    uncoded: bool,
     /// Bits that one CLIP token stands for, 1 to 4; unless given the fewest that make room
     #[arg(long, hide_short_help = true)]
     bits_per_token: Option<usize>,
@@ -44,7 +47,7 @@ pub struct Create {
     /// Steps of the convolutional decoder's training
     #[arg(long, hide_short_help = true)]
     steps: Option<usize>,
-    /// A CLIP by its name, shipped or added with `models add`, instead of the shipped one for messages of that length
+    /// A CLIP by its name, shipped or added with `models add`, instead of the newest shipped one
     #[arg(long)]
     clip: Option<String>,
     /// Where to compute: auto, wgpu or cpu
@@ -80,6 +83,7 @@ pub struct Create {
 struct Report<'a> {
     key: String,
     bits: usize,
+    word_bits: usize,
     bit_accuracy_unseen: Option<f64>,
     bit_accuracy_unseen_noisy: Option<f64>,
     clip: &'a str,
@@ -94,7 +98,7 @@ pub fn run(command: Command) -> Result<Exit> {
     let compute = match arguments.extractor {
         Extractor::Clip => load::device(
             arguments.device,
-            clip.unwrap_or_else(|| ShippedClip::for_bits(arguments.bits)),
+            clip.unwrap_or(ShippedClip::NEWEST),
             load::Work::Reading,
         )?,
         Extractor::Hidden => open(arguments.device)?,
@@ -123,6 +127,7 @@ fn for_clip(arguments: &Create, compute: &Compute) -> Result<Key> {
     };
     let options = KeyOptions {
         bits: arguments.bits,
+        coded: !arguments.uncoded,
         bits_per_token: arguments.bits_per_token,
         seed: arguments.seed,
         robust_to: arguments.robust_to,
@@ -162,6 +167,7 @@ fn hidden(arguments: &Create, compute: &Compute) -> Result<Key> {
     let of_clip = [
         ("clip", arguments.clip.is_some()),
         ("decoder", arguments.decoder.is_some()),
+        ("uncoded", arguments.uncoded),
         ("bits-per-token", arguments.bits_per_token.is_some()),
         ("remove", arguments.remove.is_some()),
         ("keep", arguments.keep.is_some()),
@@ -188,6 +194,7 @@ fn tell(arguments: &Create, compute: &Compute, key: &Key, start: Instant) -> Res
     let report = Report {
         key: key.id(),
         bits: key.bits(),
+        word_bits: key.word_bits(),
         bit_accuracy_unseen: key.accuracy_unseen,
         bit_accuracy_unseen_noisy: key.accuracy_unseen_noisy,
         clip: &key.clip.name,

@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })?;
     drop(display);
     let report = VerifyReport {
-        findings: VerificationReport::of(&compared)?,
+        findings: VerificationReport::of(&engine.message_code, &compared)?,
         seconds: start.elapsed().as_secs_f64(),
         device: &engine.compute.name,
         clip: &key.clip.name,

@@ -2,8 +2,9 @@
 //!
 //! A claim takes the reading of which chance is the least likely, each paid for by its share. The share of right bits under
 //! that reading would be too good: it was searched for. So each bit is read as a claim about all *other* bits would; no bit
-//! has a say in how it is read.
-use guardsplat_codeword::{Hypothesis, Message, Reading, shares, signed_rank};
+//! has a say in how it is read. A coded message can be read without knowing it: the reading is taken that is least likely by
+//! chance to be as near to a codeword as it is.
+use guardsplat_codeword::{Hypothesis, Message, MessageCode, Reading, shares, signed_rank};
 
 use crate::error::Result;
 
@@ -25,6 +26,24 @@ pub(super) fn cross_chosen(read: &[(Hypothesis, Vec<f32>)], message: &Message) -
         Ok(read[(0..read.len()).fold(0, better)].1[bit])
     });
     each.collect()
+}
+
+/// Logits of the reading whose own message is the least likely by chance, each paid for by its share; the first of equal ones.
+///
+/// # Errors
+/// Logits that are not of the code's words.
+pub(super) fn blindly_chosen(code: &MessageCode, read: Vec<(Hypothesis, Vec<f32>)>) -> Result<Vec<f32>> {
+    let hypotheses: Vec<Hypothesis> = read.iter().map(|(hypothesis, _)| *hypothesis).collect();
+    let mut best: Option<(f64, Vec<f32>)> = None;
+    for ((_, logits), tries) in read.into_iter().zip(shares(&hypotheses)) {
+        let word = code.word(&code.read(&logits)?)?;
+        let rank_sum = Reading::from_logits(&logits)?.rank_sum(&word)?;
+        let p_value = signed_rank::tail(word.length().bits(), rank_sum)? * tries as f64;
+        if best.as_ref().is_none_or(|(least, _)| p_value < *least) {
+            best = Some((p_value, logits));
+        }
+    }
+    Ok(best.map_or_else(Vec::new, |(_, logits)| logits))
 }
 
 /// The p-value of a claim about all bits but one; 1 where there are no others.
@@ -99,6 +118,32 @@ mod tests {
         };
         assert_eq!(many(0), 13);
         assert_eq!(matches(&chosen(vec![logits(3), logits(8), logits(0)])), 16);
+    }
+
+    #[test]
+    fn of_coded_messages_the_reading_is_taken_that_is_nearest_to_a_codeword() {
+        let code = MessageCode::coded(16, 3).unwrap();
+        let word = code.word(&message()).unwrap();
+        let at = |wrong: usize| -> Vec<f32> {
+            let signed = word.targets().map(|t| 2.0 * t - 1.0).enumerate();
+            // The wrong ones lie all over the word.
+            signed.map(|(i, v)| if i * 37 % 64 < wrong { -v } else { v }).collect()
+        };
+        // What says nothing is as near to some codeword as chance has it.
+        let nothing = |seed: u64| -> Vec<f32> {
+            use rand::{RngExt, SeedableRng};
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            (0..64).map(|_| rng.random_range(-1.0..1.0)).collect()
+        };
+        let mut readings: Vec<_> = (0..100).map(nothing).collect();
+        readings.insert(70, at(6));
+        let found = blindly_chosen(&code, under_guesses(readings)).unwrap();
+        assert_eq!(found, at(6));
+        assert_eq!(code.read(&found).unwrap(), message());
+        // Of equal ones as given is paid for least.
+        let twice: Vec<f32> = at(3).iter().map(|logit| 2.0 * logit).collect();
+        let found = blindly_chosen(&code, under_guesses(vec![at(3), twice, nothing(1)])).unwrap();
+        assert_eq!(found, at(3));
     }
 
     #[test]

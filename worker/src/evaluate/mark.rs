@@ -77,10 +77,11 @@ impl Marking<'_> {
         make_folder(&self.folder.join(&picture))?;
         let shown = &pairs[..pairs.len().min(SHOWN)];
         write_picture(&self.folder.join(&picture), &contact_sheet(shown)?)?;
-        let before = unmarked
-            .read(self.engine, self.message)?
-            .each()?
-            .compare(self.message, &self.engine.acceptance_rule(1))?;
+        let before = unmarked.read(self.engine, self.message)?.each()?.compare(
+            &self.engine.message_code,
+            self.message,
+            &self.engine.acceptance_rule(1),
+        )?;
         Ok((
             Mark {
                 experiment: experiment.into(),

@@ -1,7 +1,7 @@
 //! Views of a scene as 8-bit pictures, and what is read of them after something was done to them.
 use std::collections::BTreeMap;
 
-use guardsplat_codeword::{Message, Reading};
+use guardsplat_codeword::Message;
 use guardsplat_distortion::Vae;
 use guardsplat_evaluation::attack::Attack;
 use guardsplat_evaluation::report::names;
@@ -137,18 +137,19 @@ impl Views {
         attack: &str,
         before: &Views,
     ) -> Result<ReadingRecord> {
+        let code = &engine.message_code;
         let reading = self.read(engine, message)?;
         let right = reading
             .each()?
             .views
             .iter()
-            .map(|logits| Ok(Reading::from_logits(logits)?.matches(message)? as u16))
+            .map(|logits| Ok((message.length().bits() - code.wrong_bits(logits, message)?) as u16))
             .collect::<Result<Vec<u16>>>()?;
         let mut from = BTreeMap::new();
         for views in MESSAGE_VIEWS.into_iter().filter(|n| *n as usize <= right.len()) {
             from.insert(
                 views,
-                reading.of_first(views as usize)?.reading() == &Reading::of(*message),
+                code.wrong_bits(&reading.of_first(views as usize)?.summed, message)? == 0,
             );
         }
         Ok(ReadingRecord {

@@ -3,7 +3,7 @@
 use guardsplat_codeword::Message;
 use guardsplat_engine::extract::{Engine, PictureLogits, PooledLogits, hypotheses};
 
-use super::guessed::cross_chosen;
+use super::guessed::{blindly_chosen, cross_chosen};
 use crate::error::Result;
 
 /// What was read of some views.
@@ -40,9 +40,13 @@ impl ViewReadings<'_> {
     }
 }
 
-/// Logits of pictures together, each bit under the hypothesis that a claim about the others would take.
+/// Logits of pictures together: of a coded message under the hypothesis that a claim about whatever it reads would take, else
+/// each bit under that of a claim about the others.
 fn together(engine: &Engine, pictures: &[PictureLogits], message: &Message) -> Result<Vec<f32>> {
     let read = hypotheses(engine, pictures)?.into_iter();
     let read: Vec<_> = read.map(|(hypothesis, logits)| (hypothesis, logits.summed)).collect();
-    cross_chosen(&read, message)
+    match engine.message_code.messages() {
+        Some(_) => blindly_chosen(&engine.message_code, read),
+        None => cross_chosen(&read, message),
+    }
 }

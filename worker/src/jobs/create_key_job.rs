@@ -26,6 +26,7 @@ struct Made {
 pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outcome> {
     let options = KeyOptions {
         bits: spec.bits as usize,
+        coded: true,
         bits_per_token: None,
         seed: spec.seed,
         robust_to: RobustTo::none(),
@@ -33,7 +34,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &KeySpec) -> Result<Outc
     };
     let work = attempt.compute(move |cache, stop, reporter| {
         let start = Instant::now();
-        let compute = cache.compute(ShippedClip::for_bits(options.bits), load::Work::Reading)?;
+        let compute = cache.compute(ShippedClip::NEWEST, load::Work::Reading)?;
         let key = create_key::create(
             &options,
             ProjectionOverrides::default(),

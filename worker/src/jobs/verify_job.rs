@@ -66,10 +66,13 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
             // As given comes first.
             let reading = read.readings.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-            (VerificationReport::new(reading, None, &read.ignored)?, read.readings)
+            (
+                VerificationReport::new(&engine.message_code, reading, None, &read.ignored)?,
+                read.readings,
+            )
         } else {
             let compared = read_and_compare(engine, &suspect, &views, message.as_ref(), progress)?;
-            (VerificationReport::of(&compared)?, Vec::new())
+            (VerificationReport::of(&engine.message_code, &compared)?, Vec::new())
         };
         Ok(Verified {
             findings,

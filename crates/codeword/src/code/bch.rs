@@ -5,7 +5,7 @@
 use super::field::{ORDER, div, generator, mul, power};
 
 /// Most errors that one of the codes corrects.
-const MOST: usize = 6;
+const MOST: usize = 11;
 /// Coefficients of error locators while they are found: their degree stays below 2 t.
 const TERMS: usize = 2 * MOST + 1;
 
@@ -26,6 +26,8 @@ impl Bch {
     pub const T5: Self = Self::new(5);
     /// (63, 30), correcting 6.
     pub const T6: Self = Self::new(6);
+    /// (63, 16), correcting 11.
+    pub const T11: Self = Self::new(11);
 
     const fn new(t: u32) -> Self {
         let generator = generator(t);
@@ -127,15 +129,15 @@ mod tests {
     #[test]
     fn codes_have_their_published_sizes() {
         assert_eq!(
-            [Bch::T3, Bch::T5, Bch::T6].map(|code| (code.k, code.t)),
-            [(45, 3), (36, 5), (30, 6)]
+            [Bch::T3, Bch::T5, Bch::T6, Bch::T11].map(|code| (code.k, code.t)),
+            [(45, 3), (36, 5), (30, 6), (16, 11)]
         );
     }
 
     #[test]
     fn codewords_are_multiples_of_the_generator_and_keep_their_information() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        for code in [Bch::T3, Bch::T5, Bch::T6] {
+        for code in [Bch::T3, Bch::T5, Bch::T6, Bch::T11] {
             for _ in 0..500 {
                 let information = rng.random::<u64>() >> (64 - code.k);
                 let word = code.encode(information);
@@ -155,7 +157,7 @@ mod tests {
     #[test]
     fn no_codeword_is_lighter_than_the_designed_distance() {
         // All combinations of few rows of the generator matrix: light codewords would show up among them.
-        for code in [Bch::T3, Bch::T5, Bch::T6] {
+        for code in [Bch::T3, Bch::T5, Bch::T6, Bch::T11] {
             let rows: Vec<u64> = (0..code.k).map(|i| code.encode(1 << i)).collect();
             let mut lightest = 64;
             for a in 0..rows.len() {

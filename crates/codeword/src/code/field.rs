@@ -133,5 +133,6 @@ mod tests {
         assert_eq!(generator(3), 0o1701317);
         assert_eq!(generator(5), 0o1033500423);
         assert_eq!(generator(6), 0o157464165547);
+        assert_eq!(generator(11), 0o6331141367235453);
     }
 }

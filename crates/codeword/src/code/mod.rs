@@ -147,6 +147,11 @@ impl Code {
     }
 }
 
+/// The codeword of up to 16 bits, in the lowest of `information`, in the extended code (64, 16).
+pub fn short_codeword(information: u64) -> u64 {
+    extend(Bch::T11.encode(information))
+}
+
 /// 63 bits with their parity behind.
 fn extend(codeword: u64) -> u64 {
     codeword << 1 | u64::from(codeword.count_ones() & 1)

@@ -1,5 +1,4 @@
-//! The CLIPs that are part of the program: those that new keys read with, by the length of their messages, and those of
-//! before, whose marks are read for ever. `docs/clip.md` tells how they came about.
+//! The CLIPs that are part of the program: the one that new keys read with, and those of before, whose marks are read for ever. `docs/clip.md` tells how they came about.
 use super::{Clip, ClipConfig, ClipModel, Parts, TensorFile, weights_path};
 use crate::error::{Error, Result};
 use burn::module::Module;
@@ -27,7 +26,7 @@ static SHORT_WEIGHTS: [u8; include_bytes!("../../models/guardsplat-short/model.s
 static FIRST_WEIGHTS: [u8; include_bytes!("../../models/guardsplat/image.safetensors").len()] =
     *include_bytes!("../../models/guardsplat/image.safetensors");
 
-/// The newest for messages of any length.
+/// The newest.
 const NEWEST: ShippedClip = ShippedClip {
     name: "guardsplat-2",
     config: include_str!("../../models/guardsplat-2/config.json"),
@@ -35,16 +34,14 @@ const NEWEST: ShippedClip = ShippedClip {
     whole: None,
 };
 
-/// For short messages: of lower radians, which stand more and tell fewer messages apart.
+/// For messages of up to 16 bits that are embedded bit by bit: of lower radians, which stand more and tell fewer messages
+/// apart.
 const SHORT: ShippedClip = ShippedClip {
     name: "guardsplat-short",
     config: include_str!("../../models/guardsplat-short/config.json"),
     weights: &SHORT_WEIGHTS,
     whole: None,
 };
-
-/// The longest message that [`SHORT`] is for. Of 32 bits it reads a scene of few colours at 93 %, where the newest reads 97.
-const SHORT_BITS: usize = 16;
 
 /// The first, of November 2026: all pixels weigh alike.
 const FIRST: ShippedClip = ShippedClip {
@@ -57,17 +54,8 @@ const FIRST: ShippedClip = ShippedClip {
 impl ShippedClip {
     /// All of them, the newest first.
     pub const ALL: [Self; 3] = [NEWEST, SHORT, FIRST];
-    /// What the newest for messages of any length is called.
+    /// What the newest is called, with which new keys read.
     pub const NEWEST: &'static str = NEWEST.name;
-
-    /// What a new key for messages of so many bits reads with: the newest, or where they are few the one for short
-    /// messages, unless `$GUARDSPLAT_CLIP` takes the place of the newest.
-    pub fn for_bits(bits: usize) -> &'static str {
-        match bits <= SHORT_BITS && std::env::var_os(INSTEAD).is_none() {
-            true => SHORT.name,
-            false => NEWEST.name,
-        }
-    }
 
     /// The one of this name.
     pub fn named(name: &str) -> Option<Self> {
@@ -141,8 +129,5 @@ mod tests {
             assert!(a.0 != b.0 && a.1 != b.1, "{a:?} {b:?}");
         }
         assert_eq!(newest.0, ShippedClip::NEWEST);
-        for (bits, name) in [(8, short.0), (16, short.0), (17, newest.0), (64, newest.0)] {
-            assert_eq!(ShippedClip::for_bits(bits), name, "{bits}");
-        }
     }
 }

@@ -67,11 +67,12 @@ impl EarlyStopping {
             .collect::<Result<Vec<Psnr>>>()?;
         let logits = pictures.iter().map(|picture| read_rendered(engine, picture));
         let reading = PooledLogits::new(logits.collect::<Result<_>>()?)?;
+        let code = &engine.message_code;
         let check = Check {
             step,
-            bit_accuracy: reading.compare(message, &engine.acceptance_rule(1))?.bit_accuracy,
+            bit_accuracy: reading.compare(code, message, &engine.acceptance_rule(1))?.bit_accuracy,
             psnr_db: mean_psnr(&psnrs)?.psnr_db.unwrap_or(f64::INFINITY),
-            margin: reading.margin(message),
+            margin: code.margin(&reading.summed, message)? / reading.views.len() as f64,
         };
         let stop = &self.stop;
         let holds =

@@ -178,6 +178,7 @@ mod tests {
         };
         let key = Key {
             secret: Secret::from_seed(1),
+            coded_bits: None,
             bits_per_token: 1,
             seed: None,
             clip: nobody,

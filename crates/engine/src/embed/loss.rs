@@ -22,6 +22,8 @@ pub(super) struct Loss<'a> {
     engine: &'a Engine,
     settings: Settings,
     image_augmentation: ImageAugmentation,
+    message: Message,
+    /// The bits of its word.
     targets: Vec<f32>,
 }
 
@@ -54,13 +56,16 @@ impl Graph {
 }
 
 impl<'a> Loss<'a> {
-    pub fn new(engine: &'a Engine, settings: &Settings, message: &Message) -> Self {
-        Self {
+    /// # Errors
+    /// A message that is not of the key's length.
+    pub fn new(engine: &'a Engine, settings: &Settings, message: &Message) -> Result<Self> {
+        Ok(Self {
             engine,
             settings: *settings,
             image_augmentation: ImageAugmentation::new(settings, engine),
-            targets: message.targets().collect(),
-        }
+            targets: engine.message_code.word(message)?.targets().collect(),
+            message: *message,
+        })
     }
 
     /// Divides logits by `temperature` from now on.
@@ -215,14 +220,14 @@ impl<'a> Loss<'a> {
         };
         check_finite(step, &terms)?;
         let logits: Vec<f32> = numbers.collect();
-        let right = logits
-            .iter()
-            .zip(self.targets.iter().cycle())
-            .filter(|(logit, target)| (**logit > 0.0) == (**target > 0.5))
-            .count();
+        let views: Vec<&[f32]> = logits.chunks_exact(self.targets.len()).collect();
+        let code = &self.engine.message_code;
+        let wrong = views.par_iter().map(|view| code.wrong_bits(view, &self.message));
+        let wrong: u32 = wrong.collect::<guardsplat_codeword::Result<Vec<u32>>>()?.iter().sum();
+        let bits = self.message.len() * views.len();
         Ok(Evaluated {
             terms,
-            bit_accuracy: right as f64 / logits.len() as f64,
+            bit_accuracy: 1.0 - f64::from(wrong) / bits.max(1) as f64,
             psnr_db,
         })
     }

@@ -47,10 +47,11 @@ pub fn optimise(
 ) -> Result<Optimised> {
     settings.check()?;
     let settings = &settings.for_scene(&scene.gaussians, cameras)?;
-    if message.len() != engine.bits {
+    let word = engine.message_code.word(message)?;
+    if word.len() != engine.bits {
         return Err(Error::BadOption {
             field: "message",
-            reason: format!("{} bits, but the key has {}", message.len(), engine.bits),
+            reason: format!("{} bits, but the key has {}", word.len(), engine.bits),
         });
     }
     let gaussians = &scene.gaussians;

@@ -27,7 +27,7 @@ pub enum Preset {
     /// What the figures in the documentation were made with.
     #[default]
     Standard,
-    /// For messages of 16 bits: a third more steps, and a mark that shows a little more.
+    /// For messages of 16 bits: a third more steps, and a mark that shows as much as it may.
     Robust,
     /// Twice the steps of standard, for more bits that are right at the same likeness.
     Thorough,
@@ -204,6 +204,8 @@ impl Preset {
                 balance: standard.balance.map(|balance| LossWeightControl {
                     target_psnr_db: 39.2,
                     target_ssim: Some(0.9925),
+                    // Never: what is left over is to be used.
+                    bit_accuracy: 2.0,
                     ..balance
                 }),
                 early_stop: standard.early_stop.map(|stop| EarlyStop {

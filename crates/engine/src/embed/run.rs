@@ -96,7 +96,7 @@ impl<'a> Run<'a> {
             settings,
             steps: settings.steps,
             extension: settings.extension,
-            loss: Loss::new(engine, settings, message),
+            loss: Loss::new(engine, settings, message)?,
             pool,
             optimiser,
             controller: LossWeightController::new(settings.balance, coverage.covered),

@@ -85,7 +85,8 @@ impl Target {
             // How many, and not which: the words of assets are told to nobody.
             missed.push(format!("{} of {bits} bits of the message are wrong", found.wrong_bits));
         }
-        if self.message && bits > SHORT && !claimable(&found.comparison.decision, rule) {
+        let claimed = bits > SHORT || found.comparison.decision.bits as usize > bits;
+        if self.message && claimed && !claimable(&found.comparison.decision, rule) {
             missed.push(format!(
                 "a claim would be no match: {} of {bits} bits of the message are wrong",
                 found.wrong_bits_of_all

@@ -15,7 +15,7 @@ const KEPT_PAIRS: usize = 5;
 /// What the verification found.
 #[derive(Clone, Debug)]
 pub struct Verification {
-    /// How the views compare with the message.
+    /// How the views compare with the message: the decision is on its word.
     pub comparison: Comparison,
     /// What was read of all views.
     pub reading: PooledLogits,
@@ -125,8 +125,9 @@ pub fn verify(
     pairs.truncate(KEPT_PAIRS);
     let reading = PooledLogits::new(logits)?;
     // Rendered as it is, a scene is one hypothesis.
-    let comparison = reading.compare(message, &engine.acceptance_rule(1))?;
-    let wrong = |read: &PooledLogits| Ok::<_, Error>(message.len() - read.reading().matches(message)? as usize);
+    let code = &engine.message_code;
+    let comparison = reading.compare(code, message, &engine.acceptance_rule(1))?;
+    let wrong = |read: &PooledLogits| Ok::<_, Error>(code.wrong_bits(&read.summed, message)? as usize);
     let read = reading.of_first(settings.verify.message_views)?;
     let (wrong_bits, wrong_bits_of_all) = (wrong(&read)?, wrong(&reading)?);
     Ok(Verification {
@@ -135,7 +136,7 @@ pub fn verify(
         message_recovered: wrong_bits == 0,
         wrong_bits,
         wrong_bits_of_all,
-        message: read.message(),
+        message: code.read(&read.summed)?,
         quality,
         psnr_covered_db: match of_covered.is_empty() {
             true => None,

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use burn::tensor::Tensor;
-use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE};
+use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE, MessageCode};
 use rayon::prelude::*;
 
 use super::extractor::{ClipExtractor, Extractor};
@@ -56,8 +56,10 @@ pub struct Engine {
     pub compute: Compute,
     /// What reads messages from pictures.
     pub extractor: Box<dyn Extractor>,
-    /// Bits of the key's messages.
+    /// Bits of what is embedded and read: logits of a picture.
     pub bits: usize,
+    /// How the key's messages become what is embedded.
+    pub message_code: MessageCode,
     /// The renderer, from its first use on: pictures are read without it.
     rasterizer: OnceLock<Box<dyn Rasterizer>>,
     /// Where the weights of the perceptual distance are, if they were added.
@@ -77,17 +79,21 @@ impl Engine {
     /// ([`Key::require_clip`]), who knows their files.
     ///
     /// # Errors
-    /// Those of [`ClipExtractor::new`].
+    /// Those of [`ClipExtractor::new`], and of [`Key::message_code`].
     pub fn new(compute: Compute, clip: Clip, key: &Key, lpips_weights: Option<PathBuf>) -> Result<Self> {
         let extractor = ClipExtractor::new(clip, key, &compute.device)?;
-        Ok(Self::with_extractor(compute, Box::new(extractor), lpips_weights))
+        Ok(Self {
+            message_code: key.message_code()?,
+            ..Self::with_extractor(compute, Box::new(extractor), lpips_weights)
+        })
     }
 
-    /// An engine that reads with any extractor, whose weights are on the device of `compute`.
+    /// An engine that reads with any extractor, whose weights are on the device of `compute`. Messages are embedded bit by bit.
     pub fn with_extractor(compute: Compute, extractor: Box<dyn Extractor>, lpips_weights: Option<PathBuf>) -> Self {
         Self {
             rasterizer: OnceLock::new(),
             bits: extractor.bits(),
+            message_code: MessageCode::Plain,
             extractor,
             false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
             limits: Limits {

@@ -6,12 +6,12 @@ use crate::clip::{Clip, resize};
 use crate::error::{Error, Result};
 use crate::message::{Decoding, Key, Reader};
 
-/// Turns pictures into a number for each bit of a message.
+/// Turns pictures into a number for each bit of a word.
 ///
 /// Whatever reads 2D pictures differentiably can take CLIP's place: embedding needs the gradient of its logits to the
 /// pictures, and nothing else of it.
 pub trait Extractor: Send + Sync {
-    /// Bits of a message.
+    /// Bits of a word.
     fn bits(&self) -> usize;
 
     /// Side in pixels of the square pictures that it looks at, whatever it is given.
@@ -83,7 +83,7 @@ impl ClipExtractor {
         Ok(Self {
             clip,
             reader: Reader::new(projection, decoder, device),
-            bits: key.bits(),
+            bits: key.word_bits(),
         })
     }
 }

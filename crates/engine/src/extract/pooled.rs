@@ -1,5 +1,5 @@
 //! Logits summed per bit over views, and the one reading that they decide for.
-use guardsplat_codeword::{AcceptanceRule, Decision, Message, Reading};
+use guardsplat_codeword::{AcceptanceRule, Decision, Message, MessageCode, Reading};
 
 use crate::error::{Error, Result};
 
@@ -65,29 +65,27 @@ impl PooledLogits {
         &self.reading
     }
 
-    /// The bits of that; undecided ones are 0.
-    pub fn message(&self) -> Message {
-        self.reading.message()
-    }
-
-    /// Compares with a message, by a rule that says how many hypotheses are tried.
+    /// Compares with a message of `code`, by a rule that says how many hypotheses are tried. The decision is on the bits of
+    /// its word; right bits are those of the message.
     ///
     /// # Errors
     /// When lengths differ.
-    pub fn compare(&self, message: &Message, rule: &AcceptanceRule) -> Result<Comparison> {
-        if message.len() != self.summed.len() {
+    pub fn compare(&self, code: &MessageCode, message: &Message, rule: &AcceptanceRule) -> Result<Comparison> {
+        let word = code.word(message)?;
+        if word.len() != self.summed.len() {
             return Err(Error::BadOption {
                 field: "message",
-                reason: format!("{} bits, but the key has {}", message.len(), self.summed.len()),
+                reason: format!("{} bits, but the key has {}", word.len(), self.summed.len()),
             });
         }
+        let bits = message.len() as f64;
         let accuracies = self
             .views
             .iter()
-            .map(|view| Ok(Reading::from_logits(view)?.bit_accuracy(message)?))
+            .map(|view| Ok(1.0 - f64::from(code.wrong_bits(view, message)?) / bits))
             .collect::<Result<Vec<f64>>>()?;
         Ok(Comparison {
-            decision: rule.decide(&self.reading, message)?,
+            decision: rule.decide(&self.reading, &word)?,
             bit_accuracy: accuracies.iter().sum::<f64>() / accuracies.len() as f64,
             bit_accuracy_worst_view: accuracies.iter().copied().fold(1.0, f64::min),
         })
@@ -111,15 +109,6 @@ impl PooledLogits {
         };
         let count = self.views.len() * self.summed.len();
         self.views.iter().map(agreeing).sum::<usize>() as f64 / count as f64
-    }
-
-    /// The weakest bit of `message`: its summed logit, positive when right, a view.
-    pub fn margin(&self, message: &Message) -> f64 {
-        let signed = self.summed.iter().zip(message.bits());
-        let weakest = signed
-            .map(|(&sum, bit)| f64::from(if bit { sum } else { -sum }))
-            .fold(f64::INFINITY, f64::min);
-        weakest / self.views.len() as f64
     }
 }
 
@@ -147,7 +136,7 @@ mod tests {
         let reading = reading();
         assert_eq!(reading.summed, [1.0, -3.0, 1.5, -0.125]);
         // Two of three views vote against the first and the last bit; the sums decide otherwise.
-        assert_eq!(reading.message().to_string(), "a");
+        assert_eq!(reading.reading().message().to_string(), "a");
         assert_eq!(reading.of_first(1).unwrap().summed, [3.0, -1.0, 0.5, -0.5]);
         assert_eq!(reading.of_first(9).unwrap(), reading);
     }
@@ -155,13 +144,42 @@ mod tests {
     #[test]
     fn accuracy_is_per_view_and_the_decision_is_one() {
         let message = Message::parse("a", 4).unwrap();
-        let found = reading().compare(&message, &RULE).unwrap();
+        let found = reading().compare(&MessageCode::Plain, &message, &RULE).unwrap();
         assert_eq!(found.decision.matched_bits, 4);
         assert_eq!(found.decision.bits, 4);
         assert_eq!(found.decision.verdict, Verdict::Inconclusive);
         assert!((found.bit_accuracy - (1.0 + 0.5 + 0.5) / 3.0).abs() < 1e-12);
         assert_eq!(found.bit_accuracy_worst_view, 0.5);
-        assert!(reading().compare(&Message::parse("aa", 8).unwrap(), &RULE).is_err());
+        assert!(
+            reading()
+                .compare(&MessageCode::Plain, &Message::parse("aa", 8).unwrap(), &RULE)
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn coded_messages_are_compared_by_their_words_and_read_by_the_likeliest() {
+        let code = MessageCode::coded(16, 77).unwrap();
+        let message = Message::parse("c0de", 16).unwrap();
+        let word = code.word(&message).unwrap();
+        // Twelve bits of a view are wrong, others in each.
+        let view = |first: usize| -> Vec<f32> {
+            let signed = word.targets().map(|target| 2.0 * target - 1.0).enumerate();
+            signed
+                .map(|(i, v)| if (first..first + 12).contains(&i) { -0.5 * v } else { v })
+                .collect()
+        };
+        let read = PooledLogits::new(vec![view(0), view(20), view(40)]).unwrap();
+        let found = read.compare(&code, &message, &RULE).unwrap();
+        assert_eq!((found.bit_accuracy, found.bit_accuracy_worst_view), (1.0, 1.0));
+        assert_eq!((found.decision.matched_bits, found.decision.bits), (64, 64));
+        assert_eq!(found.decision.verdict, Verdict::Match);
+        let other = Message::parse("c0df", 16).unwrap();
+        let found = read.compare(&code, &other, &RULE).unwrap();
+        assert_eq!(
+            (found.bit_accuracy, found.decision.verdict),
+            (15.0 / 16.0, Verdict::NoMatch)
+        );
     }
 
     #[test]
@@ -169,9 +187,6 @@ mod tests {
         let reading = reading();
         assert!((reading.agreement() - 8.0 / 12.0).abs() < 1e-12);
         assert!((reading.mean_abs_logit() - 10.375 / 12.0).abs() < 1e-6);
-        let margin = |text| reading.margin(&Message::parse(text, 4).unwrap());
-        assert!((margin("a") - 0.125 / 3.0).abs() < 1e-6);
-        assert!((margin("e") + 1.0).abs() < 1e-6);
     }
 
     #[test]
@@ -216,7 +231,7 @@ mod tests {
             };
             let logits: Vec<f32> = word.bits().enumerate().map(logit).collect();
             let raw = PooledLogits::new(vec![logits.clone()]).unwrap();
-            let raw = raw.compare(&word, &RULE).unwrap().decision;
+            let raw = raw.compare(&MessageCode::Plain, &word, &RULE).unwrap().decision;
             let claim = Claim {
                 scheme: Scheme::default(),
                 readings: &[HypothesisReading {

@@ -66,7 +66,7 @@ fn any_differentiable_extractor_can_be_embedded_for() {
             |_, _| Ok(()),
         )
         .unwrap();
-        assert_eq!(reading.message(), message, "{reading:?}");
+        assert_eq!(reading.reading().message(), message, "{reading:?}");
     }
 }
 

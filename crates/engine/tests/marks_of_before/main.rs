@@ -20,6 +20,8 @@ fn a_mark_of_november_2026_is_read() {
     let engine = Engine::new(compute, clip, &key, None).unwrap();
     let pictures = ["view_000.png", "view_001.png"].map(|name| read_picture(&folder.join(name), [1.0; 3]).unwrap());
     let read = read_pictures(&engine, &pictures).unwrap();
-    let found = read.compare(&message, &engine.acceptance_rule(1)).unwrap();
-    assert!(found.decision.matched_bits >= 31, "{}", read.message());
+    let found = read
+        .compare(&engine.message_code, &message, &engine.acceptance_rule(1))
+        .unwrap();
+    assert!(found.decision.matched_bits >= 31, "{:?}", found.decision);
 }

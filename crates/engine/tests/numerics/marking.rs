@@ -40,6 +40,7 @@ fn engine(machine: &Machine, lpips: Option<PathBuf>, change: impl FnOnce(&mut De
     change(&mut decoder);
     let key = Key {
         secret: Secret::from_seed(1),
+        coded_bits: None,
         bits_per_token: 1,
         seed: None,
         clip: ClipIdentity {

@@ -54,6 +54,7 @@ fn keys() {
         projection.matrix_text.fill(0.0);
         let key = Key {
             secret: Secret::from_seed(1),
+            coded_bits: None,
             bits_per_token: 1,
             seed: Some(1),
             clip: ClipIdentity {

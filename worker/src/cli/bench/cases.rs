@@ -88,13 +88,14 @@ impl Given {
 fn made(device: DeviceChoice) -> Result<Key> {
     let options = KeyOptions {
         bits: BITS,
+        coded: true,
         bits_per_token: None,
         seed: Some(SEED),
         robust_to: RobustTo::none(),
         training: TrainingOptions::default(),
     };
     let overrides = create_key::ProjectionOverrides::default();
-    let compute = load::device(device, ShippedClip::for_bits(BITS), load::Work::Reading)?;
+    let compute = load::device(device, ShippedClip::NEWEST, load::Work::Reading)?;
     create_key::create(&options, overrides, None, &compute, &Stop::default(), |_| {})
 }
 

@@ -30,7 +30,11 @@ pub fn run(arguments: &copy::Arguments) -> Result<Exit> {
     drop(display);
     let query = Query {
         alg: ALGORITHM,
-        value: Value::seal(binding_key(&key, &key.id()), &reading.message())?.text(),
+        value: Value::seal(
+            binding_key(&key, &key.id()),
+            &engine.message_code.read(&reading.summed)?,
+        )?
+        .text(),
     };
     if arguments.json {
         print_json(&query)?;

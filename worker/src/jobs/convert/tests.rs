@@ -1,5 +1,5 @@
 //! What the API says is what the engine does.
-use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE, Message};
+use guardsplat_codeword::{AcceptanceRule, DEFAULT_FALSE_POSITIVE_RATE, Message, MessageCode};
 use guardsplat_engine::embed::{LossTerms, Progress, Step};
 use guardsplat_engine::extract::PooledLogits;
 
@@ -133,8 +133,8 @@ fn findings_keep_their_figures() {
         false_positive_rate: DEFAULT_FALSE_POSITIVE_RATE,
         hypotheses: 1,
     };
-    let comparison = reading.compare(&message, &rule).unwrap();
-    let found = verify_result(VerificationReport::new(&reading, Some(&comparison), &[]).unwrap());
+    let comparison = reading.compare(&MessageCode::Plain, &message, &rule).unwrap();
+    let found = verify_result(VerificationReport::new(&MessageCode::Plain, &reading, Some(&comparison), &[]).unwrap());
     assert_eq!(found.verdict(), ApiVerdict::Match);
     assert_eq!((found.matched_bits, found.bits, found.views), (Some(32), 32, 2));
     assert_eq!(
@@ -142,7 +142,7 @@ fn findings_keep_their_figures() {
         (Some(0.5), Some(0.0))
     );
     assert!(found.p_value.unwrap() <= found.threshold.unwrap() && found.reason.is_empty());
-    let alone = verify_result(VerificationReport::new(&reading, None, &[]).unwrap());
+    let alone = verify_result(VerificationReport::new(&MessageCode::Plain, &reading, None, &[]).unwrap());
     assert_eq!((alone.verdict(), alone.p_value), (ApiVerdict::Inconclusive, None));
     assert_eq!(alone.message, "ffffffff");
     assert!(

@@ -21,6 +21,7 @@ fn engine() -> Engine {
     projection.matrix_image.iter_mut().for_each(|v| *v *= 8.0);
     let key = Key {
         secret: Secret::from_seed(1),
+        coded_bits: None,
         bits_per_token: 1,
         seed: None,
         clip: ClipIdentity {

@@ -11,7 +11,7 @@ use crate::message::tokens::hmac_sha256;
 use crate::message::{CONTEXT, FitOptions, Message, Projection, TokenTable, fit, train, training};
 use crate::picture::Picture;
 use crate::stop::Stop;
-use guardsplat_codeword::MessageLength;
+use guardsplat_codeword::{MessageCode, MessageLength};
 
 /// Random messages whose text features the projection is fitted to.
 const FITTED_MESSAGES: usize = 512;
@@ -46,9 +46,13 @@ pub fn create_key(
     mut progress: impl FnMut(KeyProgress),
 ) -> Result<Key> {
     MessageLength::new(options.bits)?;
+    if options.coded {
+        // What cannot be coded is told before anything is trained.
+        MessageCode::coded(options.bits, 0)?;
+    }
     let bits_per_token = options.bits_per_token();
     let secret = Secret::draw(options.seed)?;
-    let table = TokenTable::new(secret.expose(), options.bits, bits_per_token)?;
+    let table = TokenTable::new(secret.expose(), options.word_bits(), bits_per_token)?;
     let length = table.positions() + 2;
     check_text_tower(clip, &identity, length)?;
     let mut encode = |sequences: &[[i64; CONTEXT]]| {
@@ -72,6 +76,7 @@ pub fn create_key(
     Ok(Key {
         secret,
         seed: options.seed,
+        coded_bits: options.coded.then_some(options.bits),
         bits_per_token,
         clip: identity,
         decoding: Decoding::Clip {

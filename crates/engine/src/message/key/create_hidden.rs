@@ -87,6 +87,7 @@ pub fn create_hidden_key(
     Ok(Key {
         secret,
         seed: options.seed,
+        coded_bits: None,
         bits_per_token: fewest_bits_per_token(options.bits),
         clip: ClipIdentity {
             name: HIDDEN.into(),

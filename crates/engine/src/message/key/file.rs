@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::message::decoder::{DecoderWeights, HIDDEN, LayerWeights};
 use crate::message::projection::Projection;
 use crate::message::tokens::check_bits_per_token;
-use guardsplat_codeword::{MAX_BITS, MessageLength};
+use guardsplat_codeword::{MAX_BITS, MessageCode, MessageLength};
 
 /// The format's version; another one is refused.
 const VERSION: u32 = 1;
@@ -27,6 +27,9 @@ struct Header {
     version: u32,
     id: String,
     bits: usize,
+    /// Bits of the words that messages are put into; without it they are embedded bit by bit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    word_bits: Option<usize>,
     #[serde(default = "one")]
     bits_per_token: usize,
     #[serde(default = "three")]
@@ -39,6 +42,13 @@ struct Header {
     clip: ClipIdentity,
     accuracy_unseen: Option<f64>,
     accuracy_unseen_noisy: Option<f64>,
+}
+
+impl Header {
+    /// Bits of what is embedded.
+    fn word_bits(&self) -> usize {
+        self.word_bits.unwrap_or(self.bits)
+    }
 }
 
 /// Keys of more than one bit a token came later.
@@ -135,6 +145,7 @@ pub(super) fn serialize(key: &Key) -> Result<Vec<u8>, String> {
         version: VERSION,
         id: key.id(),
         bits: key.bits(),
+        word_bits: key.coded_bits.map(|_| key.word_bits()),
         bits_per_token: key.bits_per_token,
         layers,
         extractor,
@@ -201,7 +212,15 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     if MessageLength::new(header.bits).is_err() {
         return Err(format!("{} bits are outside 1 to {MAX_BITS}", header.bits));
     }
-    check_bits_per_token(header.bits, header.bits_per_token).map_err(|e| e.to_string())?;
+    check_bits_per_token(header.word_bits(), header.bits_per_token).map_err(|e| e.to_string())?;
+    let coded = MessageLength::CODED.bits() as usize;
+    if header
+        .word_bits
+        .is_some_and(|word| word != coded || !MessageCode::is_for(header.bits))
+    {
+        let (bits, word) = (header.bits, header.word_bits());
+        return Err(format!("messages of {bits} bits are not put into words of {word}"));
+    }
     let mut secret = [0; 32];
     hex::decode_to_slice(&header.secret, &mut secret).map_err(|_| "its secret is not 64 hexadecimal digits")?;
 
@@ -210,7 +229,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
         None => clip_decoding(&file, &header)?,
         Some(HIDDEN_DECODER) => {
             let read = |name: &str, shape: &[usize]| tensor(&file, &format!("{HIDDEN_DECODER}.{name}"), shape);
-            let weights = guardsplat_hidden::Weights::from_tensors("decoder", header.bits, read);
+            let weights = guardsplat_hidden::Weights::from_tensors("decoder", header.word_bits(), read);
             Decoding::Hidden(weights.map_err(|e| e.to_string())?)
         }
         Some(other) => {
@@ -222,6 +241,7 @@ pub(super) fn deserialize(bytes: &[u8]) -> Result<Key, String> {
     let key = Key {
         secret: Secret::new(secret),
         seed: header.seed,
+        coded_bits: header.word_bits.map(|_| header.bits),
         bits_per_token: header.bits_per_token,
         clip: header.clip,
         decoding,
@@ -266,11 +286,11 @@ fn clip_decoding(file: &SafeTensors<'_>, header: &Header) -> Result<Decoding, St
         })
     };
     let layers = match header.layers {
-        1 => vec![layer(0, rank, header.bits)?],
+        1 => vec![layer(0, rank, header.word_bits())?],
         3 => vec![
             layer(0, rank, HIDDEN)?,
             layer(1, HIDDEN, HIDDEN)?,
-            layer(2, HIDDEN, header.bits)?,
+            layer(2, HIDDEN, header.word_bits())?,
         ],
         other => return Err(format!("its decoder has {other} layers, not 1 or 3")),
     };
@@ -308,6 +328,7 @@ mod tests {
         Key {
             secret: Secret::from_seed(5),
             seed: Some(5),
+            coded_bits: None,
             bits_per_token: 1,
             clip: ClipIdentity {
                 name: "tiny".into(),
@@ -360,6 +381,48 @@ mod tests {
         let mut last = bytes.clone();
         *last.last_mut().unwrap() ^= 1;
         assert!(deserialize(&last).is_err());
+    }
+
+    #[test]
+    fn keys_of_coded_messages_are_kept_and_checked() {
+        let key = Key {
+            coded_bits: Some(16),
+            decoding: Decoding::Clip {
+                projection: Projection::identity(64),
+                decoder: DecoderWeights::seeded(64, 64, 1),
+            },
+            ..key()
+        };
+        assert_eq!((key.bits(), key.word_bits()), (16, 64));
+        let bytes = key.to_bytes().unwrap();
+        let read = Key::from_bytes("k", &bytes).unwrap();
+        assert_eq!(read, key);
+        assert_ne!(
+            key.id(),
+            Key {
+                coded_bits: None,
+                ..key.clone()
+            }
+            .id()
+        );
+        let message = key.message("c0de").unwrap();
+        let word = read.message_code().unwrap().word(&message).unwrap();
+        assert_eq!(word, key.message_code().unwrap().word(&message).unwrap());
+        // Another secret has another pad.
+        let other = Key {
+            secret: Secret::from_seed(6),
+            ..key.clone()
+        };
+        assert_ne!(other.message_code().unwrap().word(&message).unwrap(), word);
+        let with = |from: &[u8], to: &[u8]| {
+            let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
+            let mut changed = bytes.clone();
+            changed[at..at + to.len()].copy_from_slice(to);
+            deserialize(&changed).unwrap_err()
+        };
+        assert!(with(b"bits\\\":16", b"bits\\\":17").contains("17 bits are not put into words of 64"));
+        assert!(with(b"bits\\\":16", b"bits\\\":15").contains("does not match its id"));
+        assert!(with(b"word_bits\\\":64", b"word_bits\\\":65").contains("are not put into words of 65"));
     }
 
     #[cfg(unix)]

@@ -21,7 +21,7 @@ use crate::message::decoder::DecoderWeights;
 use crate::message::projection::Projection;
 use crate::message::tokens::{TokenTable, fewest_bits_per_token, hmac_sha256};
 use crate::message::training::TrainingOptions;
-use guardsplat_codeword::Message;
+use guardsplat_codeword::{Message, MessageCode, MessageLength};
 
 /// Which CLIP a key belongs to; for keys that read pictures without one, how their decoder is made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,6 +37,8 @@ pub struct ClipIdentity {
 pub struct KeyOptions {
     /// Bits of its messages, 1 to [`MAX_BITS`](guardsplat_codeword::MAX_BITS).
     pub bits: usize,
+    /// Puts messages into words of 64 bits ([`MessageCode`]), of which a fifth may be read wrong; for messages of up to 16.
+    pub coded: bool,
     /// Bits that one CLIP token stands for; `None` takes the fewest that make room.
     pub bits_per_token: Option<usize>,
     /// Makes the key reproducible, and only as secret as the seed; `None` asks the operating system for a secret.
@@ -49,9 +51,17 @@ pub struct KeyOptions {
 }
 
 impl KeyOptions {
+    /// Bits of what is embedded.
+    pub fn word_bits(&self) -> usize {
+        match self.coded {
+            true => MessageLength::CODED.bits() as usize,
+            false => self.bits,
+        }
+    }
+
     /// Bits a token, as asked for or the fewest that make room.
     pub fn bits_per_token(&self) -> usize {
-        self.bits_per_token.unwrap_or(fewest_bits_per_token(self.bits))
+        self.bits_per_token.unwrap_or(fewest_bits_per_token(self.word_bits()))
     }
 }
 
@@ -127,6 +137,9 @@ pub struct Key {
     pub secret: Secret,
     /// The seed that the secret came from, if it did.
     pub seed: Option<u64>,
+    /// Bits of its messages, where they are put into longer words ([`MessageCode`]); `None` where a message is embedded bit by
+    /// bit.
+    pub coded_bits: Option<usize>,
     /// Bits that one CLIP token stands for.
     pub bits_per_token: usize,
     /// The CLIP whose features the decoder reads.
@@ -144,10 +157,29 @@ pub struct Key {
 impl Key {
     /// Bits of its messages.
     pub fn bits(&self) -> usize {
+        self.coded_bits.unwrap_or_else(|| self.word_bits())
+    }
+
+    /// Bits of what is embedded, and read from pictures.
+    pub fn word_bits(&self) -> usize {
         match &self.decoding {
             Decoding::Clip { decoder, .. } => decoder.bits(),
             Decoding::Hidden(weights) => weights.bits(),
         }
+    }
+
+    /// How its messages become words, and are read from logits.
+    ///
+    /// # Errors
+    /// Coded messages of a length that is not coded.
+    pub fn message_code(&self) -> Result<MessageCode> {
+        let Some(bits) = self.coded_bits else {
+            return Ok(MessageCode::Plain);
+        };
+        Ok(MessageCode::coded(
+            bits,
+            self.secret.derived_seed(b"guardsplat word pad v1"),
+        )?)
     }
 
     /// 32 hexadecimal digits that name the key and give nothing of the secret away: an HMAC over everything in it.
@@ -160,13 +192,17 @@ impl Key {
         if self.bits_per_token != 1 {
             parts.extend([b" bits a token ".as_slice(), &per_token]);
         }
+        let word_bits = (self.word_bits() as u64).to_le_bytes();
+        if self.coded_bits.is_some() {
+            parts.extend([b" in words of ".as_slice(), &word_bits]);
+        }
         parts.extend(tensors.iter().map(Vec::as_slice));
         hex::encode(&hmac_sha256(self.secret.expose(), &parts)[..16])
     }
 
     /// The key's token table.
     pub fn tokens(&self) -> Result<TokenTable> {
-        TokenTable::new(self.secret.expose(), self.bits(), self.bits_per_token)
+        TokenTable::new(self.secret.expose(), self.word_bits(), self.bits_per_token)
     }
 
     /// Parses a message of the key's length from hexadecimal.
@@ -227,6 +263,7 @@ mod tests {
         Key {
             secret: Secret::draw(seed).unwrap(),
             seed,
+            coded_bits: None,
             bits_per_token: fewest_bits_per_token(8),
             clip: ClipIdentity {
                 name: "tiny".into(),
