@@ -34,7 +34,7 @@ pub use error::{Error, Result};
 pub use hypothesis::{Hypothesis, PhotometricCorrection, Tone, WINDOW_STEPS, Window, tint_without_ground};
 pub use limits::{MAX_BITS, VERSION};
 pub use message::{Message, MessageLength};
-pub use message_code::{CODED_MESSAGE_BITS, MessageCode};
+pub use message_code::MessageCode;
 pub use reading::Reading;
 pub use search::{Hit, Index};
 pub use shares::shares;

@@ -108,9 +108,7 @@ impl Message {
 
     /// The 64 bits of an integer, most significant first.
     pub fn from_u64(value: u64) -> Self {
-        let mut message = Self::zeros(MessageLength::CODED);
-        message.limbs[0] = value;
-        message
+        Self::from_integer(value, MessageLength::CODED)
     }
 
     /// The lowest bits of an integer, as many as the length, of which there are at most 64.

@@ -1,6 +1,6 @@
 //! How the messages of a key become the words that are embedded, and how words are read as messages again.
 //!
-//! A message of up to [`CODED_MESSAGE_BITS`] bits is put into a codeword of 64 bits, so that a fifth of them may be read
+//! A message of up to 16 bits is put into a codeword of 64 bits, so that a fifth of them may be read
 //! wrong; longer ones are embedded bit by bit. Codewords are those of the extended BCH code (64, 16), which differ in 24 bits
 //! at least. What is read is the likeliest message of all, by every codeword's sum of logits: maximum-likelihood decoding
 //! where noise is Gaussian (Lin and Costello, Error Control Coding, 2nd edition, section 10.1).
@@ -16,7 +16,7 @@ use crate::message::{Message, MessageLength};
 use crate::reading::Reading;
 
 /// Longest message that is coded, in bits.
-pub const CODED_MESSAGE_BITS: u32 = 16;
+const CODED_MESSAGE_BITS: u32 = 16;
 
 /// Between messages and words.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum MessageCode {
     Plain,
     /// A word is a codeword of 64 bits under a pad.
     Coded {
-        /// Bits of a message, at most [`CODED_MESSAGE_BITS`].
+        /// Bits of a message, at most 16.
         length: MessageLength,
         /// The pad; secret.
         pad: Message,
@@ -50,7 +50,7 @@ impl MessageCode {
     /// Codewords of messages of `bits` bits, under a secret pad.
     ///
     /// # Errors
-    /// [`Error::Length`] for no bits, [`Error::TooLarge`] for more than [`CODED_MESSAGE_BITS`].
+    /// [`Error::Length`] for no bits, [`Error::TooLarge`] for more than 16.
     pub fn coded(bits: usize, pad: u64) -> Result<Self> {
         let length = MessageLength::new(bits)?;
         if !Self::is_for(bits) {
