@@ -3,6 +3,7 @@
 #
 #     deploy/fuzz.sh [SECONDS a target (60)] [TARGET...]
 #     deploy/fuzz.sh --build                              only builds
+#     FUZZ_SEED=1 deploy/fuzz.sh 5                        tries the same inputs each time, as far as the time goes
 #
 # Own crates are built for it on stable Rust (deploy/fuzz-rustc.sh); cargo-fuzz and nightly are not needed. What is found
 # on the way is kept in target/fuzz/corpus and goes on from there the next time; tests/fuzz/corpus is where it starts.
@@ -47,7 +48,7 @@ run() {
     # Without leak detection: it is that of a sanitizer that is not there. Allocations are counted by the targets.
     "$built/fuzz_$target" "$fuzz/corpus/$target" "tests/fuzz/corpus/$target" "${dictionary[@]}" \
         -artifact_prefix="$fuzz/artifacts/$target/" -max_total_time="$seconds" -max_len=65536 -timeout=20 \
-        -rss_limit_mb=2048 -print_final_stats=1 -detect_leaks=0 -reload=0 >"$fuzz/logs/$target" 2>&1
+        -seed="${FUZZ_SEED:-0}" -rss_limit_mb=2048 -print_final_stats=1 -detect_leaks=0 -reload=0 >"$fuzz/logs/$target" 2>&1
 }
 
 # As many at a time as there are cores.

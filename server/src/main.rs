@@ -7,7 +7,6 @@ use clap::{CommandFactory as _, Parser};
 use guardsplat_server::settings::{self, Arguments, Command, LogFormat, Settings};
 use guardsplat_server::{offline, run};
 use tokio::signal::unix::{Signal, SignalKind, signal};
-use tracing_subscriber::EnvFilter;
 
 /// What is still being removed from disk at the end gets so long.
 const LAST_WORK: Duration = Duration::from_secs(2);
@@ -68,7 +67,7 @@ fn beside(settings: Settings, command: offline::Command) -> Result<(), String> {
 }
 
 fn start(settings: Settings) -> Result<(), String> {
-    log(&settings);
+    log(&settings)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()
@@ -102,15 +101,17 @@ async fn either(one: &mut Signal, other: &mut Signal) {
     }
 }
 
-fn log(settings: &Settings) {
+fn log(settings: &Settings) -> Result<(), String> {
+    let filter = settings.log_filter().map_err(|error| error.to_string())?;
     let subscriber = tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::new(&settings.log_filter))
+        .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal());
     match settings.log_format {
         LogFormat::Text => subscriber.init(),
         LogFormat::Json => subscriber.json().init(),
     }
+    Ok(())
 }
 
 /// An error and its causes.

@@ -123,19 +123,26 @@ impl Settings {
             })?;
         }
         self.place()?;
+        self.log_filter()?;
+        Ok(())
+    }
+
+    /// What is logged.
+    pub fn log_filter(&self) -> Result<EnvFilter, SettingsError> {
+        let invalid = |reason: String| SettingsError::Invalid {
+            field: "log_filter",
+            reason,
+        };
         // Filters on fields of spans are regular expressions that the library compiles without limits: 70 bytes of one
         // took gigabytes.
         if self.log_filter.contains(['[', '{']) {
-            return Err(SettingsError::Invalid {
-                field: "log_filter",
-                reason: "filters on spans and fields are not supported; name targets and levels".into(),
-            });
+            let reason = "filters on spans and fields are not supported; name targets and levels";
+            return Err(invalid(reason.into()));
         }
-        EnvFilter::try_new(&self.log_filter).map_err(|error| SettingsError::Invalid {
-            field: "log_filter",
-            reason: error.to_string(),
-        })?;
-        Ok(())
+        // After a space before a target the library takes the wrong part of the text, and panics if that begins or ends
+        // inside a character.
+        let directives: Vec<&str> = self.log_filter.split(',').map(str::trim).collect();
+        EnvFilter::try_new(directives.join(",")).map_err(|error| invalid(error.to_string()))
     }
 
     /// Where artifacts are, if not in the data folder.

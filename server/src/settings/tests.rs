@@ -246,7 +246,10 @@ fn bad_values_are_told_with_setting_and_limit() {
         assert!(text.ends_with("is not between 1e-30 and 0.1"), "{text}");
     }
     assert_eq!(error("data_dir = \"\"", &[], &[]), "setting data_dir: an empty path");
-    assert!(error("log_filter = \"info,=[\"", &[], &[]).starts_with("setting log_filter: "));
+    for filter in ["info,=[", "info,h2=loud", " =info"] {
+        let text = error(&format!("log_filter = \"{filter}\""), &[], &[]);
+        assert!(text.starts_with("setting log_filter: "), "{text}");
+    }
     for (file, field) in [
         ("max_attempts = -1", "max_attempts"),
         ("max_attempts = 5000000000", "max_attempts"),
@@ -259,6 +262,18 @@ fn bad_values_are_told_with_setting_and_limit() {
         let text = error(file, &[], &[]);
         assert!(text.contains(field), "{file}: {text}");
     }
+}
+
+#[test]
+fn spaces_around_targets_of_the_log_do_not_matter() {
+    let filter = |text: &str| {
+        let settings = layers(&format!("log_filter = \"{text}\""), &[], &[]).unwrap();
+        settings.log_filter().unwrap().to_string()
+    };
+    assert_eq!(
+        filter(" info, h2=warn,\u{2003}il\u{456}=debug "),
+        filter("info,h2=warn,il\u{456}=debug")
+    );
 }
 
 #[test]

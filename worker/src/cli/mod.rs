@@ -190,7 +190,12 @@ fn filter(command: &Command) -> EnvFilter {
         // Of warnings those that tell a user what to write differently.
         _ => "error,guardsplat_engine::embed::optimizer=warn",
     };
-    EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default))
+    // After a space before a target the library takes the wrong part of the text.
+    let said = std::env::var(EnvFilter::DEFAULT_ENV).ok().and_then(|text| {
+        let directives: Vec<&str> = text.split(',').map(str::trim).collect();
+        EnvFilter::try_new(directives.join(",")).ok()
+    });
+    said.unwrap_or_else(|| EnvFilter::new(default))
 }
 
 fn carry_out(command: Command) -> crate::error::Result<Exit> {

@@ -59,6 +59,8 @@ pub fn put_all() {
         "span-filter",
         "log_filter = \"info,a[b{BBBBeconBBBBBBBbBBBBBBBBBBB.......log_format = .......................BBBBBBBBBB..............................BBBBBBBBBBBBBBBBBBBBds }c=x\"",
     );
+    // Found by the fuzzer: the library panicked inside of the last letter.
+    put("server_settings", "filter-after-space", "log_filter = \" il\u{456}=\"");
     put("server_settings", "table", "[listen]\nport = 3\n[[listen]]");
     put(
         "server_settings",
