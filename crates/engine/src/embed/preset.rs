@@ -95,6 +95,7 @@ impl Preset {
             // not at CLIP's size.
             enlarged: 9.0,
             black_backgrounds: 0.1,
+            windows: 0.5,
             lambda: LossWeights {
                 reconstruction: 1.0,
                 l1: 0.0,
@@ -233,6 +234,7 @@ impl Preset {
                 size: 224,
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
+                windows: 0.0,
                 distorted_size: 224,
                 distorted_views: None,
                 robust_to: RobustTo::none(),

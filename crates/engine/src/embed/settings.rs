@@ -157,6 +157,9 @@ pub struct Settings {
     pub enlarged: f32,
     /// Share of training views over black instead of white.
     pub black_backgrounds: f32,
+    /// Share of training views of a forward-facing capture of which a part is shown, 0.35 to 0.9 of each side: what is left of
+    /// a cropped picture is another part of such a scene each time, and views of the whole teach no mark to be read there.
+    pub windows: f32,
     /// Weights of the loss.
     pub lambda: LossWeights,
     /// Views of a step that LPIPS looks at, the next ones at every step; its time is nearly all of a step's. `None` for all.
@@ -276,6 +279,7 @@ impl Settings {
         }
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
+        within("windows", f64::from(self.windows), 0.0, 1.0)?;
         let l = &self.lambda;
         for (field, value) in [
             ("lambda.reconstruction", l.reconstruction),

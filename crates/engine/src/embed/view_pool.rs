@@ -16,8 +16,10 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::splat::Geometry;
-use crate::view::{Split, ViewSampler};
+use crate::view::{Camera, SceneKind, Split, ViewSampler};
 
+/// How much of each side a window has.
+const KEPT: std::ops::Range<f32> = 0.35..0.9;
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
 const NEWLY_SEEN: f64 = 1e-3;
 /// Most views that are looked at to find the Gaussians that can be seen.
@@ -56,11 +58,26 @@ impl ViewMaker {
     /// Views by their numbers, without their unmarked pictures, side by side.
     fn prepare(&self, engine: &Engine, geometry: &Geometry<'_>, numbers: &[u64]) -> Result<Vec<PooledView>> {
         let prepare = |&number: &u64| {
-            let camera = self.sampler.camera(Split::Training, number, self.settings.size);
+            let camera = self.camera(number);
             let how = self.chosen(number, geometry.sh().degree);
             PooledView::prepared(engine, geometry, &camera, &how)
         };
         numbers.par_iter().map(prepare).collect()
+    }
+
+    /// Where a training view is taken from; of a forward-facing capture it may show a window of that, seeded.
+    fn camera(&self, index: u64) -> Camera {
+        let s = &self.settings;
+        let camera = self.sampler.camera(Split::Training, index, s.size);
+        if self.sampler.kind() != SceneKind::Forward || self.sampler.given().is_some() {
+            return camera;
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(3));
+        rng.set_stream(index);
+        match rng.random::<f32>() < s.windows {
+            true => camera.window(rng.random_range(KEPT), [rng.random(), rng.random()]),
+            false => camera,
+        }
     }
 
     /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
@@ -248,5 +265,28 @@ impl ViewPool {
             };
             bytes -= oldest.bytes();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embed::Preset;
+    use crate::sample::sample_of;
+
+    #[test]
+    fn half_of_the_views_of_a_forward_facing_capture_show_a_part_of_it() {
+        let parts = |kind, settings: Settings| {
+            let scene = sample_of(kind, 4000, 0, 1).unwrap().gaussians;
+            let sampler = ViewSampler::new(&scene, 1).unwrap();
+            assert_eq!(sampler.kind(), kind);
+            let maker = ViewMaker { sampler, settings };
+            let is_part = |index: &u64| maker.camera(*index) != maker.sampler.camera(Split::Training, *index, 160);
+            (0..200).filter(is_part).count()
+        };
+        let standard = Preset::Standard.settings();
+        assert!((80..120).contains(&parts(SceneKind::Forward, standard)));
+        assert_eq!(parts(SceneKind::Object, standard), 0);
+        assert_eq!(parts(SceneKind::Forward, Preset::Paper.settings()), 0);
     }
 }

@@ -62,6 +62,20 @@ impl Camera {
         }
     }
 
+    /// What a window of the picture shows, at the size of the whole: `kept` of each side, and `at` where it is along x and y,
+    /// 0 (left, top) to 1.
+    #[must_use]
+    pub fn window(&self, kept: f32, at: [f32; 2]) -> Camera {
+        let first = |side: u32, at: f32| at * (1.0 - kept) * side as f32;
+        Camera {
+            fx: self.fx / kept,
+            fy: self.fy / kept,
+            cx: (self.cx - first(self.width, at[0])) / kept,
+            cy: (self.cy - first(self.height, at[1])) / kept,
+            ..self.clone()
+        }
+    }
+
     /// Where the camera is, in world units.
     pub fn centre(&self) -> [f32; 3] {
         std::array::from_fn(|k| {
@@ -97,6 +111,22 @@ mod tests {
         assert!(camera.to_camera([0.5, 1.25, -1.0])[1] < 0.0);
         // The vertical field of view ends at the picture's edge.
         assert!((camera.fy * (0.4f32).tan() - 24.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_window_is_that_part_of_the_picture() {
+        let camera = Camera::look_at([0.0, 0.0, -3.0], [0.1, 0.2, 0.0], [0.0, -1.0, 0.0], 0.8, 64, 48);
+        let window = camera.window(0.5, [1.0, 0.25]);
+        let pixel = |camera: &Camera, point| {
+            let [x, y, z] = camera.to_camera(point);
+            [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
+        };
+        for point in [[0.0; 3], [0.4, -0.3, 0.5]] {
+            let [x, y] = pixel(&camera, point);
+            let [u, v] = pixel(&window, point);
+            // The right half, from an eighth of the height.
+            assert!((u - 2.0 * (x - 32.0)).abs() < 1e-3 && (v - 2.0 * (y - 6.0)).abs() < 1e-3);
+        }
     }
 
     #[test]

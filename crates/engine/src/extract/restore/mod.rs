@@ -1,5 +1,6 @@
 //! Restoration: what is not of the scene is taken out of a picture before it is read.
 //!
+//! - **Uneven light.** Dark corners, or light from one side, as a [ground](uneven) shows it.
 //! - **Noise.** A tower of sines reads exact colours, so that noise blurs what it reads. Worse, a white ground with noise is
 //!   not white any more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers
 //!   more of a picture than the scene does.
@@ -12,6 +13,7 @@
 mod median;
 mod noise;
 mod plain;
+mod uneven;
 
 use std::borrow::Cow;
 
@@ -67,9 +69,10 @@ pub(super) fn restored<'a>(engine: &Engine, picture: &'a Picture) -> Cow<'a, Pic
     if !engine.extractor.reads_exact_colours() {
         return Cow::Borrowed(picture);
     }
-    let clear = match noise::deviation(picture) >= NOISE {
-        true => Cow::Owned(without_noise(picture)),
-        false => Cow::Borrowed(picture),
+    let even = uneven::evened(picture).map_or(Cow::Borrowed(picture), Cow::Owned);
+    let clear = match noise::deviation(&even) >= NOISE {
+        true => Cow::Owned(without_noise(&even)),
+        false => even,
     };
     without_plain_areas(clear)
 }
