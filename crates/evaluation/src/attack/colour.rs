@@ -13,6 +13,20 @@ pub(super) fn tint(picture: RgbImage, factors: [f64; 3]) -> RgbImage {
     })
 }
 
+/// Values times 1 - `missing` · r², r being the distance from the centre, 1 in the corners.
+pub(super) fn vignette(mut picture: RgbImage, missing: f64) -> RgbImage {
+    let (width, height) = (f64::from(picture.width()), f64::from(picture.height()));
+    let from_middle = |i: u32, side: f64| f64::from(i) + 0.5 - 0.5 * side;
+    for (x, y, pixel) in picture.enumerate_pixels_mut() {
+        let squared = from_middle(x, width).powi(2) + from_middle(y, height).powi(2);
+        let factor = 1.0 - missing * squared / (0.25 * (width * width + height * height));
+        pixel.0 = pixel
+            .0
+            .map(|value| (f64::from(value) * factor).round().clamp(0.0, 255.0) as u8);
+    }
+    picture
+}
+
 /// Distance from the mean grey times `factor`.
 pub(super) fn contrast(picture: RgbImage, factor: f64) -> RgbImage {
     let sum: f64 = picture.pixels().map(luma).sum();

@@ -52,6 +52,9 @@ pub enum AttackKind {
     /// Each channel times a factor of its own: `tint:1.05/1/0.95` has one for red, green and blue, and of one range,
     /// `tint:0.95..1.05`, each draws its own.
     Tint,
+    /// Values times less the farther out, as lenses and filters have it: in the corners this share is missing, and elsewhere
+    /// as much less as the square of the distance from the centre is.
+    Vignette,
     /// Distance of values from the mean grey of the picture times this, as torchvision's `adjust_contrast`.
     Contrast,
     /// Values of [0, 1] to this power.
@@ -72,7 +75,7 @@ pub enum AttackKind {
 
 impl AttackKind {
     /// Every kind, in the order of the docs.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 31] = [
         Self::Jpeg,
         Self::Webp,
         Self::JpegTurbo,
@@ -95,6 +98,7 @@ impl AttackKind {
         Self::Page,
         Self::Brightness,
         Self::Tint,
+        Self::Vignette,
         Self::Contrast,
         Self::Gamma,
         Self::Hue,
@@ -145,6 +149,7 @@ impl AttackKind {
             Self::Page => ("page", real(0.1, 1.0, 1.0)),
             Self::Brightness => ("brightness", real(0.0, 10.0, 1.0)),
             Self::Tint => ("tint", real(0.0, 10.0, 1.0)),
+            Self::Vignette => ("vignette", real(0.0, 1.0, 0.0)),
             Self::Contrast => ("contrast", real(0.0, 10.0, 1.0)),
             Self::Gamma => ("gamma", real(0.1, 10.0, 1.0)),
             Self::Hue => ("hue", real(-1.0, 1.0, 0.0)),

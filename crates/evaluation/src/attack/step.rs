@@ -125,6 +125,7 @@ impl Step {
                 let factors = self.channels().map(|channels| channels.map(Strength::low));
                 colour::tint(picture, factors.unwrap_or([value; 3]))
             }
+            AttackKind::Vignette => colour::vignette(picture, value),
             AttackKind::Contrast => colour::contrast(picture, value),
             AttackKind::Gamma => colour::gamma(picture, value),
             AttackKind::Hue => colour::hue(picture, value),

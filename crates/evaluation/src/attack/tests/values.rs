@@ -29,6 +29,17 @@ fn tones_follow_their_formulas() {
 }
 
 #[test]
+fn a_vignette_darkens_corners_and_not_the_middle() {
+    let white = RgbImage::from_pixel(401, 201, Rgb([200, 100, 0]));
+    let darker = done("vignette:0.5", &white);
+    assert_eq!(darker.get_pixel(200, 100).0, [200, 100, 0]);
+    assert_eq!(darker.get_pixel(0, 200).0, [101, 50, 0]);
+    // Half of the way to a corner a quarter of that is missing.
+    assert_eq!(darker.get_pixel(100, 50).0, [175, 88, 0]);
+    assert_eq!(done("vignette:0", &white), white);
+}
+
+#[test]
 fn tints_change_each_channel() {
     assert_eq!(pixel("tint:1.05/1/0.95", [100, 100, 100]), [105, 100, 95]);
     assert_eq!(pixel("tint:2", [10, 130, 200]), pixel("brightness:2", [10, 130, 200]));
