@@ -95,7 +95,7 @@ impl Preset {
             // not at CLIP's size.
             enlarged: 9.0,
             black_backgrounds: 0.1,
-            windows: 0.5,
+            windows: 0.25,
             lambda: LossWeights {
                 reconstruction: 1.0,
                 l1: 0.0,

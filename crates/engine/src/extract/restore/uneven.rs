@@ -192,11 +192,13 @@ mod tests {
         }
     }
 
-    /// In a light that falls off by `by` to the corners, and is redder at the right.
+    /// In a light that falls off by `by` to the corners, and is redder at the right, 1 where it is brightest.
     fn lit(picture: &Picture, by: f32) -> Picture {
         let light = of(picture.width, |x, y| {
             let corners = 1.0 - by * (x * x + y * y) / 2.0;
-            [corners - 0.2 * by * (1.0 - x), corners, corners]
+            // Brightest at x = 0.2, y = 0.
+            let red = (corners - 0.2 * by * (1.0 - x)) / (1.0 - 0.18 * by);
+            [red, corners, corners]
         });
         let pixels = picture.pixels.iter().zip(&light.pixels).map(|(v, light)| v * light);
         Picture {
