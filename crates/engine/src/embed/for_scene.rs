@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::extract::sufficient_side;
 use crate::scene::Gaussians;
 use crate::splat::Geometry;
-use crate::view::{Camera, ViewSampler};
+use crate::view::{Camera, SceneKind, ViewSampler};
 
 impl Settings {
     /// The settings for a scene and the cameras it is seen from, which say all by themselves: its kind, the side of its
@@ -18,7 +18,9 @@ impl Settings {
             return Ok(*self);
         }
         let sampler = ViewSampler::seen_from(gaussians, self.seed, self.viewpoints(cameras))?;
-        let mut settings = self.for_views(sampler.shows_parts(), sampler.given().is_some());
+        // Windows of a view show other parts each, too, but are of one picture: nothing is gained by longer steps.
+        let windows = self.windows > 0.0 && sampler.kind() == SceneKind::Forward && sampler.given().is_none();
+        let mut settings = self.for_views(sampler.shows_parts() || windows, sampler.given().is_some() || windows);
         if cameras.is_empty() {
             settings.kind = Some(sampler.kind());
         }
@@ -44,8 +46,8 @@ impl Settings {
         settings
     }
 
-    /// The settings for a scene of which every view shows another part, or each the whole; `given` says whether views are
-    /// among cameras that were given.
+    /// The settings for a scene of which every view shows another part, or each the whole; `given` says whether views lie near
+    /// each other: among cameras that were given, or in one view.
     fn for_views(&self, of_parts: bool, given: bool) -> Self {
         let mut settings = *self;
         let times = std::mem::replace(&mut settings.times_of_parts, 1);

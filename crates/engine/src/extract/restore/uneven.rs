@@ -27,22 +27,16 @@ const TERMS: usize = 6;
 pub(super) fn evened(picture: &Picture) -> Option<Picture> {
     let blocks = blocks(picture);
     let ring: Vec<&Block> = blocks.iter().filter(|block| block.outermost).collect();
+    let every: Vec<&Block> = blocks.iter().collect();
     let mut light = Light::fitted(&ring)?;
-    let mut ground = ring.clone();
     for round in 0..ROUNDS {
-        // The ground within lies between that of the border: it is looked for once the border is known.
-        let of = if round < ROUNDS / 2 {
-            ring.iter().copied().collect()
-        } else {
-            blocks.iter().collect::<Vec<_>>()
-        };
         let mut errors: Vec<f64> = ring.iter().map(|block| light.error(block)).collect();
         let middle = errors.len() / 2;
         let typical = *errors.select_nth_unstable_by(middle, f64::total_cmp).1;
-        ground = of
-            .into_iter()
-            .filter(|block| light.error(block) <= TOLERANCE.max(typical))
-            .collect();
+        // The ground within is looked for once that of the border is known.
+        let among = if round < ROUNDS / 2 { &ring } else { &every };
+        let near = |block: &&Block| light.error(block) <= TOLERANCE.max(typical);
+        let ground: Vec<&Block> = among.iter().copied().filter(near).collect();
         light = Light::fitted(&ground)?;
     }
     let fits = ring.iter().filter(|block| light.error(block) <= TOLERANCE).count();
@@ -55,7 +49,7 @@ pub(super) fn evened(picture: &Picture) -> Option<Picture> {
         .zip(brightest)
         .any(|(dark, bright)| bright - dark >= UNEVEN);
     let is_bright = darkest.iter().all(|dark| *dark >= DARKEST);
-    (is_uneven && is_bright && !ground.is_empty()).then(|| light.evened(picture, brightest))
+    (is_uneven && is_bright).then(|| light.evened(picture, brightest))
 }
 
 /// A square of a picture.
