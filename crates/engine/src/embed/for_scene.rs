@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::extract::sufficient_side;
 use crate::scene::Gaussians;
 use crate::splat::Geometry;
-use crate::view::{Camera, SceneKind, ViewSampler};
+use crate::view::{Camera, ViewSampler};
 
 impl Settings {
     /// The settings for a scene and the cameras it is seen from, which say all by themselves: its kind, the side of its
@@ -18,8 +18,8 @@ impl Settings {
             return Ok(*self);
         }
         let sampler = ViewSampler::seen_from(gaussians, self.seed, self.viewpoints(cameras))?;
-        // Windows of a view show other parts each, too, but are of one picture: nothing is gained by longer steps.
-        let windows = self.windows > 0.0 && sampler.kind() == SceneKind::Forward && sampler.given().is_none();
+        // Windows show other parts each, too, but all from one side.
+        let windows = self.windows > 0.0 && sampler.faces_one_side();
         let mut settings = self.for_views(sampler.shows_parts() || windows, sampler.given().is_some() || windows);
         if cameras.is_empty() {
             settings.kind = Some(sampler.kind());
@@ -46,9 +46,9 @@ impl Settings {
         settings
     }
 
-    /// The settings for a scene of which every view shows another part, or each the whole; `given` says whether views lie near
-    /// each other: among cameras that were given, or in one view.
-    fn for_views(&self, of_parts: bool, given: bool) -> Self {
+    /// The settings for a scene of which views show other parts each, or each the whole; `near` says whether they lie near each
+    /// other, among cameras that were given or before one side.
+    fn for_views(&self, of_parts: bool, near: bool) -> Self {
         let mut settings = *self;
         let times = std::mem::replace(&mut settings.times_of_parts, 1);
         if !of_parts {
@@ -59,7 +59,7 @@ impl Settings {
             extension.after *= times as usize;
         }
         if let Optimizer::PreconditionedSgd(sgd) = &mut settings.optimizer
-            && !given
+            && !near
         {
             sgd.length *= times as f32;
         }
@@ -79,15 +79,15 @@ mod tests {
         let standard = Preset::Standard.settings();
         let whole = standard.for_views(false, false);
         assert_eq!((whole.steps, whole.times_of_parts), (standard.steps, 1));
-        let [parts, given] = [false, true].map(|given| standard.for_views(true, given));
-        assert_eq!((parts.steps, given.steps), (2 * standard.steps, 2 * standard.steps));
+        let [parts, near] = [false, true].map(|near| standard.for_views(true, near));
+        assert_eq!((parts.steps, near.steps), (2 * standard.steps, 2 * standard.steps));
         assert_eq!(parts.extension.unwrap().after, 2 * standard.extension.unwrap().after);
         let length = |settings: &Settings| match settings.optimizer {
             Optimizer::PreconditionedSgd(sgd) => sgd.length,
             Optimizer::Adam(_) => f32::NAN,
         };
         assert_eq!(length(&parts), 2.0 * length(&standard));
-        assert_eq!(length(&given), length(&standard));
+        assert_eq!(length(&near), length(&standard));
         let paper = Preset::Paper.settings();
         assert_eq!(paper.for_views(true, false), paper);
         assert!(standard.overridden(r#"{"times_of_parts": 0}"#).is_err());

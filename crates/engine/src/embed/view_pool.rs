@@ -16,7 +16,7 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::splat::Geometry;
-use crate::view::{Camera, SceneKind, Split, ViewSampler};
+use crate::view::{Camera, Split, ViewSampler};
 
 /// How much of each side a window has.
 const KEPT: std::ops::Range<f32> = 0.35..0.9;
@@ -69,7 +69,7 @@ impl ViewMaker {
     fn camera(&self, index: u64) -> Camera {
         let s = &self.settings;
         let camera = self.sampler.camera(Split::Training, index, s.size);
-        if self.sampler.kind() != SceneKind::Forward || self.sampler.given().is_some() {
+        if !self.sampler.faces_one_side() {
             return camera;
         }
         let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(3));
@@ -273,6 +273,7 @@ mod tests {
     use super::*;
     use crate::embed::Preset;
     use crate::sample::sample_of;
+    use crate::view::SceneKind;
 
     #[test]
     fn some_views_of_a_forward_facing_capture_show_a_part_of_it() {

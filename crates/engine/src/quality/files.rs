@@ -203,6 +203,7 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::largest_difference;
 
     const BLACK: [f32; 3] = [0.0; 3];
 
@@ -213,15 +214,6 @@ mod tests {
             height: 12,
             pixels: pixels.collect(),
         }
-    }
-
-    fn largest_difference(a: &Picture, b: &Picture) -> f32 {
-        assert_eq!((a.width, a.height), (b.width, b.height));
-        a.pixels
-            .iter()
-            .zip(&b.pixels)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f32::max)
     }
 
     #[test]

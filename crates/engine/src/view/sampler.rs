@@ -186,6 +186,11 @@ impl ViewSampler {
         self.given.is_some() || self.inside.is_some()
     }
 
+    /// Whether all views are of a forward-facing capture, from its front.
+    pub fn faces_one_side(&self) -> bool {
+        self.kind == SceneKind::Forward && self.given.is_none()
+    }
+
     /// Where and how large the scene is.
     pub fn extent(&self) -> &Extent {
         &self.extent

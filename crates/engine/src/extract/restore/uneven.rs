@@ -164,6 +164,7 @@ impl Light {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::largest_difference;
 
     /// A disc with a gradient, a fifth of it beyond the border, on a ground.
     fn disc(side: u32, ground: f32) -> Picture {
@@ -199,14 +200,6 @@ mod tests {
             pixels: pixels.collect(),
             ..*picture
         }
-    }
-
-    fn largest_difference(a: &Picture, b: &Picture) -> f32 {
-        a.pixels
-            .iter()
-            .zip(&b.pixels)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f32::max)
     }
 
     #[test]
