@@ -4,48 +4,31 @@
     cargo build --release --workspace --locked --examples
     python3 tools/tower_bench.py target/release/examples/bench_tower [--rounds 7] [--threads 2]
 
-Needs PyTorch and a C++ compiler for torch.compile. Each round runs all three; what is printed is the median of rounds in
+Needs PyTorch, safetensors, and a C++ compiler for torch.compile. Each round runs all three; what is printed is the median of rounds in
 milliseconds, and the median of the rounds' ratios with their range.
 """
+
 import argparse
 import math
 import os
 import statistics
 import subprocess
 import time
+from pathlib import Path
 
 import torch
-from torch.nn import functional
 
-VIEWS, SIDE, WIDTH, SCALES, FEATURES = 8, 160, 128, (1, 2, 4), 152
+from twin.reading import Tower
 
-
-class Tower(torch.nn.Module):
-    """Mean sines of filters of one pixel at three scales, and a linear head."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        generator = torch.Generator().manual_seed(1)
-        draw = lambda *shape: torch.randn(*shape, generator=generator)
-        self.filters = [20.0 * draw(WIDTH, 3) for _ in SCALES]
-        self.phases = [math.pi * draw(WIDTH) for _ in SCALES]
-        self.head = draw(WIDTH * len(SCALES), FEATURES) / WIDTH
-
-    def forward(self, pictures: torch.Tensor) -> torch.Tensor:
-        """Features of pictures [views, 3, side, side]."""
-        means = []
-        for scale, filters, phases in zip(SCALES, self.filters, self.phases):
-            x = pictures if scale == 1 else functional.avg_pool2d(pictures, scale)
-            angles = torch.einsum("nc,bcp->bnp", filters, x.flatten(2)) + phases[:, None]
-            means.append(angles.sin().mean(2))
-        return functional.normalize(torch.cat(means, 1) @ self.head)
+VIEWS = 8
+CLIP = Path(__file__).resolve().parent.parent / "crates/engine/models/guardsplat-2"
 
 
 def milliseconds(tower, repeats: int = 3) -> float:
     """The fewest of some runs of features and gradient."""
     best = math.inf
     for _ in range(repeats):
-        pictures = torch.rand(VIEWS, 3, SIDE, SIDE).requires_grad_()
+        pictures = torch.rand(VIEWS, 3, tower.side, tower.side).requires_grad_()
         clock = time.perf_counter()
         tower(pictures).sum().backward()
         best = min(best, 1e3 * (time.perf_counter() - clock))
@@ -73,7 +56,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
-    eager = Tower()
+    eager = Tower(CLIP)
     compiled = torch.compile(eager)
     runs = {
         "engine": lambda: engine(options.program, options.threads),

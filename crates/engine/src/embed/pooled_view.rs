@@ -15,7 +15,7 @@ use crate::view::Camera;
 /// A view with what it looks like unmarked.
 pub(super) struct PooledView {
     pub view: PreparedView,
-    background: [f32; 3],
+    pub how: TrainingView,
     /// Added to the colours of the visible Gaussians; empty for nothing.
     noise: Vec<f32>,
     /// What a card is to have of the view, until it has it.
@@ -75,7 +75,7 @@ impl PooledView {
         Ok(Self {
             view,
             packed,
-            background: how.background,
+            how: *how,
             noise,
             reference: Picture {
                 width: 0,
@@ -116,7 +116,7 @@ impl PooledView {
     pub fn shown(&self) -> Shown<'_> {
         Shown {
             view: &self.view,
-            background: self.background,
+            background: self.how.background,
         }
     }
 
@@ -130,7 +130,7 @@ impl PooledView {
         Drawing {
             view: &self.view,
             colours,
-            background: self.background,
+            background: self.how.background,
         }
     }
 

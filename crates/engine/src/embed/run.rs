@@ -199,7 +199,7 @@ impl<'a> Run<'a> {
         timing: &mut StepTimer,
         meanwhile: impl FnOnce(&mut ViewPool) -> Result<()>,
     ) -> Result<Step> {
-        let factors = self.controller.factors();
+        let factors = self.factors();
         let options = StepOptions {
             step,
             factors,
@@ -286,8 +286,13 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// What terms of the loss are multiplied by at the next step.
+    pub fn factors(&self) -> LossWeightFactors {
+        self.controller.factors()
+    }
+
     /// Factor on the learning rates: a half cosine from 1 to the final rate.
-    fn rate(&self, step: usize) -> f32 {
+    pub fn rate(&self, step: usize) -> f32 {
         let s = self.settings;
         let last = s.optimizer.final_rate();
         let turn = std::f32::consts::PI * (step - 1) as f32 / self.steps as f32;
@@ -296,4 +301,4 @@ impl<'a> Run<'a> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -12,7 +12,7 @@ const TINY: &str = r#"{"embed_dim": 16,
     "text_cfg": {"context_length": 5, "vocab_size": 9, "width": 8, "heads": 1, "layers": 1}}"#;
 
 /// A tiny random CLIP and an untrained decoder.
-fn engine() -> Engine {
+pub(in crate::embed) fn engine() -> Engine {
     let compute = open(DeviceChoice::Cpu).unwrap();
     let config = ClipConfig::parse("tiny", TINY).unwrap();
     let model = ClipModel::init(&config, Parts::Image, &compute.device, 5);
