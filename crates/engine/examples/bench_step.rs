@@ -71,7 +71,8 @@ fn time(engine: &Engine, scene: &Scene, message: &Message, settings: Settings, s
     let times = &times[WARM_UP..];
     let count = times.len() as f64;
     println!("step_ms {:.2}", wall / count);
-    let stages: [(&str, fn(&StepTimes) -> f64); 5] = [
+    type Stage = (&'static str, fn(&StepTimes) -> f64);
+    let stages: [Stage; 5] = [
         ("prepare_ms", |t| t.prepare),
         ("draw_ms", |t| t.colours + t.render),
         ("loss_ms", |t| t.loss),
