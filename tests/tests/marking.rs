@@ -90,6 +90,24 @@ fn marking_changes_colours_only_and_is_reproducible() {
 }
 
 #[test]
+fn copies_that_are_marked_together_are_those_that_are_marked_alone() {
+    let environment = environment_with(&["in.ply", "k.key", "hasty.json"]);
+    environment.write("messages", "C0FFEE42\n\n12345678\n");
+    let embed = EMBED.replace("--message c0ffee42", "--messages messages");
+    let report = environment.json(&embed.replace("out.ply", "marked"), 0);
+    assert!(environment.read("marked/c0ffee42.ply") == marked("out.ply"));
+    environment.exits(&EMBED.replace("c0ffee42", "12345678"), 0);
+    assert!(environment.read("marked/12345678.ply") == environment.read("out.ply"));
+    assert_eq!(environment.names("marked"), ["12345678.ply", "c0ffee42.ply"]);
+    let copies = report["copies"].as_array().unwrap();
+    let outputs: Vec<&Value> = copies.iter().map(|copy| &copy["output"]).collect();
+    assert_eq!(outputs, ["marked/c0ffee42.ply", "marked/12345678.ply"]);
+    assert_eq!(copies[0]["bit_accuracy"], MARKED.report["bit_accuracy"]);
+    environment.write("messages", "c0ffee42\nc0ff\n");
+    environment.refuses(&embed, &["--messages", "line 2", "32 bits"]);
+}
+
+#[test]
 fn the_report_of_a_verification_has_every_field_and_the_exit_code_is_its_verdict() {
     let environment = environment_with(&["out.ply", "k.key"]);
     let verify = "verify out.ply --key k.key --device cpu --views 3 --size 32 --json";

@@ -15,7 +15,7 @@ use guardsplat_soft_binding::Value;
 
 use super::credentials::{self, Signing};
 use super::display::Display;
-use super::{Budget, Exit, Kind, embed_levels, print_json, print_line};
+use super::{Budget, Exit, Kind, embed_copies, embed_levels, print_json, print_line};
 use crate::credentials_program::binding_key;
 use guardsplat_operations::embed_report::EmbedReport;
 use guardsplat_operations::embed_settings::Choices;
@@ -26,15 +26,22 @@ pub struct Arguments {
     /// The scene to mark: PLY, compressed PLY, SPZ, SOG (also as a folder, and streamed), glTF, .ksplat or .splat
     #[arg(value_name = "IN")]
     pub(super) input: PathBuf,
-    /// Where to write the marked scene, in the format of IN
+    /// Where to write the marked scene, in the format of IN; with --messages the folder of the copies
     #[arg(value_name = "OUT")]
     pub(super) output: PathBuf,
     /// The key file
     #[arg(long)]
     key: PathBuf,
     /// The message in hexadecimal, as many bits as the key has
-    #[arg(long, value_name = "HEX")]
-    message: String,
+    #[arg(long, value_name = "HEX", required_unless_present = "messages")]
+    message: Option<String>,
+    /// A file with a message a line, for each of which a copy is marked, OUT/MESSAGE with IN's extension. What copies have in
+    /// common is done once for all
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["message", "credentials"])]
+    messages: Option<PathBuf>,
+    /// Copies that are marked at a time, as memory allows
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "messages", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub(super) together: u8,
     /// draft, standard, robust, thorough or paper
     #[arg(long, default_value = "standard")]
     pub(super) preset: Preset,
@@ -94,7 +101,13 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
     let streamed = embed_levels::open(arguments)?;
     let settings = choices(arguments)?.settings()?;
     let key = Key::read(&arguments.key)?;
-    let message = key.message(&arguments.message)?;
+    let copies = copies(arguments, &key, streamed.is_some())?;
+    let message = match (&arguments.message, copies.first()) {
+        (Some(text), _) => key.message(text)?,
+        // The job is a pattern for the copies then.
+        (None, Some(copy)) => copy.message,
+        (None, None) => key.message("")?,
+    };
     let engine = load::engine(
         &arguments.key,
         &key,
@@ -117,6 +130,9 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
         force: arguments.force,
         bad_rows: BadRows::ignored_if(arguments.ignore_bad_rows),
     };
+    if !copies.is_empty() {
+        return Ok(embed_copies::run(arguments, &engine, &key, &job, &copies)?);
+    }
     if let Some(streamed) = streamed {
         return Ok(embed_levels::run(arguments, &engine, &key, &job, &streamed)?);
     }
@@ -141,6 +157,20 @@ pub fn run(arguments: &Arguments) -> crate::error::Result<Exit> {
     } else {
         Exit::Inconclusive
     })
+}
+
+/// The copies that are asked for; none where it is one message.
+fn copies(arguments: &Arguments, key: &Key, streamed: bool) -> Result<Vec<embed_copies::Copy>> {
+    let Some(file) = &arguments.messages else {
+        return Ok(Vec::new());
+    };
+    if streamed {
+        return Err(Error::BadOption {
+            field: "--messages",
+            reason: "a SOG with a lod-meta.json is marked with one message at a time".into(),
+        });
+    }
+    embed_copies::read(file, key.bits(), &arguments.input, &arguments.output)
 }
 
 fn choices(arguments: &Arguments) -> Result<Choices> {
@@ -197,6 +227,13 @@ pub(super) fn write_report(folder: &Path, verification: &Verification) -> Result
         &folder.join(comparison_sheet::NAME),
         &comparison_sheet::of(&verification.pairs)?,
     )
+}
+
+/// Tells what a mark misses of its target, if it does.
+pub(super) fn tell_missed(what: &str, outcome: &Outcome) {
+    if !outcome.missed.is_empty() {
+        eprintln!("{what}: target missed: {}", outcome.missed.join(", "));
+    }
 }
 
 /// What became of a mark, in a line.

@@ -9,7 +9,7 @@ use guardsplat_engine::{Error, Result};
 use serde::Serialize;
 
 use super::display::Display;
-use super::embed::{Arguments, line, show, write_report};
+use super::embed::{Arguments, line, show, tell_missed, write_report};
 use super::{Exit, print_json, print_line};
 use guardsplat_operations::embed_levels::{Event, embed_levels};
 use guardsplat_operations::embed_report::EmbedReport;
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, engine: &Engine, key: &Key, job: &Job<'_>, str
                     let report = EmbedReport::of(outcome, engine, key, arguments.preset, start.elapsed());
                     print_line(&format!("level {level}: {}", line(&report)));
                 }
-                tell_missed(level, outcome);
+                tell_missed(&format!("level {level}"), outcome);
             }
         }
         Ok(())
@@ -88,10 +88,4 @@ pub fn run(arguments: &Arguments, engine: &Engine, key: &Key, job: &Job<'_>, str
     }
     let missed = levels.outcomes.iter().any(|(_, outcome)| !outcome.missed.is_empty());
     Ok(if missed { Exit::Inconclusive } else { Exit::Done })
-}
-
-fn tell_missed(level: usize, outcome: &Outcome) {
-    if !outcome.missed.is_empty() {
-        eprintln!("level {level}: target missed: {}", outcome.missed.join(", "));
-    }
 }

@@ -5,6 +5,7 @@ mod convert;
 mod credentials;
 mod display;
 mod embed;
+mod embed_copies;
 mod embed_levels;
 mod evaluate;
 mod inspect;

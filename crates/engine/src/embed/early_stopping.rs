@@ -1,4 +1,6 @@
 //! Looks at held-out views during an embedding, and decides when the margin is enough.
+use std::sync::Arc;
+
 use super::pooled_view::PooledView;
 use super::progress::Check;
 use super::settings::{EarlyStop, Settings};
@@ -11,10 +13,11 @@ use crate::scene::Gaussians;
 use crate::splat::{Changes, Geometry};
 use crate::view::{Camera, Split, ViewSampler};
 
-/// Held-out views, prepared once, and how many checks in a row were passed.
+/// Held-out views, prepared once, and how many checks in a row were passed. A clone has the same views.
+#[derive(Clone)]
 pub(super) struct EarlyStopping {
     stop: EarlyStop,
-    views: Vec<PooledView>,
+    views: Arc<Vec<PooledView>>,
     passed: usize,
 }
 
@@ -39,6 +42,7 @@ impl EarlyStopping {
         for view in &mut views {
             view.reference = view.reference.to_8_bit();
         }
+        let views = Arc::new(views);
         Ok(Self { stop, views, passed: 0 })
     }
 

@@ -1,9 +1,11 @@
 //! Embedding from file to file: the marked scene is written aside, read back and verified before it gets its name.
+use std::collections::HashSet;
 use std::path::Path;
 
 use super::aside::Aside;
 use super::learned_offsets::LearnedOffsets;
-use super::marking::{Outcome, Work, admit, mark};
+use super::marking::{Outcome, Work, admit, verified};
+use super::optimise::optimise_together;
 use super::progress::Progress;
 use super::resources::model_bytes;
 use super::settings::Settings;
@@ -39,7 +41,7 @@ pub struct Job<'a> {
 /// stop; the output is then as it was before.
 pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     let read = |memory| Scene::read_within(job.input, job.bad_rows, memory);
-    embed_scene(engine, job, &read, progress)
+    embed_one(engine, job, &read, progress)
 }
 
 /// Marks a scene as [`embed`], which may be in more files than one: a glTF with its buffers beside it, or the folder of a
@@ -49,7 +51,7 @@ pub fn embed(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress))
 /// Those of [`embed`].
 pub fn embed_with_files(engine: &Engine, job: &Job<'_>, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     let read = |memory| Scene::read_with_files(job.input, job.bad_rows, memory);
-    embed_scene(engine, job, &read, progress)
+    embed_one(engine, job, &read, progress)
 }
 
 /// Marks a level of detail of a SOG that is streamed, in all tiles, as [`embed_with_files`]. The output is a folder with a
@@ -64,47 +66,103 @@ pub fn embed_level(
     level: usize,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Outcome> {
-    embed_scene(
-        engine,
-        job,
-        &|memory| streamed.read(level, job.bad_rows, memory),
-        progress,
-    )
+    let read = |memory| streamed.read(level, job.bad_rows, memory);
+    embed_one(engine, job, &read, progress)
 }
 
-fn embed_scene(
+/// Marks copies of one scene, as [`embed_with_files`] does each by itself, with views that are prepared once for all: only the
+/// messages and outputs of the jobs may differ. Outcomes are in the order of the jobs; `progress` is told which it is about.
+///
+/// # Errors
+/// Those of [`embed`], of any job: outputs that have their names by then stay. [`Error::BadOption`] for jobs that differ
+/// otherwise, or have one output.
+pub fn embed_together(
+    engine: &Engine,
+    jobs: &[Job<'_>],
+    progress: &mut dyn FnMut(usize, Progress),
+) -> Result<Vec<Outcome>> {
+    let Some((first, others)) = jobs.split_first() else {
+        return Ok(Vec::new());
+    };
+    let refuse = |field, reason: &str| {
+        Err(Error::BadOption {
+            field,
+            reason: reason.into(),
+        })
+    };
+    let alike = |job: &Job<'_>| {
+        (job.input, job.settings, job.cameras, job.bad_rows)
+            == (first.input, first.settings, first.cameras, first.bad_rows)
+    };
+    if !others.iter().all(alike) {
+        return refuse(
+            "jobs",
+            "only messages and outputs of jobs that are done together may differ",
+        );
+    }
+    let outputs: HashSet<&Path> = jobs.iter().map(|job| job.output).collect();
+    if outputs.len() < jobs.len() {
+        return refuse("OUT", "two marks would be written to one file");
+    }
+    let read = |memory| Scene::read_with_files(first.input, first.bad_rows, memory);
+    embed_scene(engine, jobs, &read, progress)
+}
+
+fn embed_one(
     engine: &Engine,
     job: &Job<'_>,
     read: &dyn Fn(u64) -> crate::scene::Result<Scene>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Outcome> {
-    job.settings.check()?;
-    let settings = job.settings;
+    let progress = &mut |_: usize, event| progress(event);
+    Ok(embed_scene(engine, std::slice::from_ref(job), read, progress)?.swap_remove(0))
+}
+
+/// Marks the scene that all jobs, one at least, are of.
+fn embed_scene(
+    engine: &Engine,
+    jobs: &[Job<'_>],
+    read: &dyn Fn(u64) -> crate::scene::Result<Scene>,
+    progress: &mut dyn FnMut(usize, Progress),
+) -> Result<Vec<Outcome>> {
+    let Job {
+        input,
+        settings,
+        cameras,
+        ..
+    } = jobs[0];
+    settings.check()?;
     let stop = &engine.stop;
     stop.check()?;
     let rest = MemoryRequirements {
         models: model_bytes(engine, settings).learning,
         ..MemoryRequirements::of_program()
     };
-    admission::admit_marking(job.input, &engine.limits, rest)?;
+    admission::admit_marking(input, &engine.limits, rest)?;
     let scene = read(engine.limits.left(&rest))?;
     stop.check()?;
-    let settings = &settings.for_scene(&scene.gaussians, job.cameras)?;
-    let work = Work {
-        message: job.message,
-        settings,
-        cameras: job.cameras,
-    };
-    let memory = admit(engine, &scene, &work)?;
-    let aside = reserve(job, &scene)?;
-    progress(Progress::Admitted(memory));
-    let marked = |learned: &LearnedOffsets| write(job, &scene, learned, &aside);
-    let (_, mut outcome) = mark(engine, &scene, &work, memory, progress, &marked)?;
-    outcome.written = outcome.missed.is_empty() || job.force;
-    if outcome.written {
-        aside.persist(job.output)?;
+    let settings = &settings.for_scene(&scene.gaussians, cameras)?;
+    let work = Work { settings, cameras };
+    let memory = admit(engine, &scene, &work, jobs.len())?;
+    let asides = jobs
+        .iter()
+        .map(|job| reserve(job, &scene))
+        .collect::<Result<Vec<_>>>()?;
+    (0..jobs.len()).for_each(|place| progress(place, Progress::Admitted(memory)));
+    let messages: Vec<&Message> = jobs.iter().map(|job| job.message).collect();
+    let optimised = optimise_together(engine, &scene, &messages, settings, cameras, progress)?;
+    let mut outcomes = Vec::with_capacity(jobs.len());
+    for (place, ((job, aside), optimised)) in jobs.iter().zip(asides).zip(optimised).enumerate() {
+        let progress = &mut |event| progress(place, event);
+        let marked = |learned: &LearnedOffsets| write(job, &scene, learned, &aside);
+        let (_, mut outcome) = verified(engine, &scene, &work, memory, job.message, optimised, progress, &marked)?;
+        outcome.written = outcome.missed.is_empty() || job.force;
+        if outcome.written {
+            aside.persist(job.output)?;
+        }
+        outcomes.push(outcome);
     }
-    Ok(outcome)
+    Ok(outcomes)
 }
 
 /// Writes the scene with what was learned to the file aside, and reads back what it shows.

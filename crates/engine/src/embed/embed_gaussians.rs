@@ -1,6 +1,7 @@
 //! Embedding in memory: for programs that have Gaussians and no file, such as those that train them.
 use super::learned_offsets::LearnedOffsets;
-use super::marking::{Outcome, Work, admit, mark};
+use super::marking::{Outcome, Work, admit, verified};
+use super::optimise::optimise;
 use super::progress::Progress;
 use super::settings::Settings;
 use crate::error::Result;
@@ -28,12 +29,8 @@ pub fn embed_gaussians(
     engine.stop.check()?;
     let scene = Scene::from_gaussians(gaussians);
     let settings = &settings.for_scene(&scene.gaussians, cameras)?;
-    let work = Work {
-        message,
-        settings,
-        cameras,
-    };
-    let memory = admit(engine, &scene, &work)?;
+    let work = Work { settings, cameras };
+    let memory = admit(engine, &scene, &work, 1)?;
     progress(Progress::Admitted(memory));
     let marked = |learned: &LearnedOffsets| {
         let mut sh = learned.colours(&scene.gaussians.sh);
@@ -44,7 +41,8 @@ pub fn embed_gaussians(
             ..scene.gaussians.clone()
         })
     };
-    let (learned, mut outcome) = mark(engine, &scene, &work, memory, progress, &marked)?;
+    let optimised = optimise(engine, &scene, message, settings, cameras, progress)?;
+    let (learned, mut outcome) = verified(engine, &scene, &work, memory, message, optimised, progress, &marked)?;
     outcome.written = outcome.missed.is_empty();
     Ok((learned.colours(&scene.gaussians.sh), outcome))
 }

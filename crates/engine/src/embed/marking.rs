@@ -1,6 +1,6 @@
-//! Marks a scene and verifies the mark, whatever the marked scene is kept in: a file, or memory.
+//! Admits and verifies a mark, whatever the marked scene is kept in: a file, or memory.
 use super::learned_offsets::LearnedOffsets;
-use super::optimise::optimise;
+use super::optimise::Optimised;
 use super::progress::Progress;
 use super::resources::{measure_view, model_bytes, predict_memory};
 use super::settings::Settings;
@@ -16,9 +16,8 @@ use crate::view::Camera;
 /// changes as they are; where it rounds them, what is left is not as much less as was asked for (compressed PLY).
 const WEAKENED: usize = 4;
 
-/// What to embed, and how.
+/// How to embed.
 pub(super) struct Work<'a> {
-    pub message: &'a Message,
     pub settings: &'a Settings,
     pub cameras: &'a [Camera],
 }
@@ -52,27 +51,34 @@ pub struct Outcome {
     pub changed: usize,
 }
 
-/// Predicts what memory the work will need, and refuses what does not fit.
-pub(super) fn admit(engine: &Engine, scene: &Scene, work: &Work<'_>) -> Result<MemoryRequirements> {
+/// Predicts what memory so many marks at once will need, and refuses what does not fit.
+pub(super) fn admit(engine: &Engine, scene: &Scene, work: &Work<'_>, marks: usize) -> Result<MemoryRequirements> {
     let settings = work.settings;
     let view = measure_view(engine, &scene.gaussians, settings, work.cameras)?;
-    let memory = predict_memory(SceneSize::of(scene), view, settings, model_bytes(engine, settings));
+    let memory = predict_memory(
+        SceneSize::of(scene),
+        view,
+        settings,
+        model_bytes(engine, settings),
+        marks,
+    );
     engine.limits.admit(&memory)?;
     Ok(memory)
 }
 
-/// Learns the mark and verifies it on what `marked` makes of it: the scene as others will have it. One that shows more than
-/// it may is made weaker. Nothing is said to be written.
-pub(super) fn mark(
+/// Verifies a mark on what `marked` makes of it: the scene as others will have it. One that shows more than it may is made
+/// weaker. Nothing is said to be written.
+pub(super) fn verified(
     engine: &Engine,
     scene: &Scene,
     work: &Work<'_>,
     memory: MemoryRequirements,
+    message: &Message,
+    mut optimised: Optimised,
     progress: &mut dyn FnMut(Progress),
     marked: &dyn Fn(&LearnedOffsets) -> Result<Gaussians>,
 ) -> Result<(LearnedOffsets, Outcome)> {
     let settings = work.settings;
-    let mut optimised = optimise(engine, scene, work.message, settings, work.cameras, progress)?;
     let (mut verification, mut missed);
     let mut weakened = 0;
     loop {
@@ -84,7 +90,7 @@ pub(super) fn mark(
             engine,
             &scene.gaussians,
             &marked,
-            work.message,
+            message,
             settings,
             work.cameras,
             |done| progress(Progress::Verifying { done, total }),

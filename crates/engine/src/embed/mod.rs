@@ -35,13 +35,13 @@ mod view_pool;
 
 pub use adam::{Adam, AdamOptions, Penalty};
 pub use augment::Augmentation;
-pub use embed_file::{Job, embed, embed_level, embed_with_files};
+pub use embed_file::{Job, embed, embed_level, embed_together, embed_with_files};
 pub use embed_gaussians::embed_gaussians;
 pub use forecast::{Forecast, forecast};
 pub use learned_offsets::LearnedOffsets;
 pub use loss_weight_controller::{LossWeightControl, LossWeightController, TargetRelaxation};
 pub use marking::Outcome;
-pub use optimise::{Optimised, optimise};
+pub use optimise::{Optimised, optimise, optimise_together};
 pub use optimizer::Optimizer;
 pub use preconditioned_sgd::{PreconditionedSgd, PreconditionedSgdOptions};
 pub use preset::Preset;

@@ -8,10 +8,17 @@ use crate::scene::Gaussians;
 use crate::splat::{Geometry, PreparedView};
 use crate::view::{Camera, Split, ViewSampler};
 
-/// Predicts the most memory that an embedding with these settings has in use at once.
-pub fn predict_memory(scene: SceneSize, view: ViewSize, settings: &Settings, models: ModelBytes) -> MemoryRequirements {
+/// Predicts the most memory that an embedding of so many `marks` at once, with these settings, has in use at a time.
+pub fn predict_memory(
+    scene: SceneSize,
+    view: ViewSize,
+    settings: &Settings,
+    models: ModelBytes,
+    marks: usize,
+) -> MemoryRequirements {
     let distorts_pictures = settings.robust_to.of_pictures().next().is_some();
     let work = EmbeddingWorkload {
+        marks: marks as u64,
         size: settings.size,
         distorted_size: distorts_pictures.then_some(settings.distorted_size),
         views_per_step: settings.views_per_step,
@@ -132,6 +139,7 @@ mod tests {
                 view,
                 &Preset::Draft.settings(),
                 ModelBytes::default(),
+                1,
             );
             admit_marking(&path, &up_to(needed.total()), MemoryRequirements::of_program()).unwrap();
             admit_reading(

@@ -1,4 +1,4 @@
-//! A run of the loop: one step after the other, on the host or on a card.
+//! The run of one message: one step after the other, on the host or on a card, with views that it is given.
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -12,18 +12,16 @@ use super::on_device::{OnDevice, StepOptions};
 use super::optimizer::Optimizer;
 use super::pooled_view::PooledView;
 use super::preconditioned_sgd::PreconditionedSgd;
-use super::preparing::Preparing;
 use super::progress::{Check, Step};
 use super::settings::{Extension, Settings};
 use super::step_timer::{Stage, StepTimer};
-use super::view_pool::{Coverage, ViewPool};
+use super::view_pool::Coverage;
 use crate::error::Result;
 use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
-use crate::splat::{Changes, Geometry, Learnable, PreparedView, sh};
-use crate::view::ViewSampler;
+use crate::splat::{Changes, Learnable, PreparedView, sh};
 
 /// dB that held-out views may lack of the target without more steps: to hold them takes bits.
 const SHORT_DB: f64 = 0.5;
@@ -38,14 +36,12 @@ pub(super) enum OptimizerState {
 pub(super) struct Run<'a> {
     engine: &'a Engine,
     scene: &'a Scene,
-    geometry: Arc<Geometry<'a>>,
     settings: &'a Settings,
     /// Most steps, by the settings or as they were extended.
     steps: usize,
     /// What is done at the next look, where bits are wrong.
     extension: Option<Extension>,
     loss: Loss<'a>,
-    pool: ViewPool,
     optimiser: OptimizerState,
     controller: LossWeightController,
     augmentation: ChaCha8Rng,
@@ -56,21 +52,18 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Finds what views show, and stands before the first step.
+    /// Stands before the first step. `coverage` is what views show, `of_parts` whether each shows another part of the scene.
     ///
     /// # Errors
-    /// A failing device; [`Error::Stopped`](crate::Error::Stopped).
+    /// A message that is not of the key's length; a failing device.
     pub fn new(
         engine: &'a Engine,
         scene: &'a Scene,
-        geometry: Geometry<'a>,
         message: &Message,
         settings: &'a Settings,
-        sampler: ViewSampler,
-    ) -> Result<(Self, Coverage)> {
-        let of_parts = sampler.shows_parts();
-        let mut pool = ViewPool::new(sampler, settings);
-        let coverage = pool.cover(engine, &geometry)?;
+        coverage: &Coverage,
+        of_parts: bool,
+    ) -> Result<Self> {
         let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
         let mut augmentation = ChaCha8Rng::seed_from_u64(settings.seed);
         augmentation.set_stream(u64::MAX - 1);
@@ -88,42 +81,35 @@ impl<'a> Run<'a> {
         };
         let rasterizer = engine.rasterizer()?.on_device();
         let on_device = rasterizer.map(|rasterizer| OnDevice::new(rasterizer, scene, &learnable, &optimiser));
-        let run = Self {
+        Ok(Self {
             engine,
             on_device,
             scene,
-            geometry: Arc::new(geometry),
             settings,
             steps: settings.steps,
             extension: settings.extension,
             loss: Loss::new(engine, settings, message)?,
-            pool,
             optimiser,
             controller: LossWeightController::new(settings.balance, coverage.covered),
             augmentation,
             gradient: vec![0.0; learnable.len()],
             learned: LearnedOffsets::new(scene, learnable),
-        };
-        Ok((run, coverage))
+        })
     }
 
-    /// One step; `step` counts from 1.
-    pub fn step<'scope>(
+    /// One step with these views; `step` counts from 1. `meanwhile` is done while a card computes, or after that.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`](crate::Error::NotFinite) with the term, [`Error::Stopped`](crate::Error::Stopped), a failing device;
+    /// those of `meanwhile`.
+    pub fn step(
         &mut self,
         step: usize,
-        preparing: &mut Preparing<'scope, 'a>,
+        views: &[Arc<PooledView>],
         timing: &mut StepTimer,
-    ) -> Result<Step>
-    where
-        'a: 'scope,
-    {
-        let engine = self.engine;
-        let views = self.pool.batch(engine, &self.geometry)?;
-        preparing.begin(engine, &self.geometry, self.steps - step, |after| {
-            self.pool.upcoming(after)
-        });
-        timing.lap(Stage::Prepare);
-        let mut figures = self.differentiate(step, &views, timing, |pool| pool.prepared(engine, preparing.next()?))?;
+        meanwhile: impl FnOnce() -> Result<()>,
+    ) -> Result<Step> {
+        let mut figures = self.differentiate(step, views, timing, meanwhile)?;
         if !self.moves_on_device() {
             figures.terms.offset = self.advance(step)?;
         }
@@ -197,7 +183,7 @@ impl<'a> Run<'a> {
         step: usize,
         views: &[Arc<PooledView>],
         timing: &mut StepTimer,
-        meanwhile: impl FnOnce(&mut ViewPool) -> Result<()>,
+        meanwhile: impl FnOnce() -> Result<()>,
     ) -> Result<Step> {
         let factors = self.factors();
         let options = StepOptions {
@@ -210,7 +196,7 @@ impl<'a> Run<'a> {
             (Some(rasterizer), Some(on_device)) => {
                 let launched = on_device.launch(rasterizer, &self.loss, views, options, &mut self.augmentation)?;
                 timing.lap(Stage::Loss);
-                meanwhile(&mut self.pool)?;
+                meanwhile()?;
                 timing.lap(Stage::Prepare);
                 let found = on_device.wait(rasterizer, &self.loss, launched)?;
                 if !on_device.moves() {
@@ -221,7 +207,7 @@ impl<'a> Run<'a> {
             }
             _ => {
                 let found = self.differentiate_on_host(step, views, factors, timing)?;
-                meanwhile(&mut self.pool)?;
+                meanwhile()?;
                 timing.lap(Stage::Prepare);
                 found
             }

@@ -1,9 +1,7 @@
 //! What the steps of an embedding look at and find: for a program that computes the same in another way, and is compared.
 use std::collections::HashMap;
-use std::thread;
 
 use super::pooled_view::PooledView;
-use super::preparing::Preparing;
 use super::progress::Step;
 use super::run::Run;
 use super::scene_augmentation::SceneAugmentation;
@@ -68,50 +66,40 @@ pub fn trace(engine: &Engine, scene: &Scene, message: &Message, settings: &Setti
     settings.check()?;
     let settings = settings.for_scene(&scene.gaussians, &[])?;
     let sampler = ViewSampler::seen_from(&scene.gaussians, settings.seed, settings.viewpoints(&[]))?;
-    let geometry = Geometry::new(&scene.gaussians);
-    // The run keeps its views to itself; which they are follows from the same settings.
-    let mut pool = ViewPool::new(sampler.clone(), &settings);
-    pool.cover(engine, &geometry)?;
-    let (mut run, coverage) = Run::new(engine, scene, geometry.clone(), message, &settings, sampler)?;
+    let (geometry, of_parts) = (Geometry::new(&scene.gaussians), sampler.shows_parts());
+    let mut pool = ViewPool::new(sampler, &settings);
+    let coverage = pool.cover(engine, &geometry)?;
+    let mut run = Run::new(engine, scene, message, &settings, &coverage, of_parts)?;
     let learnable = Learnable::new(&coverage.seen, scene.learnable_degree());
-    let mut trace = Trace {
-        settings,
-        energies: learnable
-            .rows()
-            .iter()
-            .map(|row| coverage.energies[*row as usize])
-            .collect(),
+    let energy = |row: &u32| coverage.energies[*row as usize];
+    let (mut views, mut traced) = (Vec::new(), Vec::new());
+    let (mut places, mut timing) = (HashMap::new(), StepTimer::new());
+    for step in 1..=steps.min(run.steps()) {
+        engine.stop.check()?;
+        let shown = pool.batch(engine, &geometry)?;
+        let mut of_step = Vec::with_capacity(shown.len());
+        for view in &shown {
+            let place = *places.entry(view.view.id.0).or_insert(views.len());
+            if place == views.len() {
+                views.push(TracedView::of(view)?);
+            }
+            of_step.push(place);
+        }
+        let factors = run.factors();
+        traced.push(TracedStep {
+            views: of_step,
+            factors: [factors.reconstruction, factors.ssim],
+            rate: run.rate(step),
+            found: run.step(step, &shown, &mut timing, || Ok(()))?,
+        });
+    }
+    Ok(Trace {
+        energies: learnable.rows().iter().map(energy).collect(),
         rows: learnable.rows().to_vec(),
         targets: engine.message_code.word(message)?.targets().collect(),
-        views: Vec::new(),
-        steps: Vec::new(),
-    };
-    let mut places = HashMap::new();
-    thread::scope(|scope| {
-        let (mut timing, mut preparing) = (StepTimer::new(), Preparing::new(scope));
-        for step in 1..=steps.min(run.steps()) {
-            engine.stop.check()?;
-            let mut views = Vec::new();
-            for view in pool.batch(engine, &geometry)? {
-                let place = match places.get(&view.view.id.0) {
-                    Some(place) => *place,
-                    None => {
-                        trace.views.push(TracedView::of(&view)?);
-                        places.insert(view.view.id.0, trace.views.len() - 1);
-                        trace.views.len() - 1
-                    }
-                };
-                views.push(place);
-            }
-            let factors = run.factors();
-            trace.steps.push(TracedStep {
-                views,
-                factors: [factors.reconstruction, factors.ssim],
-                rate: run.rate(step),
-                found: run.step(step, &mut preparing, &mut timing)?,
-            });
-        }
-        Ok(trace)
+        views,
+        steps: traced,
+        settings,
     })
 }
 

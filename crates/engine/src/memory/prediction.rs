@@ -84,6 +84,8 @@ pub struct ModelBytes {
 /// What of an embedding's settings decides how much memory it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EmbeddingWorkload {
+    /// Marks that are made of the scene at once.
+    pub marks: u64,
     /// Side of training views in pixels.
     pub size: u32,
     /// Side in pixels to which views are enlarged before they are distorted; `None` where none are.
@@ -148,8 +150,8 @@ pub fn embedding_requirements(
     let optimising = MemoryRequirements {
         models: models.learning,
         scene: scene.bytes(),
-        offsets: 2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians,
-        optimiser: 2 * learned + 4 * scene.gaussians,
+        offsets: work.marks * (2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians),
+        optimiser: work.marks * (2 * learned + 4 * scene.gaussians),
         views: (kept + in_hand + held_out) as u64 + GEOMETRY_OF_VIEWS * scene.gaussians,
         // First the one, then the other.
         pictures: differentiating.max(preparing),
@@ -159,7 +161,7 @@ pub fn embedding_requirements(
     let verifying = MemoryRequirements {
         models: models.verifying,
         scene: 2 * scene.bytes(),
-        offsets: optimising.offsets - learned,
+        offsets: optimising.offsets - work.marks * learned,
         pictures: 2 * work.verification_views as u64 * picture + preparing + 2 * GEOMETRY_OF_VIEWS * scene.gaussians,
         ..MemoryRequirements::of_program()
     };

@@ -1,10 +1,13 @@
 use super::*;
 use crate::clip::{Clip, ClipConfig, ClipModel, Parts};
 use crate::device::{DeviceChoice, open};
+use crate::embed::view_pool::ViewPool;
 use crate::embed::{Augmentation, Preset};
 use crate::message::key::Secret;
 use crate::message::{ClipIdentity, DecoderWeights, Decoding, Key, Projection};
 use crate::sample::sample;
+use crate::splat::Geometry;
+use crate::view::ViewSampler;
 use rand::RngExt;
 
 const TINY: &str = r#"{"embed_dim": 16,
@@ -60,8 +63,10 @@ fn the_gradient_is_that_of_the_loss() {
         (settings.lambda.message, settings.lambda.reconstruction) = (message_weight, weight);
         let geometry = Geometry::new(&scene.gaussians);
         let sampler = ViewSampler::new(&scene.gaussians, 1).unwrap();
-        let (mut run, coverage) = Run::new(&engine, &scene, geometry, &message, &settings, sampler).unwrap();
-        let views = run.pool.batch(&engine, &run.geometry).unwrap();
+        let mut pool = ViewPool::new(sampler, &settings);
+        let coverage = pool.cover(&engine, &geometry).unwrap();
+        let mut run = Run::new(&engine, &scene, &message, &settings, &coverage, false).unwrap();
+        let views = pool.batch(&engine, &geometry).unwrap();
         // Offsets of Gaussians that no view shows have no slot.
         let columns = run.learned.learnable.columns();
         let start = start[..coverage.count() * columns].to_vec();
@@ -71,7 +76,7 @@ fn the_gradient_is_that_of_the_loss() {
             // The same augmentation every time.
             run.augmentation = ChaCha8Rng::seed_from_u64(4);
             let t = run
-                .differentiate(1, &views, &mut StepTimer::new(), |_| Ok(()))
+                .differentiate(1, &views, &mut StepTimer::new(), || Ok(()))
                 .unwrap()
                 .terms;
             let l = &settings.lambda;
