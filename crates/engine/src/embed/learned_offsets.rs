@@ -7,7 +7,7 @@ use crate::splat::{Changes, Learnable};
 /// Slots that one task quantises.
 const CHUNK: usize = 512;
 
-/// LearnedOffsets changes of a scene's colours.
+/// Learned changes of a scene's colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearnedOffsets {
     /// Which coefficients they are for.

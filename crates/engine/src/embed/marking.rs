@@ -37,7 +37,7 @@ pub struct Outcome {
     pub steps: usize,
     /// Views drawn in all steps.
     pub view_steps: usize,
-    /// MemoryRequirements that was predicted.
+    /// Memory that was predicted.
     pub memory: MemoryRequirements,
     /// Gaussians of the scene.
     pub gaussians: usize,
