@@ -15,7 +15,7 @@ CARDS = {
     "RTX 4090": (82e12, 1.0e12, 25e9),
     "L4": (30e12, 0.3e12, 25e9),
 }
-VIEWS, FRESH, SIDE, TILE = 8, 4, 160, 256
+VIEWS, FRESH, SIDE, TILE = 8, 2, 160, 256
 PIXELS = VIEWS * SIDE * SIDE
 SINES = 34.4e6  # Of all views, in each direction (docs/performance.md).
 

@@ -24,7 +24,7 @@ use crate::scene::Scene;
 use crate::splat::{Changes, Learnable, PreparedView, sh};
 
 /// dB that held-out views may lack of the target without more steps: to hold them takes bits.
-const SHORT_DB: f64 = 0.5;
+const SHORT_DB: f64 = 1.5;
 
 /// What moves the offsets.
 pub(super) enum OptimizerState {
