@@ -83,7 +83,7 @@ impl Preset {
                 temperature: 4.0,
             }),
             views_per_step: 8,
-            // As many more cost a fifth of the time and bring nothing (docs/evaluation.md).
+            // As many more cost a fifth of the time and bring nothing (docs/performance.md).
             fresh_per_step: 2,
             views: None,
             ring: None,
@@ -166,6 +166,8 @@ impl Preset {
             Self::Standard => standard,
             Self::Draft => Settings {
                 steps: 80,
+                // In so few steps half as many fresh views are too few.
+                fresh_per_step: 4,
                 // Hard scenes would be refused otherwise, and still take less than with standard.
                 extension: standard.extension.map(|extension| Extension {
                     after: 50,
