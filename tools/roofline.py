@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a step of `standard` would take on a card if nothing but its arithmetic and its memory counted, and what the host needs.
 
-    python3 tools/roofline.py [--visible 101172 --pairs 132211 --gaussians 101407 --columns 3]
+    python3 tools/roofline.py [--visible 101172 --pairs 132211 --gaussians 101407 --columns 48]
 
 `visible` and `pairs` are Gaussians and (Gaussian, tile) pairs of a view of 160 px, as `--example bench_views` prints them;
 `columns` are the numbers that are learned of a Gaussian: 3 of degree 0, 48 of degree 3. Prints Markdown. FLOPs are counted
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--visible", type=float, default=101_172)
     parser.add_argument("--pairs", type=float, default=132_211)
     parser.add_argument("--gaussians", type=float, default=101_407)
-    parser.add_argument("--columns", type=float, default=3)
+    parser.add_argument("--columns", type=float, default=48)
     parser.add_argument("--launches", type=float, default=161)
     parser.add_argument("--launch-us", type=float, default=60, help="of the host for one: launching by a step's log, over launches")
     parser.add_argument("--copy", type=float, default=5e9, help="bytes a second that the host copies to where the card fetches them")
