@@ -118,6 +118,8 @@ pub fn forecast(
     let psnr = settings.balance.map(|balance| {
         let yields = balance.yielding.is_some_and(|yielding| bit_accuracy < yielding.below);
         let whole = balance.target_psnr_db - HELD_OUT_DB - if yields { YIELDED_DB } else { 0.0 };
+        // A mark with less is held weaker while it is made.
+        let whole = whole.max(settings.target.psnr_db);
         let of_whole = 10.0 * found.covered.max(f64::MIN_POSITIVE).log10();
         let least = balance.covered_psnr_db.map(|db| db - HELD_OUT_DB - of_whole);
         let whole = least
