@@ -39,7 +39,7 @@ pub struct Arguments {
     /// common is done once for all
     #[arg(long, value_name = "FILE", conflicts_with_all = ["message", "credentials"])]
     messages: Option<PathBuf>,
-    /// Copies that are marked at a time, as memory allows
+    /// Copies that are marked at a time; each takes memory
     #[arg(long, value_name = "N", default_value_t = 8, requires = "messages", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub(super) together: u8,
     /// draft, standard, robust, thorough or paper

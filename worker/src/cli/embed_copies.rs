@@ -85,10 +85,12 @@ pub fn run(arguments: &Arguments, engine: &Engine, key: &Key, job: &Job<'_>, cop
         watched.display.finish();
         // Each has its share of the time.
         let seconds = start.elapsed().as_secs_f64() / copies.len() as f64;
-        for (copy, outcome) in copies.iter().zip(outcomes) {
+        for (copy, mut outcome) in copies.iter().zip(outcomes) {
             if let Some(folder) = &arguments.report {
                 write_report(&folder.join(copy.message.to_string()), &outcome.verification)?;
             }
+            // A file may ask for more copies than memory has room for the pictures of.
+            outcome.verification.pairs = Vec::new();
             told.push((outcome, seconds));
         }
     }
@@ -170,7 +172,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// The slowest copy's step, and the figures of all.
+    /// The step that all are at, or were, and the mean figures.
     fn show_steps(&mut self) {
         let steps: Vec<&Step> = self.steps.iter().flatten().collect();
         let (Some(step), Some(total)) = (
