@@ -29,7 +29,7 @@ class Camera:
 
 
 CamerasFrom = Union[str, "os.PathLike[str]", Iterable[Camera], None]
-"""A file (cameras.json or transforms.json), a folder of COLMAP, cameras, or none."""
+"""A file (cameras.json, transforms.json or a glTF), a folder of COLMAP, cameras, or none."""
 
 
 def from_numbers(numbers: _engine.CameraNumbers) -> Camera:
@@ -82,7 +82,7 @@ def to_engine(cameras: CamerasFrom) -> str | list[_engine.CameraNumbers] | None:
 
 
 def read_cameras(path: str | os.PathLike[str]) -> list[Camera]:
-    """Reads cameras of a file (``cameras.json`` of 3DGS, ``transforms.json`` of NeRF) or a folder of COLMAP."""
+    """Reads cameras of a file (``cameras.json`` of 3DGS, ``transforms.json`` of NeRF, a glTF) or a folder of COLMAP."""
     return [from_numbers(numbers) for numbers in _engine.read_cameras(os.fspath(path))]
 
 

@@ -51,7 +51,7 @@ pub fn numbers(camera: &Camera) -> Numbers {
     (camera.width, camera.height, [fx, fy, cx, cy], rotation, translation)
 }
 
-/// Cameras of a file (cameras.json or transforms.json), or of a folder of COLMAP.
+/// Cameras of a file (cameras.json, transforms.json or a glTF), or of a folder of COLMAP.
 #[pyfunction]
 pub fn read_cameras(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Numbers>> {
     let read = py.detach(|| guardsplat_engine::view::read_cameras(&path));

@@ -85,7 +85,7 @@ pub struct Arguments {
         hide_possible_values = true
     )]
     robust_to: Vec<Distortion>,
-    /// Where the scene's viewers are: cameras.json (3DGS) or transforms.json (NeRF), or artifacts/ID
+    /// Where the scene's viewers are: cameras.json (3DGS), transforms.json (NeRF), a glTF, or artifacts/ID
     #[arg(long, value_name = "FILE")]
     cameras: Option<String>,
     /// The kind of scene, which says where its viewers are; found from the scene unless given

@@ -34,6 +34,7 @@ pub use atomic_write::{write_folder_whole, write_whole};
 pub use container::Format;
 pub use error::{Error, Result};
 pub use gaussians::{Gaussians, MAX_DEGREE, Sh};
+pub use gltf::{GltfCamera, gltf_cameras, is_binary_gltf};
 pub use ignored::{BadRows, Ignored};
 pub use scene::Scene;
 pub use sniff::{HEAD, is_loose_sog, sniff, summary};

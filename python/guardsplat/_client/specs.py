@@ -51,7 +51,7 @@ class Embed(Submission, total=False):
     size: int
     """Side of training views in pixels."""
     cameras: FileOrArtifact
-    """Where the scene's viewers are: cameras.json or transforms.json."""
+    """Where the scene's viewers are: cameras.json, transforms.json or a glTF."""
     kind: str
     """``object``, ``room``, ``terrain`` or ``forward``."""
     robust_to: str | Iterable[str]

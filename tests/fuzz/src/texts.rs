@@ -6,7 +6,7 @@ use guardsplat_engine::view::parse_cameras;
 use guardsplat_soft_binding::resolution::{self, Question};
 use guardsplat_soft_binding::{BindingKey, Value};
 
-/// `cameras.json` and `transforms.json`.
+/// `cameras.json`, `transforms.json`, and the cameras of a glTF.
 pub fn cameras(data: &[u8]) {
     for camera in bounded(data.len(), || parse_cameras(data)).unwrap_or_default() {
         let numbers = [camera.fx, camera.fy, camera.cx, camera.cy]

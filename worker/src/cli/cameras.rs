@@ -9,7 +9,7 @@ use super::{Exit, print_line};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Cameras: cameras.json (3DGS), transforms.json (NeRF), or a folder of COLMAP with cameras and images (.bin or .txt)
+    /// Cameras: cameras.json (3DGS), transforms.json (NeRF), a glTF (.gltf or .glb), or a folder of COLMAP with cameras and images (.bin or .txt)
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// The file to write: transforms.json where its name has `transforms` in it, else cameras.json

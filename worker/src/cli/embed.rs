@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Trains on views on a circle at this elevation in degrees, as the paper's public code does, instead of over the sphere
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     ring: Option<f32>,
-    /// Where the scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP: training views are around and between
+    /// Where the scene's viewers are, from a file (cameras.json, transforms.json or a glTF) or a folder of COLMAP: training views are around and between
     /// these, and every eighth is held out
     #[arg(long, value_name = "FILE", conflicts_with = "ring")]
     cameras: Option<PathBuf>,

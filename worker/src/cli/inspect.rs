@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Counts the Gaussians that so many training views show; takes a while
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: Option<u32>,
-    /// Where the scene's viewers are, as for `embed`: a file (cameras.json or transforms.json), or a folder of COLMAP
+    /// Where the scene's viewers are, as for `embed`: a file (cameras.json, transforms.json or a glTF), or a folder of COLMAP
     #[arg(long, value_name = "PATH")]
     cameras: Option<PathBuf>,
     /// The kind of scene, which says where its viewers are; found from the scene unless given

@@ -34,7 +34,7 @@ pub struct Arguments {
     /// How many views; with --cameras, its first ones, all unless given
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), required_unless_present = "cameras")]
     views: Option<u32>,
-    /// Cameras from a file (cameras.json or transforms.json) or a folder of COLMAP instead of ones where viewers of such a scene are
+    /// Cameras from a file (cameras.json, transforms.json or a glTF) or a folder of COLMAP instead of ones where viewers of such a scene are
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
     /// The kind of scene, which says where its viewers are; found from the scene unless given

@@ -43,7 +43,7 @@ pub struct Arguments {
     /// What is behind a scene, or shows through transparent pixels
     #[arg(long, value_enum, default_value = "white")]
     background: Background,
-    /// Where a scene's viewers are, from a file (cameras.json or transforms.json) or a folder of COLMAP, as `embed` was told
+    /// Where a scene's viewers are, from a file (cameras.json, transforms.json or a glTF) or a folder of COLMAP, as `embed` was told
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
     /// The kind of scene, which says where its viewers are; found from the scene unless given

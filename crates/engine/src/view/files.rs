@@ -1,15 +1,16 @@
-//! Camera files: `cameras.json` of the 3DGS reference implementation and `transforms.json` of NeRF.
+//! Camera files: `cameras.json` of the 3DGS reference implementation, `transforms.json` of NeRF, and the cameras of a glTF.
 //!
-//! Both store camera-to-world poses. `cameras.json` is an array whose entries have `position` and `rotation` (rows;
+//! The first two store camera-to-world poses. `cameras.json` is an array whose entries have `position` and `rotation` (rows;
 //! camera axes x right, y down, z forward are its columns), `width`, `height`, `fx`, `fy`. `transforms.json` is an
 //! object with `frames`, each a `transform_matrix` whose camera axes are those of OpenGL (x right, y up, z backward),
-//! and intrinsics for all frames or one: `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`.
+//! and intrinsics for all frames or one: `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`. A glTF has OpenGL's axes too, and
+//! no pixels: pictures are taken to be 800 high.
 use super::camera::Camera;
 use super::colmap;
 use super::json::{self, Fields, Length, List, Outline, Scalar};
 use super::vector::{cross, dot};
 use crate::error::{Error, Result};
-use crate::scene::write_whole;
+use crate::scene::{GltfCamera, gltf_cameras, is_binary_gltf, write_whole};
 use serde_json::{Value, json};
 use std::io::Read;
 use std::path::Path;
@@ -20,17 +21,17 @@ const MAX_FILE: u64 = 64 << 20;
 const MIN_ENTRY: usize = 60;
 /// Widest and highest picture, pixels.
 const MAX_SIDE: f64 = 16384.0;
-/// Side of a picture of the NeRF synthetic set, whose files do not state it.
-const BLENDER_SIDE: f64 = 800.0;
+/// Side of a picture where files do not state it: that of the NeRF synthetic set.
+const UNSTATED_SIDE: f64 = 800.0;
 
-/// Reads cameras of either kind, told apart by their contents; of a folder, those of a COLMAP model.
+/// Reads cameras of any kind, told apart by their contents; of a folder, those of a COLMAP model.
 ///
 /// Principal points that are not stated are the centre; sizes that a `transforms.json` does not state are 800 by 800,
-/// those of the NeRF synthetic set.
+/// those of the NeRF synthetic set. A glTF may be the scene itself; its perspective cameras are read.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::BadCameras`] naming the camera and the field: not JSON, over 64 MiB, neither kind, no
-/// camera in it, a field missing or not a finite number, a side outside 1 to 16384, a focal length not above zero, a
+/// [`Error::Io`], or [`Error::BadCameras`] naming the camera and the field: not JSON, over 64 MiB (but for a binary glTF), no
+/// kind of these, no camera in it, a field missing or not a finite number, a side outside 1 to 16384, a focal length not above zero, a
 /// rotation that is none (unequal or skewed axes, a mirror).
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>> {
     if path.is_dir() {
@@ -45,7 +46,8 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>> {
     file.take(MAX_FILE + 1)
         .read_to_end(&mut text)
         .map_err(Error::io(path))?;
-    if text.len() as u64 > MAX_FILE {
+    // Of a binary glTF what counts comes first.
+    if text.len() as u64 > MAX_FILE && !is_binary_gltf(&text) {
         return Err(bad(format!("longer than the limit of {MAX_FILE} bytes")));
     }
     parse_cameras(&text).map_err(bad)
@@ -73,19 +75,23 @@ pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<()> {
     Ok(())
 }
 
-/// Reads cameras of either kind from a file's text. Entries are read one by one: only the cameras are kept, not the
+/// Reads cameras of any kind from a file's bytes. Entries are read one by one: only the cameras are kept, not the
 /// JSON, which would take many times its text. `Err` is the reason why not.
 pub fn parse_cameras(text: &[u8]) -> Result<Vec<Camera>, String> {
+    if is_binary_gltf(text) {
+        return from_gltf(text);
+    }
     let outline = json::outline(text)?;
     let (count, shared) = match &outline {
         Outline::Array(count) => (*count, None),
+        Outline::Object(shared) if shared.asset.is_some() => return from_gltf(text),
         Outline::Object(shared) => match shared.frames {
             Some(Length(Some(count))) => (count, Some(&**shared)),
             _ => {
-                return Err("neither cameras.json (an array) nor transforms.json (with \"frames\")".into());
+                return Err("no cameras.json (an array), transforms.json (with \"frames\") or glTF (with \"asset\")".into());
             }
         },
-        Outline::Other => return Err("neither cameras.json (an array) nor transforms.json (an object)".into()),
+        Outline::Other => return Err("no cameras.json (an array), and no transforms.json or glTF (objects)".into()),
     };
     if count == 0 {
         return Err("has no cameras".into());
@@ -101,6 +107,30 @@ pub fn parse_cameras(text: &[u8]) -> Result<Vec<Camera>, String> {
         Ok(())
     })?;
     Ok(cameras)
+}
+
+/// The cameras that a glTF shows.
+fn from_gltf(file: &[u8]) -> Result<Vec<Camera>, String> {
+    let cameras = gltf_cameras(file)?;
+    if cameras.is_empty() {
+        return Err("a glTF without a perspective camera in its scene".into());
+    }
+    let each = cameras.iter().enumerate();
+    each.map(|(i, camera)| from_gltf_camera(camera).map_err(|reason| format!("camera {i}: {reason}")))
+        .collect()
+}
+
+fn from_gltf_camera(camera: &GltfCamera) -> Result<Camera, String> {
+    let [x, y, z] = camera.axes;
+    let focal = 0.5 * UNSTATED_SIDE / (0.5 * camera.field_of_view).tan();
+    let width = (UNSTATED_SIDE * camera.aspect_ratio.unwrap_or(1.0)).round();
+    assemble(
+        [x, y.map(|v| -v), z.map(|v| -v)],
+        camera.position,
+        [focal; 2],
+        [None; 2],
+        [width, UNSTATED_SIDE],
+    )
 }
 
 fn from_entry(own: &Fields) -> Result<Camera, String> {
@@ -127,8 +157,8 @@ fn from_frame(own: &Fields, shared: &Fields) -> Result<Camera, String> {
     // OpenGL's y is up and its z backward.
     let axes = [(0, 1.0), (1, -1.0), (2, -1.0)].map(|(k, sign)| [0, 1, 2].map(|r| sign * rows[r][k]));
     let position = [rows[0][3], rows[1][3], rows[2][3]];
-    let width = find(|f| &f.w, "w")?.unwrap_or(BLENDER_SIDE);
-    let height = find(|f| &f.h, "h")?.unwrap_or(BLENDER_SIDE);
+    let width = find(|f| &f.w, "w")?.unwrap_or(UNSTATED_SIDE);
+    let height = find(|f| &f.h, "h")?.unwrap_or(UNSTATED_SIDE);
     let from_angle = |angle: Option<f64>, side: f64| angle.map(|angle| 0.5 * side / (0.5 * angle).tan());
     let fx = find(|f| &f.fl_x, "fl_x")?
         .or(from_angle(find(|f| &f.camera_angle_x, "camera_angle_x")?, width))
@@ -328,6 +358,58 @@ mod tests {
         assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (40.0, 30.0, 5.0, 10.0));
     }
 
+    /// Two cameras, one of them under a node that turns, scales and shifts, and one that no scene shows.
+    const GLTF: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2]}],
+        "nodes": [{"rotation": [0, 0, 0.7071067811865476, 0.7071067811865476], "scale": [2, 2, 2], "translation": [1, 0, 0],
+            "children": [1]}, {"camera": 1, "translation": [0, 0, 3]}, {"camera": 0, "name": "eye"}, {"camera": 1}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1.0, "aspectRatio": 1.5, "znear": 0.1}},
+            {"type": "perspective", "perspective": {"yfov": 0.6911112, "znear": 0.1}}]}"#;
+
+    /// As a binary file of which only the beginning is there.
+    fn binary(json: &str) -> Vec<u8> {
+        let words = [2, 1 << 30, json.len() as u32].map(u32::to_le_bytes).concat();
+        [b"glTF", &words[..], b"JSON", json.as_bytes(), &[9; 8]].concat()
+    }
+
+    #[test]
+    fn cameras_of_a_gltf_are_where_its_nodes_put_them() {
+        for file in [GLTF.as_bytes().to_vec(), binary(GLTF)] {
+            let [turned, eye] = parse_cameras(&file).unwrap().try_into().unwrap();
+            // Looks along -z from (1, 0, 6), a quarter turn about z: right is the world's y, up its -x.
+            assert_eq!(turned.centre().map(|v| (v * 1e3).round()), [1e3, 0.0, 6e3]);
+            let seen = turned.to_camera([1.5, 0.25, 4.0]).map(|v| (v * 1e3).round());
+            assert_eq!(seen, [250.0, 500.0, 2000.0]);
+            assert_eq!((turned.width, turned.height), (800, 800));
+            assert!((turned.fx - 1111.11).abs() < 0.1 && turned.fx == turned.fy);
+            assert_eq!((eye.width, eye.height), (1200, 800));
+            assert_eq!(eye.to_camera([1.0, 2.0, -4.0]), [1.0, -2.0, 4.0]);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_gltf_is_named() {
+        for (from, to, expected) in [
+            ("\"camera\": 0", "\"camera\": 7", "node 2 (\"eye\"): camera 7 of 2"),
+            ("1.0,", "4.0,", "yfov is 4, must be"),
+            ("1.5", "0", "aspectRatio is 0, must be"),
+            ("1.5", "99", "width is 79200, must be"),
+            ("[2, 2, 2]", "[2, 0, 2]", "a scale of 0; must be"),
+            ("[2, 2, 2]", "[2, -2, 2]", "camera 0: its rotation is not one"),
+            ("\"2.0\"", "\"1.0\"", "version 2.0 is read"),
+            ("\"children\": [1]", "\"children\": [0]", "node 0 is in the scene twice"),
+            ("[0, 2]", "[]", "without a perspective camera"),
+        ] {
+            let reason = parse_cameras(GLTF.replacen(from, to, 1).as_bytes()).unwrap_err();
+            assert!(reason.contains(expected), "{reason} does not have {expected}");
+        }
+        let orthographic = GLTF.replace("\"perspective\": {", "\"orthographic\": {");
+        let reason = parse_cameras(orthographic.as_bytes()).unwrap_err();
+        assert!(reason.contains("without a perspective camera"), "{reason}");
+        for bytes in [&binary(GLTF)[..30], &binary(GLTF)[..8], b"glTF"] {
+            assert!(parse_cameras(bytes).unwrap_err().contains("truncated"));
+        }
+    }
+
     #[test]
     fn what_is_wrong_is_named() {
         let good = r#"[{"width": 10, "height": 20, "position": [1, 2, 3],
@@ -353,8 +435,8 @@ mod tests {
         }
         for (text, expected) in [
             ("[]", "no cameras"),
-            ("{}", "neither"),
-            ("3", "neither"),
+            ("{}", "no cameras.json"),
+            ("3", "no cameras.json"),
             ("[1]", "camera 0"),
         ] {
             let reason = parse_cameras(text.as_bytes()).unwrap_err();

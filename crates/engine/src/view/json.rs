@@ -24,6 +24,8 @@ pub(super) enum Outline {
 #[derive(Deserialize)]
 #[serde(expecting = "an object")]
 pub(super) struct Fields {
+    /// That of a glTF.
+    pub asset: Option<IgnoredAny>,
     pub frames: Option<Length>,
     pub position: Option<List<Scalar, 3>>,
     pub rotation: Option<List<List<Scalar, 3>, 3>>,

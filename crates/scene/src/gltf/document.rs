@@ -22,6 +22,8 @@ pub(super) struct Document<'a> {
     #[serde(default, deserialize_with = "limited")]
     pub meshes: Vec<Mesh>,
     #[serde(default, deserialize_with = "limited")]
+    pub cameras: Vec<Camera>,
+    #[serde(default, deserialize_with = "limited")]
     pub accessors: Vec<Accessor>,
     #[serde(default, deserialize_with = "limited")]
     pub buffer_views: Vec<BufferView>,
@@ -48,6 +50,7 @@ pub(super) struct Node {
     #[serde(default)]
     pub children: Vec<u32>,
     pub mesh: Option<usize>,
+    pub camera: Option<usize>,
     pub skin: Option<IgnoredAny>,
     /// Column by column.
     pub matrix: Option<Box<[f64; 16]>>,
@@ -63,6 +66,22 @@ pub(super) struct Node {
 pub(super) struct NodeExtensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub instancing: Option<IgnoredAny>,
+}
+
+/// How a picture is taken.
+#[derive(Deserialize)]
+pub(super) struct Camera {
+    /// `None` for an orthographic one.
+    pub perspective: Option<Perspective>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Perspective {
+    /// Radians from the lower to the upper edge.
+    pub yfov: f64,
+    /// Width over height.
+    pub aspect_ratio: Option<f64>,
 }
 
 /// Numbers in a buffer view.

@@ -6,6 +6,8 @@ use std::ops::Range;
 
 /// The first bytes of a binary file.
 pub(super) const MAGIC: [u8; 4] = *b"glTF";
+/// What a text may begin with.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Bytes before the first chunk.
 pub(super) const HEADER: usize = 12;
 /// Bytes before the data of a chunk: its length, its type.
@@ -35,19 +37,10 @@ impl Envelope {
             (Format::Glb, text, binary)
         } else {
             // A byte order mark should not be there, and may be.
-            let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+            let start = if file.starts_with(BYTE_ORDER_MARK) { 3 } else { 0 };
             (Format::Gltf, start..file.len(), None)
         };
-        if let Err(error) = std::str::from_utf8(&file[text.clone()]) {
-            let place = text.start + error.valid_up_to();
-            return Err(format!("not a glTF scene: byte {place} of its JSON is not UTF-8"));
-        }
-        let json = spans::besides_data(&file[text.clone()]);
-        if json > MOST_JSON {
-            return Err(format!(
-                "{json} bytes of JSON besides the buffers in it; the limit is {MOST_JSON}"
-            ));
-        }
+        checked(&file, text.clone())?;
         Ok(Envelope {
             format,
             file,
@@ -87,25 +80,61 @@ impl Envelope {
     }
 }
 
-/// The ranges of the JSON and of the first buffer, if there is one.
-fn chunks(file: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), String> {
+/// The JSON of a file, of which what comes after it need not be there; `Err` is the reason why not.
+pub(super) fn json(file: &[u8]) -> Result<&str, String> {
+    if !file.starts_with(&MAGIC) {
+        let start = if file.starts_with(BYTE_ORDER_MARK) { 3 } else { 0 };
+        return checked(file, start..file.len());
+    }
+    version(file)?;
+    checked(file, json_chunk(file, file.len())?)
+}
+
+/// The JSON in these bytes of a file.
+fn checked(file: &[u8], text: Range<usize>) -> Result<&str, String> {
+    let start = text.start;
+    let text = std::str::from_utf8(&file[text]).map_err(|error| {
+        let place = start + error.valid_up_to();
+        format!("not a glTF scene: byte {place} of its JSON is not UTF-8")
+    })?;
+    let json = spans::besides_data(text.as_bytes());
+    if json > MOST_JSON {
+        return Err(format!(
+            "{json} bytes of JSON besides the buffers in it; the limit is {MOST_JSON}"
+        ));
+    }
+    Ok(text)
+}
+
+/// Looks at the header of a binary file.
+fn version(file: &[u8]) -> Result<(), String> {
     let there = file.len();
     if there < HEADER {
         return Err(format!("truncated: {there} bytes of a header of {HEADER}"));
     }
-    let (version, length) = (word(file, 4), word(file, 8) as usize);
-    if version != 2 {
-        return Err(format!("binary glTF of version {version}; version 2 is read"));
+    match word(file, 4) {
+        2 => Ok(()),
+        version => Err(format!("binary glTF of version {version}; version 2 is read")),
     }
+}
+
+/// Where the JSON of a binary file that ends at `end` is.
+fn json_chunk(file: &[u8], end: usize) -> Result<Range<usize>, String> {
+    let text = chunk(file, HEADER, end)?.filter(|(kind, _)| *kind == JSON);
+    let (_, text) = text.ok_or("the first chunk of a binary glTF must be its JSON")?;
+    Ok(text)
+}
+
+/// The ranges of the JSON and of the first buffer, if there is one.
+fn chunks(file: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), String> {
+    version(file)?;
+    let (there, length) = (file.len(), word(file, 8) as usize);
     if length > there {
         return Err(format!(
             "truncated: the header promises {length} bytes, {there} are there"
         ));
     }
-    let text = chunk(file, HEADER, length)?.filter(|(kind, _)| *kind == JSON);
-    let Some((_, text)) = text else {
-        return Err("the first chunk of a binary glTF must be its JSON".into());
-    };
+    let text = json_chunk(file, length)?;
     let binary = chunk(file, text.end, length)?.filter(|(kind, _)| *kind == BINARY);
     Ok((text, binary.map(|(_, data)| data)))
 }

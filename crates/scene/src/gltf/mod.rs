@@ -14,6 +14,7 @@
 //! names have a colon, and it keeps no place of anything in the text.
 mod accessor;
 mod buffers;
+mod cameras;
 mod document;
 mod envelope;
 mod harmonics;
@@ -27,6 +28,7 @@ mod splats;
 mod splice;
 mod write;
 
+pub use cameras::{GltfCamera, gltf_cameras, is_binary_gltf};
 pub(crate) use harmonics::Turn;
 pub(crate) use placement::{Placement, matrix};
 

@@ -7,7 +7,7 @@ use crate::fields::quote;
 const ROUNDING: f64 = 1e-4;
 
 /// A transformation as nodes have it: the upper three rows of its matrix.
-type Affine = [[f64; 4]; 3];
+pub(super) type Affine = [[f64; 4]; 3];
 
 const NOWHERE: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
@@ -115,12 +115,13 @@ impl Placement {
     }
 }
 
-/// Where each mesh with splats is, `None` for those that the scene shows nowhere; `Err` names the node, and what can't
-/// be.
-pub(super) fn placements(document: &Document<'_>) -> Result<Vec<Option<Placement>>, String> {
+/// Hands every node that the scene shows to `each`, with where it is, parents before their children; `Err` names a node that
+/// is not there or twice, or is a reason of `each`.
+pub(super) fn for_each_shown<'d>(
+    document: &'d Document<'_>,
+    mut each: impl FnMut(usize, &'d Node, &Affine) -> Result<(), String>,
+) -> Result<(), String> {
     let nodes = &document.nodes;
-    let mut placements: Vec<Option<Placement>> = vec![None; document.meshes.len()];
-    let mut places: Vec<usize> = vec![usize::MAX; document.meshes.len()];
     let mut visited = vec![false; nodes.len()];
     let mut open: Vec<(usize, Affine)> = roots(document)?.into_iter().rev().map(|root| (root, NOWHERE)).collect();
     while let Some((index, parent)) = open.pop() {
@@ -132,33 +133,42 @@ pub(super) fn placements(document: &Document<'_>) -> Result<Vec<Option<Placement
         }
         let here = product(&parent, &transformation(node));
         open.extend(node.children.iter().rev().map(|child| (*child as usize, here)));
-        let Some(mesh) = node.mesh else { continue };
-        let of = |reason: String| match &node.name {
+        each(index, node, &here).map_err(|reason| match &node.name {
             Some(name) => format!("node {index} ({:?}): {reason}", quote(name)),
             None => format!("node {index}: {reason}"),
-        };
+        })?;
+    }
+    Ok(())
+}
+
+/// Where each mesh with splats is, `None` for those that the scene shows nowhere; `Err` names the node, and what can't
+/// be.
+pub(super) fn placements(document: &Document<'_>) -> Result<Vec<Option<Placement>>, String> {
+    let mut placements: Vec<Option<Placement>> = vec![None; document.meshes.len()];
+    let mut places: Vec<usize> = vec![usize::MAX; document.meshes.len()];
+    for_each_shown(document, |index, node, here| {
+        let Some(mesh) = node.mesh else { return Ok(()) };
         match document.meshes.get(mesh) {
-            None => return Err(of(format!("mesh {mesh} of {}", document.meshes.len()))),
-            Some(found) if found.splats.is_empty() => continue,
+            None => return Err(format!("mesh {mesh} of {}", document.meshes.len())),
+            Some(found) if found.splats.is_empty() => return Ok(()),
             Some(_) => (),
         }
         if node.skin.is_some() {
-            return Err(of("skin: splats that bend are not read".into()));
+            return Err("skin: splats that bend are not read".into());
         }
         if node.extensions.instancing.is_some() {
-            return Err(of(
-                "EXT_mesh_gpu_instancing: splats at several places at once are not read".into(),
-            ));
+            return Err("EXT_mesh_gpu_instancing: splats at several places at once are not read".into());
         }
         if placements[mesh].is_some() {
             let first = places[mesh];
-            return Err(of(format!(
+            return Err(format!(
                 "mesh {mesh} of splats is at node {first} too; splats at several places at once are not read"
-            )));
+            ));
         }
-        placements[mesh] = Some(Placement::new(&here).map_err(of)?);
+        placements[mesh] = Some(Placement::new(here)?);
         places[mesh] = index;
-    }
+        Ok(())
+    })?;
     Ok(placements)
 }
 
