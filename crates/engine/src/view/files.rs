@@ -88,7 +88,9 @@ pub fn parse_cameras(text: &[u8]) -> Result<Vec<Camera>, String> {
         Outline::Object(shared) => match shared.frames {
             Some(Length(Some(count))) => (count, Some(&**shared)),
             _ => {
-                return Err("no cameras.json (an array), transforms.json (with \"frames\") or glTF (with \"asset\")".into());
+                return Err(
+                    "no cameras.json (an array), transforms.json (with \"frames\") or glTF (with \"asset\")".into(),
+                );
             }
         },
         Outline::Other => return Err("no cameras.json (an array), and no transforms.json or glTF (objects)".into()),

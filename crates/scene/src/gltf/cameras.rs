@@ -45,7 +45,9 @@ pub fn gltf_cameras(file: &[u8]) -> Result<Vec<GltfCamera>, String> {
         for axis in &mut axes {
             let length = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
             if !(length.is_finite() && length > 0.0) {
-                return Err(format!("camera {index}: a scale of {length}; must be finite and more than 0"));
+                return Err(format!(
+                    "camera {index}: a scale of {length}; must be finite and more than 0"
+                ));
             }
             *axis = axis.map(|v| v / length);
         }
