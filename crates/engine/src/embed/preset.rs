@@ -122,7 +122,7 @@ impl Preset {
                 // Beyond that a mark is changed by more turns of the shipped CLIP's sines than it gains by.
                 covered_psnr_db: Some(33.7),
                 target_ssim: Some(0.993),
-                // Most marks of 32 bits don't need it; rooms do, and of 64 bits smooth scenes (docs/evaluation.md).
+                // Most marks of 32 bits don't need it; rooms do, and of 64 bits smooth scenes (docs/scenes-and-views.md).
                 yielding: Some(TargetRelaxation {
                     below: 0.97,
                     psnr_db: 2.0,

@@ -5,6 +5,7 @@ mod directions;
 mod extent;
 mod files;
 mod given;
+mod gltf;
 mod inside;
 mod json;
 mod kind;
