@@ -39,6 +39,19 @@ pub(super) fn gamma(picture: RgbImage, exponent: f64) -> RgbImage {
     by_table(picture, |value| 255.0 * (value / 255.0).powf(exponent))
 }
 
+/// Black moved to `black`, of 1, and white kept.
+pub(super) fn fade(picture: RgbImage, black: f64) -> RgbImage {
+    by_table(picture, |value| 255.0 * black + (1.0 - black) * value)
+}
+
+/// Values bent by an S; black, white and the middle stay.
+pub(super) fn curve(picture: RgbImage, bend: f64) -> RgbImage {
+    use std::f64::consts::TAU;
+    by_table(picture, |value| {
+        value - 255.0 * bend * (TAU * value / 255.0).sin() / TAU
+    })
+}
+
 /// Values rounded to 2^`bits` steps of equal distance from 0 to 255.
 pub(super) fn bits(picture: RgbImage, bits: u32) -> RgbImage {
     let top = f64::from((1u32 << bits.min(8)) - 1);

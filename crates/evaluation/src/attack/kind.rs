@@ -59,6 +59,12 @@ pub enum AttackKind {
     Contrast,
     /// Values of [0, 1] to this power.
     Gamma,
+    /// Black lifted to this and white kept, as faded pictures and filters have it; below 0 levels are stretched to black, as
+    /// programs that correct contrast by themselves do.
+    Fade,
+    /// Values x of [0, 1] become `x - s sin(2 pi x) / (2 pi)`: an S, with more contrast in the middle, as sliders and filters of
+    /// photo editors bend curves.
+    Curve,
     /// Hue (of HSV) shifted by this share of the colour circle.
     Hue,
     /// Distance of each pixel from its grey times this, as torchvision's `adjust_saturation`.
@@ -75,7 +81,7 @@ pub enum AttackKind {
 
 impl AttackKind {
     /// Every kind, in the order of the docs.
-    pub const ALL: [Self; 31] = [
+    pub const ALL: [Self; 33] = [
         Self::Jpeg,
         Self::Webp,
         Self::JpegTurbo,
@@ -101,6 +107,8 @@ impl AttackKind {
         Self::Vignette,
         Self::Contrast,
         Self::Gamma,
+        Self::Fade,
+        Self::Curve,
         Self::Hue,
         Self::Saturation,
         Self::Grey,
@@ -152,6 +160,8 @@ impl AttackKind {
             Self::Vignette => ("vignette", real(0.0, 1.0, 0.0)),
             Self::Contrast => ("contrast", real(0.0, 10.0, 1.0)),
             Self::Gamma => ("gamma", real(0.1, 10.0, 1.0)),
+            Self::Fade => ("fade", real(-1.0, 1.0, 0.0)),
+            Self::Curve => ("curve", real(-1.0, 1.0, 0.0)),
             Self::Hue => ("hue", real(-1.0, 1.0, 0.0)),
             Self::Saturation => ("saturation", real(0.0, 10.0, 1.0)),
             Self::Grey => ("grey", None),

@@ -128,6 +128,8 @@ impl Step {
             AttackKind::Vignette => colour::vignette(picture, value),
             AttackKind::Contrast => colour::contrast(picture, value),
             AttackKind::Gamma => colour::gamma(picture, value),
+            AttackKind::Fade => colour::fade(picture, value),
+            AttackKind::Curve => colour::curve(picture, value),
             AttackKind::Hue => colour::hue(picture, value),
             AttackKind::Saturation => colour::saturation(picture, value),
             AttackKind::Grey => colour::saturation(picture, 0.0),

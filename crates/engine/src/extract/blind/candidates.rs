@@ -1,12 +1,13 @@
 //! All candidates for what was done to one picture, over its parts and changes of tones, as the search goes on.
 use super::parts::Part;
+use super::prior::Prior;
 use super::sample::Sample;
 use super::score::{self, Spread};
 use super::search::{self, Read};
 use super::{BATCH, Candidate, joint, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
-use crate::extract::photometric::{ToneChange, ground};
+use crate::extract::photometric::{ToneChange, ground, white_balance};
 use crate::picture::Picture;
 
 /// Logits of each picture.
@@ -65,6 +66,7 @@ impl<'a> Search<'a> {
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn sweep(&mut self, place: usize, hints: &[ToneChange]) -> Result<()> {
         let ((part, small), whole) = (&self.parts[place], self.whole);
+        let prior = Prior::of(small, whole);
         let ground = ground::colour(small);
         let anchor = ground.map(|ground| move |change: ToneChange| change.with_white(ground, whole));
         let anchor = anchor
@@ -74,15 +76,23 @@ impl<'a> Search<'a> {
         let square = self.engine.extractor.square();
         if let Some(sample) = square.and_then(|side| Sample::of(small, side)) {
             changes.extend(search::tinted());
+            if let Some(ground) = ground {
+                changes.extend(search::half_told(white_balance::told(ground)));
+                changes.extend(search::overlays(ground));
+            }
             let undone = |change: &ToneChange| sample.undone(change, whole);
-            let mut rough = search::tried(&mut reader(self.engine, undone, Engine::read_square_logits), &changes)?;
+            let mut rough = search::tried(
+                &mut reader(self.engine, undone, Engine::read_square_logits),
+                &prior,
+                &changes,
+            )?;
             self.spread = Spread::of(rough.iter().map(|read| read.score));
             rough.sort_by(|a, b| b.score.total_cmp(&a.score));
             changes = vec![ToneChange::default()];
             changes.extend(rough.iter().take(CHECKED).map(|read| read.change));
         }
         changes.extend_from_slice(hints);
-        let found = search::tried(&mut self.reader(small), &changes)?;
+        let found = search::tried(&mut self.reader(small), &prior, &changes)?;
         if square.is_none() || self.spread.is_none() {
             self.spread = Spread::of(found.iter().map(|read| read.score));
         }
@@ -108,7 +118,7 @@ impl<'a> Search<'a> {
                 score: best.score + part.cost(),
             };
             self.refined.push(best);
-            let found = search::refined(&mut self.reader(small), start)?;
+            let found = search::refined(&mut self.reader(small), &Prior::of(small, self.whole), start)?;
             self.add(*part, found);
             if self.is_clear() {
                 break;

@@ -106,9 +106,9 @@ mod tests {
     const BITS: usize = 32;
 
     fn brightened(log: f32) -> ToneChange {
-        ToneChange {
-            logs: [log, log, log, 0.0, 0.0, 0.0],
-        }
+        let mut change = ToneChange::default();
+        change.coordinates[..3].fill(log);
+        change
     }
 
     fn candidate(change: ToneChange, logits: Vec<f32>) -> Candidate {

@@ -8,6 +8,7 @@ mod candidates;
 mod finer;
 mod joint;
 mod parts;
+mod prior;
 mod sample;
 mod score;
 mod search;

@@ -123,7 +123,7 @@ mod tests {
         let sample = Sample::of(&picture, 4).unwrap();
         let darker = |factor: f32| {
             let mut change = ToneChange::default();
-            change.logs[..3].fill(factor.ln());
+            change.coordinates[..3].fill(factor.ln());
             sample.undone(&change, &picture)
         };
         assert!(darker(0.8).is_some() && darker(0.7).is_none());

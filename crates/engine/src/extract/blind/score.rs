@@ -3,13 +3,6 @@
 //! A mark pushes all bits of a picture away from 0, about equally far. Logits of an unmarked picture, or of one whose tones
 //! are wrong, spread around 0: fewer are large, and some are small. Nothing here knows a message, so that a reading may be
 //! chosen by it without being paid for.
-use crate::extract::photometric::ToneChange;
-
-/// A change of a coordinate, as a logarithm, that costs half as much as the largest.
-const SMALL: f32 = 0.1;
-/// What the largest change of a coordinate must gain to be believed, in logarithms of the size of logits. The size of
-/// logits is largest a little beside the truth, and most people change one thing or nothing.
-const COST: f64 = 0.2;
 /// Deviations above the middle of all that was tried from which on a reading is clearly a mark's: what is tried a few hundred
 /// times reaches two to three.
 const CLEAR: f64 = 3.0;
@@ -27,23 +20,6 @@ pub(super) fn of_logits(logits: &[f32]) -> f64 {
     let squares: f64 = logits.iter().map(|v| f64::from(*v).powi(2)).sum();
     let size = 2.0 * (roots / count).ln();
     size + EVEN * (size - 0.5 * (squares / count).ln())
-}
-
-/// What a change must gain to be believed. A tint is what channels differ by from the middle one.
-pub(super) fn cost(change: &ToneChange) -> f64 {
-    let [mut gains @ .., gamma, saturation, contrast] = change.logs;
-    gains.sort_by(f32::total_cmp);
-    let [low, brightness, high] = gains;
-    let done = [
-        brightness,
-        low - brightness,
-        high - brightness,
-        gamma,
-        saturation,
-        contrast,
-    ];
-    let share = |v: f32| f64::from(v.abs() / (v.abs() + SMALL));
-    COST * done.map(share).iter().sum::<f64>()
 }
 
 /// How scores of readings are spread that are nearly all wrong.

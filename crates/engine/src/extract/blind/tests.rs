@@ -121,11 +121,12 @@ fn marked(patches: &[Patch], message: &Message) -> Picture {
     picture(&said.collect::<Vec<_>>())
 }
 
+/// The picture after a change: logarithms of gains, gamma, saturation and contrast.
 fn done(logs: [f32; 6], picture: &Picture) -> Picture {
     // What is undone by the inverse is done; one coordinate after the other, in the order of doing.
     (0..6).fold(picture.clone(), |picture, place| {
         let mut inverse = ToneChange::default();
-        inverse.logs[place] = -logs[place];
+        inverse.coordinates[place] = -logs[place];
         inverse.undone(&picture, &picture).unwrap()
     })
 }
@@ -170,6 +171,40 @@ fn changed_tones_are_found_and_the_work_is_bounded() {
         }
     }
     assert_eq!(seen_clear, [true; 2]);
+}
+
+#[test]
+fn fades_curves_and_wider_tints_are_found() {
+    let (engine, patches, _) = engine();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let sine = |v: f32| (std::f32::consts::TAU * v).sin() / std::f32::consts::TAU;
+    let each = |picture: &Picture, change: &dyn Fn(usize, f32) -> f32| Picture {
+        pixels: picture
+            .pixels
+            .iter()
+            .enumerate()
+            .map(|(i, v)| change(i % 3, *v))
+            .collect(),
+        ..*picture
+    };
+    let changes: [&dyn Fn(usize, f32) -> f32; 6] = [
+        &|_, v| 0.15 + 0.85 * v,
+        &|_, v| (v - 0.08) / 0.92,
+        &|c, v| [0.12, 0.1, 0.08][c] + (1.0 - [0.12, 0.1, 0.08][c]) * v,
+        &|_, v| v - 0.5 * sine(v),
+        &|_, v| v + 0.3 * sine(v),
+        &|c, v| [1.12, 1.0, 0.9][c] * v,
+    ];
+    for (place, change) in changes.into_iter().enumerate() {
+        let message = random_message(&mut rng);
+        let changed = each(&marked(&patches, &message), change);
+        let found = PictureLogits::read(&engine, &changed, &[]).unwrap();
+        let estimate = estimates(std::slice::from_ref(&found))[0].unwrap();
+        assert!(
+            right(estimate.logits(), &message) >= BITS as u32 - 1,
+            "{place}: {estimate}"
+        );
+    }
 }
 
 #[test]

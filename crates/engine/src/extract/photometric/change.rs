@@ -1,24 +1,29 @@
 //! What was done to the tones of a picture, all of it together: a point of a space that can be searched.
 use std::fmt;
 
+use super::curve;
 use super::tone::{GREY, grey};
 use crate::picture::Picture;
 use crate::simd::{Instructions, Vectorised};
 
 /// Coordinates of a [`ToneChange`].
-pub(in crate::extract) const COORDINATES: usize = 6;
+pub(in crate::extract) const COORDINATES: usize = 10;
 /// Values this near to black or white were cut there by what was done, and say nothing of what they had been.
 const CUT: f32 = 0.5 / 255.0;
 /// How far beyond black and white a change may have put values: what compression does besides.
 const BEYOND: f32 = 0.03;
+/// What black may have become at least and at most.
+const MOST_FADED: [f32; 2] = [-0.5, 0.5];
 /// Share of a picture's values that may be farther out.
 const OUTSIDE: f32 = 0.02;
 
-/// Gains of the channels, a gamma, a saturation and a contrast, done one after the other. Undone, the last goes first.
+/// Gains of the channels, a gamma, a fade of each channel, a curve, a saturation and a contrast, done one after the other.
+/// Undone, the last goes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::extract) struct ToneChange {
-    /// Logarithms of the gains of red, green and blue, of gamma, of saturation and of contrast; 0 is nothing done.
-    pub logs: [f32; COORDINATES],
+    /// Logarithms of the gains of red, green and blue, of gamma, of saturation and of contrast; the [bend](curve) of a curve;
+    /// and what black became in a fade of each channel, below 0 where levels were stretched to it. 0 is nothing done.
+    pub coordinates: [f32; COORDINATES],
 }
 
 impl ToneChange {
@@ -26,18 +31,51 @@ impl ToneChange {
     const GAMMA: usize = 3;
     /// Place of the logarithm of contrast.
     const CONTRAST: usize = 5;
+    /// Place of the bend of a curve.
+    const BEND: usize = 6;
+    /// First place of what black became.
+    const FADES: usize = 7;
 
     /// This one, moved by `distance` along a direction.
     pub fn moved(&self, direction: &[f32; COORDINATES], distance: f32) -> Self {
-        let mut logs = self.logs;
-        logs.iter_mut().zip(direction).for_each(|(v, d)| *v += distance * d);
-        Self { logs }
+        let mut coordinates = self.coordinates;
+        coordinates
+            .iter_mut()
+            .zip(direction)
+            .for_each(|(v, d)| *v += distance * d);
+        Self { coordinates }
+    }
+
+    /// What black became in each channel.
+    fn fades(&self) -> [f32; 3] {
+        let [.., red, green, blue] = self.coordinates;
+        [red, green, blue]
+    }
+
+    /// Whether black became another colour.
+    pub fn is_fade(&self) -> bool {
+        self.fades() != [0.0; 3]
+    }
+
+    /// A colour laid over the picture, so thick that `share` of it hides what was there, as a ground tells it that had been
+    /// white; `None` where no such colour can have made it that.
+    pub fn overlay(ground: [f32; 3], share: f32) -> Option<Self> {
+        let mut change = Self::default();
+        for (c, level) in ground.into_iter().enumerate() {
+            let black = level - (1.0 - share);
+            if !(0.0..=share).contains(&black) {
+                return None;
+            }
+            change.coordinates[Self::FADES + c] = black;
+            change.coordinates[c] = ((1.0 - share) / (1.0 - black)).ln();
+        }
+        Some(change)
     }
 
     /// The mean grey that a picture had before its contrast was changed, which did not move it. Where contrast grew,
     /// values at black and white had been there before: a ground, most of all.
     fn mean_before(&self, picture: &Picture) -> f32 {
-        let contrast = self.logs[Self::CONTRAST].exp();
+        let contrast = self.coordinates[Self::CONTRAST].exp();
         let pixels = picture.pixels.as_chunks().0;
         let instructions = Instructions::widest();
         let mean = |centre: Option<f32>| {
@@ -56,7 +94,7 @@ impl ToneChange {
     /// have been done to values in [0, 1], and many would lie outside. Its contrast was changed about the mean of
     /// `whole`, of which it is a part.
     pub fn undone(&self, picture: &Picture, whole: &Picture) -> Option<Picture> {
-        let mean = match self.logs[Self::CONTRAST] {
+        let mean = match self.coordinates[Self::CONTRAST] {
             0.0 => 0.0,
             _ => self.mean_before(whole),
         };
@@ -70,12 +108,21 @@ impl ToneChange {
         possible.then_some(Picture { pixels, ..*picture })
     }
 
+    /// A colour of a part of `whole` before this was done to it, not cut.
+    pub fn colour_before(&self, colour: [f32; 3], whole: &Picture) -> [f32; 3] {
+        let mean = match self.coordinates[Self::CONTRAST] {
+            0.0 => 0.0,
+            _ => self.mean_before(whole),
+        };
+        Before::new(self, mean).of(colour)
+    }
+
     /// This one with the gains under which that colour of a ground had been white.
     pub fn with_white(&self, ground: [f32; 3], whole: &Picture) -> Self {
         let mut change = *self;
-        change.logs[..3].fill(0.0);
-        let before = Before::new(&change, change.mean_before(whole)).of(ground);
-        for (log, value) in change.logs.iter_mut().zip(before) {
+        change.coordinates[..3].fill(0.0);
+        let before = change.colour_before(ground, whole);
+        for (log, value) in change.coordinates.iter_mut().zip(before) {
             *log = value.clamp(0.1, 2.0).ln();
         }
         change
@@ -132,6 +179,8 @@ struct Before {
     mean: f32,
     contrast: f32,
     saturation: f32,
+    /// The bend, and what black became in each channel, where there was a curve or a fade.
+    shape: Option<(f32, [f32; 3])>,
     /// One over gamma, where that was changed.
     exponent: Option<f32>,
     gains: [f32; 3],
@@ -140,13 +189,18 @@ struct Before {
 impl Before {
     /// Of a picture with this mean grey before its contrast was changed.
     fn new(change: &ToneChange, mean: f32) -> Self {
-        let [gains @ .., gamma, saturation, contrast] = change.logs.map(f32::exp);
+        let [red, green, blue, gamma, saturation, contrast, ..] = change.coordinates.map(f32::exp);
+        let bend = change.coordinates[ToneChange::BEND];
+        let fades = change.fades();
+        let [least, most] = MOST_FADED;
         Self {
             mean,
             contrast,
             saturation,
-            exponent: (change.logs[ToneChange::GAMMA] != 0.0).then_some(1.0 / gamma),
-            gains,
+            shape: (bend != 0.0 || fades != [0.0; 3])
+                .then(|| (curve::limited(bend), fades.map(|black| black.clamp(least, most)))),
+            exponent: (change.coordinates[ToneChange::GAMMA] != 0.0).then_some(1.0 / gamma),
+            gains: [red, green, blue],
         }
     }
 
@@ -160,6 +214,11 @@ impl Before {
         let grey = grey(&pixel);
         for v in &mut pixel {
             *v = grey + (*v - grey) / self.saturation;
+        }
+        if let Some((bend, blacks)) = self.shape {
+            for (v, black) in pixel.iter_mut().zip(blacks) {
+                *v = (curve::before(*v, bend) - black) / (1.0 - black);
+            }
         }
         if let Some(exponent) = self.exponent {
             for v in &mut pixel {
@@ -186,14 +245,19 @@ impl Vectorised for Undo<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) -> usize {
         let before = self.before;
-        // Apart, so that the loop without powers has no calls.
-        let plain = Before {
+        // Apart, so that loops without powers have no calls, and those without a curve no iterations.
+        let without_power = Before {
             exponent: None,
             ..before
         };
-        match before.exponent {
-            None => self.each(plain),
-            Some(_) => self.each(before),
+        let plain = Before {
+            shape: None,
+            ..without_power
+        };
+        match (before.exponent, before.shape) {
+            (None, None) => self.each(plain),
+            (None, Some(_)) => self.each(without_power),
+            (Some(_), _) => self.each(before),
         }
     }
 }
@@ -218,19 +282,26 @@ impl Undo<'_> {
 /// In words, with every part that is not 1.
 impl fmt::Display for ToneChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [red, green, blue, gamma, saturation, contrast] = self.logs.map(f32::exp);
+        let [red, green, blue, gamma, saturation, contrast, ..] = self.coordinates.map(f32::exp);
+        let bend = self.coordinates[Self::BEND];
+        let fades = self.fades();
+        let fade: f32 = GREY.iter().zip(fades).map(|(w, v)| w * v).sum();
         let brightness: f32 = GREY.iter().zip([red, green, blue]).map(|(w, v)| w * v).sum();
         let told = [
-            ("brightness x", brightness),
-            ("red x", red / brightness),
-            ("green x", green / brightness),
-            ("blue x", blue / brightness),
-            ("gamma", gamma),
-            ("saturation x", saturation),
-            ("contrast x", contrast),
+            ("brightness x", brightness, 1.0),
+            ("red x", red / brightness, 1.0),
+            ("green x", green / brightness, 1.0),
+            ("blue x", blue / brightness, 1.0),
+            ("gamma", gamma, 1.0),
+            ("saturation x", saturation, 1.0),
+            ("contrast x", contrast, 1.0),
+            ("black at", fade, 0.0),
+            ("curve bent by", bend, 0.0),
         ];
-        let told = told.into_iter().filter(|(_, factor)| (factor - 1.0).abs() >= 0.005);
-        let told: Vec<String> = told.map(|(name, factor)| format!("{name} {factor:.2}")).collect();
+        let told = told
+            .into_iter()
+            .filter(|(_, value, none)| (value - none).abs() >= 0.005);
+        let told: Vec<String> = told.map(|(name, value, _)| format!("{name} {value:.2}")).collect();
         match told.is_empty() {
             true => f.write_str("tones as they are"),
             false => write!(f, "{} undone", told.join(", ")),
@@ -251,13 +322,13 @@ mod tests {
     }
 
     #[test]
-    fn each_coordinate_is_undone_as_it_was_done() {
+    fn each_factor_is_undone_as_it_was_done() {
         let before = picture((0..60).map(|i| 0.3 + 0.3 * (i as f32 * 0.37).sin().abs()).collect());
-        for place in 0..COORDINATES {
+        for place in 0..ToneChange::BEND {
             for log in [-0.2, 0.2] {
                 let change = |log: f32| {
                     let mut change = ToneChange::default();
-                    change.logs[place] = log;
+                    change.coordinates[place] = log;
                     change
                 };
                 let done = change(-log).undone(&before, &before).unwrap();
@@ -271,6 +342,49 @@ mod tests {
     }
 
     #[test]
+    fn fades_and_curves_are_undone() {
+        let before = picture((0..90).map(|i| 0.2 + 0.008 * i as f32).collect());
+        let sine = |v: &f32| (std::f32::consts::TAU * v).sin() / std::f32::consts::TAU;
+        for (place, amount, done) in [
+            (
+                ToneChange::FADES,
+                0.2,
+                &(|v: &f32| 0.2 + 0.8 * v) as &dyn Fn(&f32) -> f32,
+            ),
+            (ToneChange::FADES, -0.1, &|v: &f32| -0.1 + 1.1 * v),
+            (ToneChange::BEND, 0.6, &|v: &f32| v - 0.6 * sine(v)),
+            (ToneChange::BEND, -0.4, &|v: &f32| v + 0.4 * sine(v)),
+        ] {
+            let mut change = ToneChange::default();
+            let last = if place == ToneChange::FADES {
+                COORDINATES
+            } else {
+                place + 1
+            };
+            change.coordinates[place..last].fill(amount);
+            let done = picture(before.pixels.iter().map(done).collect());
+            let after = change.undone(&done, &done).unwrap();
+            for (a, b) in after.pixels.iter().zip(&before.pixels) {
+                assert!((a - b).abs() < 0.002, "{place} {amount}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ground_tells_the_colour_that_was_laid_over_it() {
+        let before = picture((0..90).map(|i| 0.01 * i as f32).collect());
+        let over = [0.8, 0.85, 1.0];
+        let laid = |(i, v): (usize, &f32)| 0.85 * v + 0.15 * over[i % 3];
+        let done = picture(before.pixels.iter().enumerate().map(laid).collect());
+        let ground = over.map(|v| 0.85 + 0.15 * v);
+        let after = ToneChange::overlay(ground, 0.15).unwrap().undone(&done, &done).unwrap();
+        for (a, b) in after.pixels.iter().zip(&before.pixels) {
+            assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+        assert_eq!(ToneChange::overlay([0.6, 1.0, 1.0], 0.2), None);
+    }
+
+    #[test]
     fn contrast_is_undone_about_the_mean_from_before_a_ground_was_cut() {
         let scene = (0..30).map(|i| 0.3 + 0.01 * i as f32);
         let before = picture(scene.chain(std::iter::repeat_n(1.0, 60)).collect());
@@ -278,7 +392,7 @@ mod tests {
         let more = |v: &f32| (mean + 1.2 * (v - mean)).clamp(0.0, 1.0);
         let done = picture(before.pixels.iter().map(more).collect());
         let mut change = ToneChange::default();
-        change.logs[ToneChange::CONTRAST] = 1.2_f32.ln();
+        change.coordinates[ToneChange::CONTRAST] = 1.2_f32.ln();
         let after = change.undone(&done, &done).unwrap();
         for (a, b) in after.pixels.iter().zip(&before.pixels[..30]) {
             assert!((a - b).abs() < 0.003, "{a} {b}");
@@ -289,22 +403,23 @@ mod tests {
     fn what_cannot_have_been_done_is_told() {
         let dim = picture(vec![0.9; 30]);
         let mut change = ToneChange::default();
-        change.logs[..3].fill(-0.4);
+        change.coordinates[..3].fill(-0.4);
         assert_eq!(change.undone(&dim, &dim), None);
         // White that was cut says nothing.
         let white = picture(vec![1.0; 30]);
         assert_eq!(change.undone(&white, &white), Some(white.clone()));
         let fitted = change.with_white([0.9, 0.8, 1.0], &dim);
-        let gains = fitted.logs.map(f32::exp);
+        let gains = fitted.coordinates.map(f32::exp);
         assert!((gains[0] - 0.9).abs() < 1e-6 && (gains[1] - 0.8).abs() < 1e-6 && gains[2] == 1.0);
     }
 
     #[test]
     fn changes_are_told_in_words() {
-        let change = ToneChange {
-            logs: [0.8_f32, 0.8, 0.88, 1.0, 1.2, 1.0].map(f32::ln),
-        };
-        let told = "brightness x 0.81, red x 0.99, green x 0.99, blue x 1.09, saturation x 1.20 undone";
+        let logs = [0.8_f32, 0.8, 0.88, 1.0, 1.2, 1.0].map(f32::ln);
+        let mut change = ToneChange::default();
+        change.coordinates[..6].copy_from_slice(&logs);
+        change.coordinates[ToneChange::FADES..].fill(0.1);
+        let told = "brightness x 0.81, red x 0.99, green x 0.99, blue x 1.09, saturation x 1.20, black at 0.10 undone";
         assert_eq!(change.to_string(), told);
         assert_eq!(ToneChange::default().to_string(), "tones as they are");
     }

@@ -11,6 +11,8 @@ const SHARE: f32 = 0.5;
 const CUT: f32 = 0.4;
 /// A ground is black or white when it is no further off than this.
 const CLEAN: f32 = 0.002;
+/// From here on a channel of a ground may have been cut at white: compression moves it by a level or two.
+pub(in crate::extract) const NEARLY_WHITE: f32 = 0.985;
 /// A ground is plain where that share of the border is no further from its colour than this: two levels of 255.
 const PLAIN: f32 = 2.5 / 255.0;
 

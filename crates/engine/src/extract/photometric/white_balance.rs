@@ -28,6 +28,13 @@ pub(super) fn gains(picture: &Picture, beyond: [f32; 3]) -> Option<[f32; 3]> {
     (gains != [1.0; 3]).then_some(gains)
 }
 
+/// Logarithms of what channels were multiplied by, told by a ground that had been white; `None` of those that are white and
+/// may have been cut there, and of all where it had hardly been white.
+pub(in crate::extract) fn told(ground: [f32; 3]) -> [Option<f32>; 3] {
+    let bright = ground.iter().all(|v| *v >= BRIGHT);
+    ground.map(|v| (bright && v < ground::NEARLY_WHITE).then(|| v.ln()))
+}
+
 /// The picture before its channels were multiplied by these, values cut to [0, 1].
 pub(super) fn undone(gains: [f32; 3], picture: &Picture) -> Picture {
     let pixels = picture.pixels.as_chunks::<3>().0.iter();
@@ -78,6 +85,12 @@ mod tests {
         for (a, b) in before.pixels.iter().zip(&scene.pixels) {
             assert!((a - b).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn channels_that_may_have_been_cut_tell_nothing() {
+        assert_eq!(told([1.0, 0.99, 0.9]), [None, None, Some(0.9_f32.ln())]);
+        assert_eq!(told([0.2, 1.0, 1.0]), [None; 3]);
     }
 
     #[test]

@@ -20,6 +20,10 @@ fn tones_follow_their_formulas() {
     // 255 (128 / 255)^2 = 64.25; 255 (64 / 255)^0.5 = 127.75.
     assert_eq!(greys(&done("gamma:2", &row(&[0, 128, 255]))), [0, 64, 255]);
     assert_eq!(greys(&done("gamma:0.5", &row(&[64]))), [128]);
+    assert_eq!(greys(&done("fade:0.2", &row(&[0, 100, 255]))), [51, 131, 255]);
+    assert_eq!(greys(&done("fade:-0.2", &row(&[0, 100, 255]))), [0, 69, 255]);
+    // At a quarter the sine is 1: 64 - 255 · 0.5 / 6.2832 = 43.7.
+    assert_eq!(greys(&done("curve:0.5", &row(&[0, 64, 191, 255]))), [0, 44, 211, 255]);
     assert_eq!(greys(&done("bits:1", &row(&[0, 127, 128, 255]))), [0, 0, 255, 255]);
     // Steps of 85, the middle between two of them being 127.5.
     assert_eq!(

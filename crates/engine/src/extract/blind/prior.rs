@@ -1,0 +1,68 @@
+//! What a change of tones must gain to be believed, in logarithms of the size of logits.
+//!
+//! The size of logits is largest a little beside the truth, and plain colours have large ones under some wrong change. Most
+//! people change one thing or nothing; and what had been a white or black ground tells what can hardly have been done to it.
+use crate::extract::photometric::{ToneChange, ground};
+use crate::picture::Picture;
+
+/// A change of a coordinate, as a logarithm, that costs half as much as the largest.
+const SMALL: f32 = 0.1;
+/// What the largest change of a coordinate costs.
+const COST: f64 = 0.2;
+/// A curve moves colours by less than its bend.
+const BENT: f32 = 0.3;
+/// What a ground costs that had been far from white and black.
+const GROUND: f64 = 0.3;
+/// Distance of a ground from both that costs half of it: compression and rounding leave a hundredth.
+const NEAR: f32 = 0.05;
+
+/// What is known of a picture, or a part of one, before anything is read.
+pub(super) struct Prior<'a> {
+    /// The colour of the ground that it shows now.
+    ground: Option<[f32; 3]>,
+    whole: &'a Picture,
+}
+
+impl<'a> Prior<'a> {
+    /// That of a part of the picture `whole`.
+    pub fn of(part: &Picture, whole: &'a Picture) -> Self {
+        Self {
+            ground: ground::seen(part),
+            whole,
+        }
+    }
+
+    /// What a change must gain. A tint is what channels differ by from the middle one.
+    pub fn cost(&self, change: &ToneChange) -> f64 {
+        let [red, green, blue, gamma, saturation, contrast, bend, fades @ ..] = change.coordinates;
+        let [gains, fades] = [[red, green, blue], fades].map(from_the_middle);
+        let others = [gamma, saturation, contrast, bend * BENT];
+        let done = gains.into_iter().chain(fades).chain(others);
+        let share = |v: f32, half: f32| f64::from(v.abs() / (v.abs() + half));
+        let ground = self.ground.map_or(0.0, |ground| share(self.off(ground, change), NEAR));
+        COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground
+    }
+
+    /// How far a ground was from white and black before a change, in the channel that was farthest. What is white now may
+    /// have been cut there, and may have been white if it was no brighter than that.
+    fn off(&self, ground: [f32; 3], change: &ToneChange) -> f32 {
+        let before = change.colour_before(ground, self.whole);
+        let farthest = |far: &dyn Fn(usize) -> f32| (0..3).map(far).fold(0.0, f32::max);
+        let white = farthest(&|c| match ground[c] >= ground::NEARLY_WHITE {
+            true => (before[c] - 1.0).max(0.0),
+            false => (before[c] - 1.0).abs(),
+        });
+        let black = farthest(&|c| match ground[c] <= 1.0 - ground::NEARLY_WHITE {
+            true => (-before[c]).max(0.0),
+            false => before[c].abs(),
+        });
+        white.min(black)
+    }
+}
+
+/// The middle one of three channels, and what the others differ by from it.
+fn from_the_middle(mut channels: [f32; 3]) -> [f32; 3] {
+    channels.sort_by(f32::total_cmp);
+    let [low, middle, high] = channels;
+    [middle, low - middle, high - middle]
+}
