@@ -4,6 +4,7 @@ use super::prior::Prior;
 use super::sample::Sample;
 use super::score::{self, Spread};
 use super::search::{self, Read};
+use super::sweep;
 use super::{BATCH, Candidate, joint, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
@@ -72,13 +73,13 @@ impl<'a> Search<'a> {
         let anchor = anchor
             .as_ref()
             .map(|anchor| anchor as &dyn Fn(ToneChange) -> ToneChange);
-        let mut changes = search::lines(anchor);
+        let mut changes = sweep::lines(anchor);
         let square = self.engine.extractor.square();
         if let Some(sample) = square.and_then(|side| Sample::of(small, side)) {
-            changes.extend(search::tinted());
+            changes.extend(sweep::tinted());
             if let Some(ground) = ground {
-                changes.extend(search::half_told(white_balance::told(ground)));
-                changes.extend(search::overlays(ground));
+                changes.extend(sweep::half_told(white_balance::told(ground)));
+                changes.extend(sweep::overlays(ground));
             }
             let undone = |change: &ToneChange| sample.undone(change, whole);
             let mut rough = search::tried(

@@ -1,5 +1,5 @@
 //! Which candidates of several pictures of one scene are right: those that carry the same message.
-use super::{BlindReading, Candidate, score, search};
+use super::{BlindReading, Candidate, score, sweep};
 
 /// Most candidates of a picture that are looked at.
 pub(super) const MOST: usize = 24;
@@ -40,7 +40,7 @@ pub(in crate::extract) fn chosen<'a>(pictures: &[&'a BlindReading]) -> Vec<Optio
 fn nearest(pictures: &[&BlindReading], to: &Candidate) -> Vec<usize> {
     let distance = |candidate: &Candidate| {
         let part = if candidate.part == to.part { 0.0 } else { 1.0 };
-        search::distance(&candidate.change, &to.change) + part
+        sweep::distance(&candidate.change, &to.change) + part
     };
     let place = |picture: &&BlindReading| {
         let distances = picture.candidates.iter().map(distance).enumerate();

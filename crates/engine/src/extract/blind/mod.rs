@@ -12,6 +12,7 @@ mod prior;
 mod sample;
 mod score;
 mod search;
+mod sweep;
 #[cfg(test)]
 mod tests;
 
@@ -58,7 +59,7 @@ impl Candidate {
 
     /// Whether it is of another part, or so far from another candidate that a refinement of one would not find the other.
     fn lies_apart_from(&self, other: &Self) -> bool {
-        self.part != other.part || search::apart(&self.change, &other.change)
+        self.part != other.part || sweep::apart(&self.change, &other.change)
     }
 }
 

@@ -34,10 +34,11 @@ impl<'a> Prior<'a> {
 
     /// What a change must gain. A tint is what channels differ by from the middle one.
     pub fn cost(&self, change: &ToneChange) -> f64 {
-        let [red, green, blue, gamma, saturation, contrast, bend, fades @ ..] = change.coordinates;
-        let [gains, fades] = [[red, green, blue], fades].map(from_the_middle);
-        let others = [gamma, saturation, contrast, bend * BENT];
-        let done = gains.into_iter().chain(fades).chain(others);
+        let at = |place: usize| change.coordinates[place];
+        let [gains, fades] = [ToneChange::GAINS.map(at), change.fades()].map(from_the_middle);
+        let factors = [ToneChange::GAMMA, ToneChange::SATURATION, ToneChange::CONTRAST].map(at);
+        let done = gains.into_iter().chain(fades).chain(factors);
+        let done = done.chain([BENT * at(ToneChange::BEND)]);
         let share = |v: f32, half: f32| f64::from(v.abs() / (v.abs() + half));
         let ground = self.ground.map_or(0.0, |ground| share(self.off(ground, change), NEAR));
         COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground

@@ -5,9 +5,11 @@
 //! correction is another chance to match it, which a claim must count**. Or it is estimated without that message, from the
 //! picture and the key (`super::blind`), as a [`ToneChange`]: then one reading is counted.
 mod change;
+mod contrast;
 mod curve;
 pub(super) mod ground;
 mod tone;
+mod undo;
 pub(super) mod white_balance;
 
 use guardsplat_codeword::{PhotometricCorrection, Tone};

@@ -1,0 +1,144 @@
+//! Changes of tones that are tried: along each coordinate, tints, and what a ground tells.
+use crate::extract::photometric::{COORDINATES, ToneChange};
+
+/// What is swept, from where to where, and in what steps; of gains and of what is told by its factor, logarithms. A step moves
+/// colours by about a hundredth. First what is common to all channels.
+const SWEPT: [Sweep; 9] = [
+    sweep(&ToneChange::GAINS, [-0.7, 0.5]),
+    sweep(&[ToneChange::GAMMA], [-0.36, 0.36]),
+    sweep(&[ToneChange::SATURATION], [-0.36, 0.36]),
+    sweep(&[ToneChange::CONTRAST], [-0.36, 0.36]),
+    sweep(&[ToneChange::BEND], [-0.42, 0.84]),
+    sweep(&ToneChange::FADES, [-0.3, 0.3]),
+    sweep(&[ToneChange::GAINS[0]], TINT),
+    sweep(&[ToneChange::GAINS[1]], TINT),
+    sweep(&[ToneChange::GAINS[2]], TINT),
+];
+/// Those of them that are common to all channels and do not make white another colour.
+const WHITE_STAYS: std::ops::Range<usize> = 1..6;
+/// Steps of sweeps along each coordinate.
+const STEPS: [f32; COORDINATES] = [0.02, 0.02, 0.02, 0.03, 0.04, 0.03, 0.06, 0.02, 0.02, 0.02];
+/// Fades of one channel, which are looked at about a fade only.
+const FADES: [Sweep; 3] = [
+    sweep(&[ToneChange::FADES[0]], [0.0; 2]),
+    sweep(&[ToneChange::FADES[1]], [0.0; 2]),
+    sweep(&[ToneChange::FADES[2]], [0.0; 2]),
+];
+/// How far a single gain is swept.
+const TINT: [f32; 2] = [-0.08, 0.08];
+/// Shares of a colour that may have been laid over a picture: steps of a fade, so many.
+const OVERLAYS: u8 = 20;
+/// How far from each other starts lie at least, in such steps.
+const APART: f32 = 2.5;
+/// Step of the gains that are tried together, and how many steps a tint goes either way: the second where brightness is
+/// nearly what it was.
+const GRID: f32 = 0.04;
+const TINTS: [i32; 2] = [2, 3];
+/// Steps of brightness up to which it nearly is.
+const NEARLY: i32 = 2;
+/// Gains of channels whose ground is white beside others whose is not: from 1 in steps of sweeps, so many.
+const CUT: u32 = 12;
+
+/// A direction in which what was done may lie.
+#[derive(Clone, Copy)]
+pub(super) struct Sweep {
+    direction: [f32; COORDINATES],
+    reach: [f32; 2],
+    step: f32,
+}
+
+/// Along these coordinates at once, which have one step.
+const fn sweep(along: &[usize], reach: [f32; 2]) -> Sweep {
+    let (mut direction, mut i) = ([0.0; COORDINATES], 0);
+    while i < along.len() {
+        direction[along[i]] = 1.0;
+        i += 1;
+    }
+    Sweep {
+        direction,
+        reach,
+        step: STEPS[along[0]],
+    }
+}
+
+impl Sweep {
+    /// A change, moved by so many steps.
+    pub fn moved(&self, change: &ToneChange, steps: f32) -> ToneChange {
+        change.moved(&self.direction, steps * self.step)
+    }
+
+    /// All steps from a change but itself.
+    fn from(self, start: ToneChange) -> impl Iterator<Item = ToneChange> {
+        let [first, last] = self.reach.map(|end| (end / self.step).round() as i32);
+        let steps = (first..=last).filter(|i| *i != 0);
+        steps.map(move |i| self.moved(&start, i as f32))
+    }
+}
+
+/// The directions in which a refinement looks about a change.
+pub(super) fn about(change: &ToneChange) -> impl Iterator<Item = &'static Sweep> {
+    let single: &[Sweep] = if change.is_fade() { &FADES } else { &[] };
+    SWEPT.iter().chain(single)
+}
+
+/// Changes along each coordinate, nothing done first. `anchor` makes a change fit a ground that had been white, if there
+/// is one that is not.
+pub(super) fn lines(anchor: Option<&dyn Fn(ToneChange) -> ToneChange>) -> Vec<ToneChange> {
+    let none = ToneChange::default();
+    let mut changes = vec![none];
+    changes.extend(SWEPT.iter().flat_map(|sweep| sweep.from(none)));
+    if let Some(anchor) = anchor {
+        changes.push(anchor(none));
+        changes.extend(SWEPT[WHITE_STAYS].iter().flat_map(|sweep| sweep.from(none)).map(anchor));
+    }
+    changes
+}
+
+/// Brightness with every tint, which lines miss: [`lines`] find a change of one kind only.
+pub(super) fn tinted() -> Vec<ToneChange> {
+    let [first, last] = SWEPT[0].reach.map(|end| (end / GRID).round() as i32);
+    let tints = |brightness: i32| {
+        let most = TINTS[usize::from(brightness.abs() <= NEARLY)];
+        (-most..=most)
+            .flat_map(move |red| (-most..=most).map(move |blue| [brightness + red, brightness, brightness + blue]))
+    };
+    let change = |steps: [i32; 3]| ToneChange::of_gains(steps.map(|steps| steps as f32 * GRID));
+    (first..=last).flat_map(tints).map(change).collect()
+}
+
+/// A tint under which some channels of a ground stayed white, for what was beyond was cut, and others did not: these tell
+/// their gain, the logarithms in `told`, and those of the others are tried. None where all channels or none tell.
+pub(super) fn half_told(told: [Option<f32>; 3]) -> Vec<ToneChange> {
+    let silent = told.iter().filter(|gain| gain.is_none()).count() as u32;
+    if silent == 0 || silent == 3 {
+        return Vec::new();
+    }
+    let change = |number: u32| {
+        let mut left = number;
+        ToneChange::of_gains(told.map(|gain| {
+            gain.unwrap_or_else(|| {
+                let steps = left % (CUT + 1);
+                left /= CUT + 1;
+                steps as f32 * STEPS[0]
+            })
+        }))
+    };
+    (0..(CUT + 1).pow(silent)).map(change).collect()
+}
+
+/// Colours laid over a picture, of all thicknesses, which a ground of this colour tells.
+pub(super) fn overlays(ground: [f32; 3]) -> impl Iterator<Item = ToneChange> {
+    let shares = (1..=OVERLAYS).map(|i| f32::from(i) * STEPS[ToneChange::FADES[0]]);
+    shares.filter_map(move |share| ToneChange::overlay(ground, share))
+}
+
+/// How far two changes are from each other, in steps of sweeps.
+pub(super) fn distance(a: &ToneChange, b: &ToneChange) -> f32 {
+    let pairs = a.coordinates.iter().zip(b.coordinates).zip(STEPS);
+    pairs.map(|((a, b), step)| ((a - b) / step).powi(2)).sum::<f32>().sqrt()
+}
+
+/// Whether two changes are so far from each other that a refinement of one would not find the other.
+pub(super) fn apart(a: &ToneChange, b: &ToneChange) -> bool {
+    distance(a, b) > APART
+}
