@@ -77,9 +77,10 @@ impl<'a> Search<'a> {
         let square = self.engine.extractor.square();
         if let Some(sample) = square.and_then(|side| Sample::of(small, side)) {
             changes.extend(sweep::tinted());
-            if let Some(ground) = ground {
-                changes.extend(sweep::half_told(white_balance::told(ground)));
+            if let Some((ground, anchor)) = ground.zip(anchor) {
                 changes.extend(sweep::overlays(ground));
+                let cut = white_balance::cut(ground);
+                changes.extend(cut.map_or_else(Vec::new, |cut| sweep::filters(anchor, cut)));
             }
             let undone = |change: &ToneChange| sample.undone(change, whole);
             let mut rough = search::tried(

@@ -36,8 +36,26 @@ const GRID: f32 = 0.04;
 const TINTS: [i32; 2] = [2, 3];
 /// Steps of brightness up to which it nearly is.
 const NEARLY: i32 = 2;
-/// Gains of channels whose ground is white beside others whose is not: from 1 in steps of sweeps, so many.
-const CUT: u32 = 12;
+/// Largest gain, a logarithm, of a channel whose ground is white beside others whose is not.
+const CUT: f32 = 0.24;
+/// Bends and blacks of filters, from where to where, and steps of gains: where at most one channel was cut, and where two were.
+const ONE_CUT: Filters = Filters {
+    bends: ([-0.3, 0.6], 0.1),
+    blacks: ([0.0, 0.12], 0.03),
+    gain: 0.02,
+};
+const TWO_CUT: Filters = Filters {
+    bends: ([-0.15, 0.6], 0.15),
+    blacks: ([0.0, 0.1], 0.05),
+    gain: 0.04,
+};
+
+/// What filters are tried: ranges with their steps, and the step of gains that a ground does not tell.
+struct Filters {
+    bends: ([f32; 2], f32),
+    blacks: ([f32; 2], f32),
+    gain: f32,
+}
 
 /// A direction in which what was done may lie.
 #[derive(Clone, Copy)]
@@ -106,24 +124,52 @@ pub(super) fn tinted() -> Vec<ToneChange> {
     (first..=last).flat_map(tints).map(change).collect()
 }
 
-/// A tint under which some channels of a ground stayed white, for what was beyond was cut, and others did not: these tell
-/// their gain, the logarithms in `told`, and those of the others are tried. None where all channels or none tell.
-pub(super) fn half_told(told: [Option<f32>; 3]) -> Vec<ToneChange> {
-    let silent = told.iter().filter(|gain| gain.is_none()).count() as u32;
-    if silent == 0 || silent == 3 {
-        return Vec::new();
-    }
-    let change = |number: u32| {
-        let mut left = number;
-        ToneChange::of_gains(told.map(|gain| {
-            gain.unwrap_or_else(|| {
-                let steps = left % (CUT + 1);
-                left /= CUT + 1;
-                steps as f32 * STEPS[0]
-            })
-        }))
+/// Tints under which the `cut` channels of a ground stayed white, for what was beyond was cut, and the others did not, alone
+/// and with a curve and a fade as filters have them. `anchor` makes a change fit the ground: of the channels that are not cut
+/// it tells the gain, those of the others are tried.
+pub(super) fn filters(anchor: &dyn Fn(ToneChange) -> ToneChange, cut: [bool; 3]) -> Vec<ToneChange> {
+    let tried = if cut.iter().filter(|cut| **cut).count() < 2 {
+        ONE_CUT
+    } else {
+        TWO_CUT
     };
-    (0..(CUT + 1).pow(silent)).map(change).collect()
+    let alone = gains_of(anchor(ToneChange::default()), cut, STEPS[0]);
+    let shaped = values(tried.bends).flat_map(|bend| {
+        let faded = values(tried.blacks).map(move |black| {
+            let mut shape = ToneChange::default();
+            shape.coordinates[ToneChange::BEND] = bend;
+            ToneChange::FADES
+                .iter()
+                .for_each(|place| shape.coordinates[*place] = black);
+            shape
+        });
+        faded.flat_map(|shape| gains_of(anchor(shape), cut, tried.gain))
+    });
+    alone.into_iter().chain(shaped).collect()
+}
+
+/// All values of a range, in steps.
+fn values(([first, last], step): ([f32; 2], f32)) -> impl Iterator<Item = f32> {
+    let [first, last] = [first, last].map(|end| (end / step).round() as i16);
+    (first..=last).map(move |i| f32::from(i) * step)
+}
+
+/// A change with all gains of some channels from what they are on, up to [`CUT`], in steps.
+fn gains_of(change: ToneChange, channels: [bool; 3], step: f32) -> Vec<ToneChange> {
+    let count = (CUT / step).round() as u16 + 1;
+    let mut all = vec![change];
+    for (place, _) in ToneChange::GAINS.into_iter().zip(channels).filter(|(_, cut)| *cut) {
+        let more = |change: &ToneChange, i: u16| {
+            let mut change = *change;
+            change.coordinates[place] += f32::from(i) * step;
+            change
+        };
+        all = all
+            .iter()
+            .flat_map(|change| (0..count).map(|i| more(change, i)))
+            .collect();
+    }
+    all
 }
 
 /// Colours laid over a picture, of all thicknesses, which a ground of this colour tells.

@@ -28,11 +28,12 @@ pub(super) fn gains(picture: &Picture, beyond: [f32; 3]) -> Option<[f32; 3]> {
     (gains != [1.0; 3]).then_some(gains)
 }
 
-/// Logarithms of what channels were multiplied by, told by a ground that had been white; `None` of those that are white and
-/// may have been cut there, and of all where it had hardly been white.
-pub(in crate::extract) fn told(ground: [f32; 3]) -> [Option<f32>; 3] {
+/// Which channels of a ground that had been white are white still, and may have been cut there; `None` where all are, or
+/// where it had hardly been white.
+pub(in crate::extract) fn cut(ground: [f32; 3]) -> Option<[bool; 3]> {
+    let cut = ground.map(|v| v >= ground::NEARLY_WHITE);
     let bright = ground.iter().all(|v| *v >= BRIGHT);
-    ground.map(|v| (bright && v < ground::NEARLY_WHITE).then(|| v.ln()))
+    (bright && cut != [true; 3]).then_some(cut)
 }
 
 /// The picture before its channels were multiplied by these, values cut to [0, 1].
@@ -88,9 +89,10 @@ mod tests {
     }
 
     #[test]
-    fn channels_that_may_have_been_cut_tell_nothing() {
-        assert_eq!(told([1.0, 0.99, 0.9]), [None, None, Some(0.9_f32.ln())]);
-        assert_eq!(told([0.2, 1.0, 1.0]), [None; 3]);
+    fn a_ground_tells_which_channels_may_have_been_cut() {
+        assert_eq!(cut([1.0, 0.99, 0.9]), Some([true, true, false]));
+        assert_eq!(cut([0.9; 3]), Some([false; 3]));
+        assert_eq!([[0.2, 1.0, 1.0], [1.0; 3]].map(cut), [None; 2]);
     }
 
     #[test]
