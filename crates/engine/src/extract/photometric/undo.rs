@@ -17,8 +17,10 @@ pub(super) struct Before {
     mean: f32,
     contrast: f32,
     saturation: f32,
-    /// The bend, and what black became in each channel, where there was a curve or a fade.
-    shape: Option<(f32, [f32; 3])>,
+    /// Of a curve, where there was one.
+    bend: Option<f32>,
+    /// What black became in each channel.
+    blacks: [f32; 3],
     /// One over gamma, where that was changed.
     exponent: Option<f32>,
     gains: [f32; 3],
@@ -29,14 +31,13 @@ impl Before {
     pub fn new(change: &ToneChange, mean: f32) -> Self {
         let factors = change.coordinates.map(f32::exp);
         let bend = change.coordinates[ToneChange::BEND];
-        let fades = change.fades();
         let [least, most] = MOST_FADED;
         Self {
             mean,
             contrast: factors[ToneChange::CONTRAST],
             saturation: factors[ToneChange::SATURATION],
-            shape: (bend != 0.0 || fades != [0.0; 3])
-                .then(|| (curve::limited(bend), fades.map(|black| black.clamp(least, most)))),
+            bend: (bend != 0.0).then(|| curve::limited(bend)),
+            blacks: change.fades().map(|black| black.clamp(least, most)),
             exponent: (change.coordinates[ToneChange::GAMMA] != 0.0).then_some(1.0 / factors[ToneChange::GAMMA]),
             gains: ToneChange::GAINS.map(|place| factors[place]),
         }
@@ -53,10 +54,13 @@ impl Before {
         for v in &mut pixel {
             *v = grey + (*v - grey) / self.saturation;
         }
-        if let Some((bend, blacks)) = self.shape {
-            for (v, black) in pixel.iter_mut().zip(blacks) {
-                *v = (curve::before(*v, bend) - black) / (1.0 - black);
+        if let Some(bend) = self.bend {
+            for v in &mut pixel {
+                *v = curve::before(*v, bend);
             }
+        }
+        for (v, black) in pixel.iter_mut().zip(self.blacks) {
+            *v = (*v - black) / (1.0 - black);
         }
         if let Some(exponent) = self.exponent {
             for v in &mut pixel {
@@ -89,10 +93,10 @@ impl Vectorised for Undo<'_> {
             ..before
         };
         let plain = Before {
-            shape: None,
+            bend: None,
             ..without_power
         };
-        match (before.exponent, before.shape) {
+        match (before.exponent, before.bend) {
             (None, None) => self.each(plain),
             (None, Some(_)) => self.each(without_power),
             (Some(_), _) => self.each(before),
