@@ -2,7 +2,7 @@
 use super::{BlindReading, Candidate, score, sweep};
 
 /// Most candidates of a picture that are looked at.
-pub(super) const MOST: usize = 24;
+pub(super) const MOST: usize = 40;
 /// How often every picture may change its mind.
 const ROUNDS: usize = 3;
 /// Pictures whose candidates are tried for all pictures, and how many of each.
