@@ -106,9 +106,7 @@ mod tests {
     const BITS: usize = 32;
 
     fn brightened(log: f32) -> ToneChange {
-        let mut change = ToneChange::default();
-        change.coordinates[..3].fill(log);
-        change
+        ToneChange::of_gains([log; 3])
     }
 
     fn candidate(change: ToneChange, logits: Vec<f32>) -> Candidate {

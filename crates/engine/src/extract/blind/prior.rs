@@ -67,3 +67,28 @@ fn from_the_middle(mut channels: [f32; 3]) -> [f32; 3] {
     let [low, middle, high] = channels;
     [middle, low - middle, high - middle]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_costs_more_under_which_a_ground_had_been_of_no_usual_colour() {
+        let on = |ground: [f32; 3]| Picture {
+            width: 4,
+            height: 4,
+            pixels: ground.repeat(16),
+        };
+        let cost = |ground: [f32; 3], gains: [f32; 3]| {
+            let picture = on(ground);
+            Prior::of(&picture, &picture).cost(&ToneChange::of_gains(gains.map(f32::ln)))
+        };
+        // Red stayed white, for what was beyond was cut; blue tells its gain.
+        let warm = [1.0, 1.0, 0.9];
+        assert!(cost(warm, [1.1, 1.0, 0.9]) + 0.1 < cost(warm, [1.1, 1.0, 1.1]));
+        // A white ground may have been made brighter, and not darker.
+        assert!(cost([1.0; 3], [1.2; 3]) + 0.1 < cost([1.0; 3], [1.0 / 1.2; 3]));
+        // A black one tells no gain.
+        assert!((cost([0.0; 3], [1.2; 3]) - cost([0.0; 3], [1.0 / 1.2; 3])).abs() < 1e-6);
+    }
+}

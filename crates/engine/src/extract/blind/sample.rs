@@ -121,11 +121,7 @@ mod tests {
         };
         let picture = square(side, pixel);
         let sample = Sample::of(&picture, 4).unwrap();
-        let darker = |factor: f32| {
-            let mut change = ToneChange::default();
-            change.coordinates[..3].fill(factor.ln());
-            sample.undone(&change, &picture)
-        };
+        let darker = |factor: f32| sample.undone(&ToneChange::of_gains([factor.ln(); 3]), &picture);
         assert!(darker(0.8).is_some() && darker(0.7).is_none());
     }
 }

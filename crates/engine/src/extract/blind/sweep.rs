@@ -87,9 +87,8 @@ impl Sweep {
 
     /// All steps from a change but itself.
     fn from(self, start: ToneChange) -> impl Iterator<Item = ToneChange> {
-        let [first, last] = self.reach.map(|end| (end / self.step).round() as i32);
-        let steps = (first..=last).filter(|i| *i != 0);
-        steps.map(move |i| self.moved(&start, i as f32))
+        let distances = values((self.reach, self.step)).filter(|distance| *distance != 0.0);
+        distances.map(move |distance| start.moved(&self.direction, distance))
     }
 }
 
@@ -133,19 +132,13 @@ pub(super) fn filters(anchor: &dyn Fn(ToneChange) -> ToneChange, cut: [bool; 3])
     } else {
         TWO_CUT
     };
-    let alone = gains_of(anchor(ToneChange::default()), cut, STEPS[0]);
-    let shaped = values(tried.bends).flat_map(|bend| {
-        let faded = values(tried.blacks).map(move |black| {
-            let mut shape = ToneChange::default();
-            shape.coordinates[ToneChange::BEND] = bend;
-            ToneChange::FADES
-                .iter()
-                .for_each(|place| shape.coordinates[*place] = black);
-            shape
-        });
-        faded.flat_map(|shape| gains_of(anchor(shape), cut, tried.gain))
-    });
-    alone.into_iter().chain(shaped).collect()
+    let none = ToneChange::default();
+    let shapes =
+        values(tried.bends).flat_map(|bend| values(tried.blacks).map(move |black| ToneChange::of_shape(bend, black)));
+    let shapes = shapes.filter(|shape| *shape != none);
+    let shaped = shapes.flat_map(|shape| gains_of(anchor(shape), cut, tried.gain));
+    let tinted = gains_of(anchor(none), cut, STEPS[ToneChange::GAINS[0]]);
+    tinted.into_iter().chain(shaped).collect()
 }
 
 /// All values of a range, in steps.
@@ -187,4 +180,65 @@ pub(super) fn distance(a: &ToneChange, b: &ToneChange) -> f32 {
 /// Whether two changes are so far from each other that a refinement of one would not find the other.
 pub(super) fn apart(a: &ToneChange, b: &ToneChange) -> bool {
     distance(a, b) > APART
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::Picture;
+
+    /// The picture after a tint, and a curve and a fade of all channels, cut to [0, 1].
+    fn filtered(tint: [f32; 3], bend: f32, black: f32) -> Picture {
+        let tau = std::f32::consts::TAU;
+        let after = |v: f32| black + (1.0 - black) * v;
+        let bent = |v: f32| v - bend * (tau * v).sin() / tau;
+        // A scene of greys on a white ground.
+        let before = (0..64).map(|i| if i < 32 { 1.0 } else { 0.2 + 0.01 * i as f32 });
+        Picture {
+            width: 8,
+            height: 8,
+            pixels: before
+                .flat_map(|v| tint.map(|gain| bent(after((gain * v).min(1.0)))))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_filter_is_near_one_of_those_tried() {
+        for (tint, bend, black) in [
+            ([1.08, 1.0, 0.9], 0.3, 0.05),
+            ([0.92, 0.97, 1.06], 0.45, 0.08),
+            ([0.95, 0.9, 0.85], -0.2, 0.0),
+            ([1.15, 1.1, 0.95], 0.0, 0.0),
+        ] {
+            let picture = filtered(tint, bend, black);
+            let ground = [picture.pixels[0], picture.pixels[1], picture.pixels[2]];
+            let anchor = |change: ToneChange| change.with_white(ground, &picture);
+            let cut = std::array::from_fn(|c| ground[c] > 0.985);
+            let tried = filters(&anchor, cut);
+            let mut done = ToneChange::of_shape(bend, black);
+            done.coordinates[..3].copy_from_slice(&tint.map(f32::ln));
+            let nearest = tried
+                .iter()
+                .map(|change| distance(change, &done))
+                .fold(f32::MAX, f32::min);
+            assert!(nearest < 2.0 * APART, "{tint:?} {bend} {black}: {nearest}");
+            // None is tried twice.
+            for (i, change) in tried.iter().enumerate() {
+                assert!(!tried[..i].contains(change), "{change}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_colour_laid_over_a_picture_is_near_one_of_those_tried() {
+        let (share, over) = (0.15, [0.8, 0.85, 1.0]);
+        let ground = over.map(|v| 1.0 - share + share * v);
+        let done = ToneChange::overlay(ground, share).unwrap();
+        let nearest = overlays(ground)
+            .map(|change| distance(&change, &done))
+            .fold(f32::MAX, f32::min);
+        assert!(nearest < APART, "{nearest}");
+        assert_eq!(overlays([0.3, 1.0, 1.0]).count(), 0);
+    }
 }

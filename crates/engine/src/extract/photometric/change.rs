@@ -41,6 +41,16 @@ impl ToneChange {
         change
     }
 
+    /// A curve, and a fade of all channels alike.
+    pub fn of_shape(bend: f32, black: f32) -> Self {
+        let mut change = Self::default();
+        change.coordinates[Self::BEND] = bend;
+        for place in Self::FADES {
+            change.coordinates[place] = black;
+        }
+        change
+    }
+
     /// This one, moved by `distance` along a direction.
     pub fn moved(&self, direction: &[f32; COORDINATES], distance: f32) -> Self {
         let mut coordinates = self.coordinates;
@@ -235,8 +245,7 @@ mod tests {
     #[test]
     fn what_cannot_have_been_done_is_told() {
         let dim = picture(vec![0.9; 30]);
-        let mut change = ToneChange::default();
-        change.coordinates[..3].fill(-0.4);
+        let change = ToneChange::of_gains([-0.4; 3]);
         assert_eq!(change.undone(&dim, &dim), None);
         // White that was cut says nothing.
         let white = picture(vec![1.0; 30]);
