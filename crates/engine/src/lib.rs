@@ -9,6 +9,7 @@ pub mod memory;
 pub mod message;
 pub mod models;
 pub mod picture;
+mod power;
 pub mod quality;
 pub mod sample;
 mod simd;

@@ -1,6 +1,8 @@
 //! What was done to the tones of a picture, all of it together: a point of a space that can be searched.
 use std::fmt;
 
+use guardsplat_codeword::Tone;
+
 use super::contrast;
 use super::tone::GREY;
 use super::undo::{Before, Undo};
@@ -38,6 +40,19 @@ impl ToneChange {
     pub fn of_gains(logs: [f32; 3]) -> Self {
         let mut change = Self::default();
         change.coordinates[..3].copy_from_slice(&logs);
+        change
+    }
+
+    /// A single tone, of all channels alike.
+    pub fn of_tone(tone: Tone) -> Self {
+        let (place, factor) = match tone {
+            Tone::Brightness(factor) => return Self::of_gains([factor.ln(); 3]),
+            Tone::Gamma(exponent) => (Self::GAMMA, exponent),
+            Tone::Contrast(factor) => (Self::CONTRAST, factor),
+            Tone::Saturation(factor) => (Self::SATURATION, factor),
+        };
+        let mut change = Self::default();
+        change.coordinates[place] = factor.ln();
         change
     }
 
@@ -90,14 +105,24 @@ impl ToneChange {
     /// have been done to values in [0, 1], and many would lie outside. Its contrast was changed about the mean of
     /// `whole`, of which it is a part.
     pub fn undone(&self, picture: &Picture, whole: &Picture) -> Option<Picture> {
+        let (before, outside) = self.undone_with_outside(picture, whole);
+        (outside as f32 <= OUTSIDE * picture.pixels.len() as f32).then_some(before)
+    }
+
+    /// The same of a whole picture, whether or not that can be.
+    pub fn undone_at_any_rate(&self, picture: &Picture) -> Picture {
+        self.undone_with_outside(picture, picture).0
+    }
+
+    /// The picture before, and how many of its values would lie outside.
+    fn undone_with_outside(&self, picture: &Picture, whole: &Picture) -> (Picture, usize) {
         let mut pixels = vec![0.0; picture.pixels.len()];
         let outside = Instructions::widest().run(Undo {
             before: self.before(whole),
             pixels: picture.pixels.as_chunks().0,
             out: pixels.as_chunks_mut().0,
         });
-        let possible = outside as f32 <= OUTSIDE * pixels.len() as f32;
-        possible.then_some(Picture { pixels, ..*picture })
+        (Picture { pixels, ..*picture }, outside)
     }
 
     /// What undoes it in a part of `whole`.
@@ -185,6 +210,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_tone_of_all_channels_is_a_change() {
+        let before = picture((0..60).map(|i| 0.3 + 0.3 * (i as f32 * 0.37).sin().abs()).collect());
+        let done = [
+            (Tone::Brightness(1.2), before.pixels.iter().map(|v| v * 1.2).collect()),
+            (
+                Tone::Gamma(0.8),
+                before.pixels.iter().map(|v| v.powf(0.8)).collect::<Vec<f32>>(),
+            ),
+        ];
+        for (tone, pixels) in done {
+            let after = ToneChange::of_tone(tone).undone_at_any_rate(&picture(pixels));
+            for (a, b) in after.pixels.iter().zip(&before.pixels) {
+                assert!((a - b).abs() < 1e-5, "{tone:?}: {a} {b}");
+            }
+        }
+        // Values that were never there are cut, where nobody asks whether they can have been.
+        let dark = ToneChange::of_tone(Tone::Brightness(0.5));
+        assert_eq!(dark.undone_at_any_rate(&picture(vec![0.9; 3])).pixels, [1.0; 3]);
     }
 
     /// Places that all have this amount, and what that does to a value.

@@ -12,7 +12,7 @@ mod tone;
 mod undo;
 pub(super) mod white_balance;
 
-use guardsplat_codeword::{PhotometricCorrection, Tone};
+use guardsplat_codeword::PhotometricCorrection;
 
 pub(super) use change::{COORDINATES, ToneChange};
 
@@ -21,7 +21,7 @@ use crate::error::Result;
 use crate::picture::Picture;
 
 /// Corrected pictures that are read together.
-const BATCH: usize = 8;
+const BATCH: usize = 16;
 
 /// All corrections that this extractor needs, none first: what [`read_corrections`] reads.
 pub fn corrections(extractor: &dyn Extractor) -> Vec<PhotometricCorrection> {
@@ -42,60 +42,42 @@ pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f3
     let as_given = engine.read_logits(std::slice::from_ref(picture))?.swap_remove(0);
     let small = engine.resized(picture)?;
     let corrections = corrections(engine.extractor.as_ref());
-    let undone: Vec<Undo> = corrections
+    let changes: Vec<Option<ToneChange>> = corrections
         .iter()
-        .map(|correction| Undo::of(*correction, &small))
+        .map(|correction| change(*correction, &small))
         .collect();
     // Many a correction does the same to this picture as another one.
-    let mut different: Vec<Undo> = Vec::new();
-    for undo in &undone {
-        if *undo != Undo::Nothing && !different.contains(undo) {
-            different.push(*undo);
+    let mut different: Vec<ToneChange> = Vec::new();
+    for change in changes.iter().flatten() {
+        if !different.contains(change) {
+            different.push(*change);
         }
     }
     let mut read = Vec::with_capacity(different.len());
     for chunk in different.chunks(BATCH) {
-        let pictures: Vec<Picture> = chunk.iter().map(|undo| undo.applied(&small)).collect();
+        let pictures = engine.each(chunk, |change| {
+            let undone = change.undone_at_any_rate(&small);
+            Ok(ground::whitened(&undone).unwrap_or(undone))
+        })?;
         read.extend(engine.read_logits(&pictures)?);
     }
-    let logits = |undo: &Undo| match different.iter().position(|other| other == undo) {
-        Some(place) => read[place].clone(),
-        None => as_given.clone(),
+    let logits = |change: &Option<ToneChange>| {
+        let place = different.iter().position(|other| Some(*other) == *change);
+        place.map_or_else(|| as_given.clone(), |place| read[place].clone())
     };
-    Ok(undone.iter().map(logits).collect())
+    Ok(changes.iter().map(logits).collect())
 }
 
-/// What a correction does to one picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Undo {
-    Nothing,
-    Ground,
-    Gains([f32; 3]),
-    Tone(Tone),
-}
-
-impl Undo {
-    fn of(correction: PhotometricCorrection, picture: &Picture) -> Self {
-        match correction {
-            // What was estimated is undone where it was found.
-            PhotometricCorrection::None | PhotometricCorrection::Estimated => Self::Nothing,
-            PhotometricCorrection::WhiteBackground => Self::Ground,
-            PhotometricCorrection::WhiteBalance(beyond) => {
-                white_balance::gains(picture, beyond).map_or(Self::Nothing, Self::Gains)
-            }
-            PhotometricCorrection::Tone(tone) => Self::Tone(tone),
+/// What a correction takes to have been done to a picture, whose ground is made white besides where it is seen; `None`
+/// where it does nothing at all.
+fn change(correction: PhotometricCorrection, picture: &Picture) -> Option<ToneChange> {
+    match correction {
+        // What was estimated is undone where it was found.
+        PhotometricCorrection::None | PhotometricCorrection::Estimated => None,
+        PhotometricCorrection::WhiteBackground => Some(ToneChange::default()),
+        PhotometricCorrection::WhiteBalance(beyond) => {
+            white_balance::gains(picture, beyond).map(|gains| ToneChange::of_gains(gains.map(f32::ln)))
         }
-    }
-
-    /// The picture before that was done to it, over white where its ground is seen.
-    fn applied(&self, picture: &Picture) -> Picture {
-        let toned = match self {
-            Self::Nothing => return picture.clone(),
-            Self::Ground => None,
-            Self::Gains(gains) => Some(white_balance::undone(*gains, picture)),
-            Self::Tone(tone) => Some(tone::undone(*tone, picture)),
-        };
-        let toned = toned.as_ref().unwrap_or(picture);
-        ground::whitened(toned).unwrap_or_else(|| toned.clone())
+        PhotometricCorrection::Tone(tone) => Some(ToneChange::of_tone(tone)),
     }
 }

@@ -1,7 +1,5 @@
-//! What is done to the tones of pictures, and how it is undone.
+//! What is guessed to have been done to the tones of pictures: one tone, by factors of which one is near enough.
 use guardsplat_codeword::Tone;
-
-use crate::picture::Picture;
 
 /// Weights of red, green and blue in a pixel's grey (ITU-R BT.601).
 pub(super) const GREY: [f32; 3] = [0.299, 0.587, 0.114];
@@ -31,31 +29,6 @@ const fn sought(tone: fn(f32) -> Tone, reach: f32, ratio: f32) -> Sought {
     Sought { tone, reach, ratio }
 }
 
-/// The picture before this was done to it, values cut to [0, 1]; what was cut when it was done stays cut.
-pub(super) fn undone(tone: Tone, picture: &Picture) -> Picture {
-    let pixels = match tone {
-        Tone::Brightness(factor) => each(picture, |v| v / factor),
-        Tone::Gamma(exponent) => each(picture, |v| v.max(0.0).powf(1.0 / exponent)),
-        Tone::Contrast(factor) => {
-            let greys = picture.pixels.as_chunks::<3>().0.iter().map(|p| f64::from(grey(p)));
-            let count = (picture.pixels.len() / 3).max(1);
-            let mean = (greys.sum::<f64>() / count as f64) as f32;
-            each(picture, |v| mean + (v - mean) / factor)
-        }
-        Tone::Saturation(factor) => picture
-            .pixels
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .flat_map(|pixel| {
-                let grey = grey(pixel);
-                pixel.map(|v| (grey + (v - grey) / factor).clamp(0.0, 1.0))
-            })
-            .collect(),
-    };
-    Picture { pixels, ..*picture }
-}
-
 /// All factors of all kinds.
 pub(super) fn all() -> Vec<Tone> {
     let mut all = Vec::new();
@@ -68,10 +41,6 @@ pub(super) fn all() -> Vec<Tone> {
     all
 }
 
-fn each(picture: &Picture, change: impl Fn(f32) -> f32) -> Vec<f32> {
-    picture.pixels.iter().map(|v| change(*v).clamp(0.0, 1.0)).collect()
-}
-
 /// The grey of a pixel.
 #[inline(always)]
 pub(super) fn grey([red, green, blue]: &[f32; 3]) -> f32 {
@@ -81,28 +50,6 @@ pub(super) fn grey([red, green, blue]: &[f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn picture() -> Picture {
-        Picture {
-            width: 4,
-            height: 2,
-            pixels: (0..24).map(|i| 0.3 + 0.4 * (i as f32 * 0.37).sin().abs()).collect(),
-        }
-    }
-
-    #[test]
-    fn what_was_done_is_undone() {
-        let before = picture();
-        for Sought { tone, .. } in SOUGHT {
-            // Undoing the inverse is doing it.
-            let done = undone(tone(1.4), &before);
-            assert_ne!(done, before, "{:?}", tone(1.4));
-            let after = undone(tone(1.0 / 1.4), &done);
-            for (a, b) in after.pixels.iter().zip(&before.pixels) {
-                assert!((a - b).abs() < 1e-5, "{:?}: {a} {b}", tone(1.4));
-            }
-        }
-    }
 
     #[test]
     fn factors_reach_twice_and_half() {

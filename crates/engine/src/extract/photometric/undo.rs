@@ -1,7 +1,8 @@
-//! Undoes a change of tones: each pixel for itself, eight or more a register.
+//! Undoes a change of tones: pixels by blocks, whose channels fill vector registers.
 use super::change::ToneChange;
 use super::curve;
-use super::tone::grey;
+use super::tone::GREY;
+use crate::power::power_of;
 use crate::simd::Vectorised;
 
 /// Values this near to black or white were cut there by what was done, and say nothing of what they had been.
@@ -10,71 +11,96 @@ pub(super) const CUT: f32 = 0.5 / 255.0;
 const BEYOND: f32 = 0.03;
 /// What black may have become at least and at most.
 const MOST_FADED: [f32; 2] = [-0.5, 0.5];
+/// Pixels of a block.
+const BLOCK: usize = 64;
 
-/// What undoes a change, worked out once for all pixels.
+/// Red, green and blue of some pixels.
+type Channels<const N: usize> = [[f32; N]; 3];
+
+/// What undoes a change, worked out once for all pixels. A part that was not done is `None`.
 #[derive(Clone, Copy)]
 pub(super) struct Before {
-    mean: f32,
-    contrast: f32,
-    saturation: f32,
-    /// Of a curve, where there was one.
+    /// The mean grey, and one over the contrast.
+    contrast: Option<(f32, f32)>,
+    /// One over the saturation.
+    saturation: Option<f32>,
+    /// Of a curve.
     bend: Option<f32>,
-    /// What black became in each channel.
-    blacks: [f32; 3],
-    /// One over gamma, where that was changed.
-    exponent: Option<f32>,
+    /// What black became in each channel, and one over how far it is from white then.
+    fades: Option<[(f32, f32); 3]>,
+    /// One over gamma.
+    exponent: Option<f64>,
+    /// One over each gain.
     gains: [f32; 3],
 }
 
 impl Before {
     /// Of a picture with this mean grey before its contrast was changed.
     pub fn new(change: &ToneChange, mean: f32) -> Self {
-        let factors = change.coordinates.map(f32::exp);
-        let bend = change.coordinates[ToneChange::BEND];
+        let done = |place: usize| Some(change.coordinates[place]).filter(|amount| *amount != 0.0);
+        let inverse = |log: f32| (-log).exp();
         let [least, most] = MOST_FADED;
+        let fade = |black: f32| {
+            let black = black.clamp(least, most);
+            (black, 1.0 / (1.0 - black))
+        };
         Self {
-            mean,
-            contrast: factors[ToneChange::CONTRAST],
-            saturation: factors[ToneChange::SATURATION],
-            bend: (bend != 0.0).then(|| curve::limited(bend)),
-            blacks: change.fades().map(|black| black.clamp(least, most)),
-            exponent: (change.coordinates[ToneChange::GAMMA] != 0.0).then_some(1.0 / factors[ToneChange::GAMMA]),
-            gains: ToneChange::GAINS.map(|place| factors[place]),
+            contrast: done(ToneChange::CONTRAST).map(|log| (mean, inverse(log))),
+            saturation: done(ToneChange::SATURATION).map(inverse),
+            bend: done(ToneChange::BEND).map(curve::limited),
+            fades: change.is_fade().then(|| change.fades().map(fade)),
+            exponent: done(ToneChange::GAMMA).map(|log| f64::from(-log).exp()),
+            gains: ToneChange::GAINS.map(|place| inverse(change.coordinates[place])),
         }
     }
 
-    /// Values before the change was done to them, not cut; what was cut when it was done stays cut.
+    /// A colour before the change was done to it, not cut; what was cut when it was done stays cut.
+    pub fn of(&self, colour: [f32; 3]) -> [f32; 3] {
+        let mut channels = colour.map(|v| [v]);
+        self.undo(&mut channels);
+        channels.map(|[v]| v)
+    }
+
+    /// The same of many colours.
     #[inline(always)]
-    pub fn of(&self, now: [f32; 3]) -> [f32; 3] {
-        let mut pixel = now;
-        for v in &mut pixel {
-            *v = self.mean + (*v - self.mean) / self.contrast;
+    fn undo<const N: usize>(&self, channels: &mut Channels<N>) {
+        if let Some((mean, contrast)) = self.contrast {
+            for v in channels.as_flattened_mut() {
+                *v = mean + (*v - mean) * contrast;
+            }
         }
-        let grey = grey(&pixel);
-        for v in &mut pixel {
-            *v = grey + (*v - grey) / self.saturation;
+        if let Some(saturation) = self.saturation {
+            let [red, green, blue] = channels;
+            for ((red, green), blue) in red.iter_mut().zip(green).zip(blue) {
+                let grey = *red * GREY[0] + *green * GREY[1] + *blue * GREY[2];
+                *red = grey + (*red - grey) * saturation;
+                *green = grey + (*green - grey) * saturation;
+                *blue = grey + (*blue - grey) * saturation;
+            }
         }
         if let Some(bend) = self.bend {
-            for v in &mut pixel {
+            for v in channels.as_flattened_mut() {
                 *v = curve::before(*v, bend);
             }
         }
-        for (v, black) in pixel.iter_mut().zip(self.blacks) {
-            *v = (*v - black) / (1.0 - black);
-        }
-        if let Some(exponent) = self.exponent {
-            for v in &mut pixel {
-                *v = v.max(0.0).powf(exponent);
+        if let Some(fades) = self.fades {
+            for (channel, (black, stretched)) in channels.iter_mut().zip(fades) {
+                channel.iter_mut().for_each(|v| *v = (*v - black) * stretched);
             }
         }
-        for (v, gain) in pixel.iter_mut().zip(self.gains) {
-            *v /= gain;
+        if let Some(exponent) = self.exponent {
+            for v in channels.as_flattened_mut() {
+                *v = power_of(if *v > 0.0 { *v } else { 0.0 }, exponent);
+            }
         }
-        pixel
+        for (channel, gain) in channels.iter_mut().zip(self.gains) {
+            channel.iter_mut().for_each(|v| *v *= gain);
+        }
     }
 }
 
-/// Undoes a change, and counts values that it can't have been done to.
+/// Undoes a change, and counts values that it can't have been done to. Nothing is fused: the bytes are the same on every
+/// instruction set of an architecture.
 pub(super) struct Undo<'a> {
     pub before: Before,
     pub pixels: &'a [[f32; 3]],
@@ -86,35 +112,23 @@ impl Vectorised for Undo<'_> {
 
     #[inline(always)]
     fn run<const FUSED: bool>(self) -> usize {
-        let before = self.before;
-        // Apart, so that loops without powers have no calls, and those without a curve no iterations.
-        let without_power = Before {
-            exponent: None,
-            ..before
-        };
-        let plain = Before {
-            bend: None,
-            ..without_power
-        };
-        match (before.exponent, before.bend) {
-            (None, None) => self.each(plain),
-            (None, Some(_)) => self.each(without_power),
-            (Some(_), _) => self.each(before),
-        }
-    }
-}
-
-impl Undo<'_> {
-    #[inline(always)]
-    fn each(self, before: Before) -> usize {
-        let mut outside = 0_u32;
-        for (out, now) in self.out.iter_mut().zip(self.pixels) {
-            let was = before.of(*now);
-            for c in 0..3 {
-                let seen = (now[c] > CUT) & (now[c] < 1.0 - CUT);
-                let possible = (was[c] >= -BEYOND) & (was[c] <= 1.0 + BEYOND);
+        let mut outside = 0;
+        for (out, pixels) in self.out.chunks_mut(BLOCK).zip(self.pixels.chunks(BLOCK)) {
+            let mut now: Channels<BLOCK> = [[0.0; BLOCK]; 3];
+            for (k, pixel) in pixels.iter().enumerate() {
+                (0..3).for_each(|c| now[c][k] = pixel[c]);
+            }
+            let mut was = now;
+            self.before.undo(&mut was);
+            // What a block is filled up with is black, which counts as cut.
+            for (now, was) in now.as_flattened().iter().zip(was.as_flattened_mut()) {
+                let seen = (*now > CUT) & (*now < 1.0 - CUT);
+                let possible = (*was >= -BEYOND) & (*was <= 1.0 + BEYOND);
                 outside += u32::from(seen & !possible);
-                out[c] = was[c].clamp(0.0, 1.0);
+                *was = was.clamp(0.0, 1.0);
+            }
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = [was[0][k], was[1][k], was[2][k]];
             }
         }
         outside as usize

@@ -36,19 +36,10 @@ pub(in crate::extract) fn cut(ground: [f32; 3]) -> Option<[bool; 3]> {
     (bright && cut != [true; 3]).then_some(cut)
 }
 
-/// The picture before its channels were multiplied by these, values cut to [0, 1].
-pub(super) fn undone(gains: [f32; 3], picture: &Picture) -> Picture {
-    let pixels = picture.pixels.as_chunks::<3>().0.iter();
-    let before = pixels.flat_map(|pixel| std::array::from_fn::<f32, 3, _>(|c| (pixel[c] / gains[c]).clamp(0.0, 1.0)));
-    Picture {
-        pixels: before.collect(),
-        ..*picture
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extract::photometric::ToneChange;
 
     /// Something coloured on a ground.
     fn on(ground: [f32; 3]) -> Picture {
@@ -82,7 +73,8 @@ mod tests {
                 .collect(),
             ..scene
         };
-        let before = undone(gains(&tinted, [1.0; 3]).unwrap(), &tinted);
+        let told = gains(&tinted, [1.0; 3]).unwrap();
+        let before = ToneChange::of_gains(told.map(f32::ln)).undone_at_any_rate(&tinted);
         for (a, b) in before.pixels.iter().zip(&scene.pixels) {
             assert!((a - b).abs() < 1e-6);
         }
