@@ -11,6 +11,7 @@ pub mod models;
 pub mod picture;
 mod power;
 pub mod quality;
+pub mod resize;
 pub mod sample;
 mod simd;
 pub mod splat;

@@ -3,10 +3,9 @@
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use guardsplat_engine::clip::config::published;
-use guardsplat_engine::clip::{
-    Clip, ClipConfig, ClipModel, Parts, Precision, TensorFile, TensorSource, normalize, resize,
-};
+use guardsplat_engine::clip::{Clip, ClipConfig, ClipModel, Parts, Precision, TensorFile, TensorSource, normalize};
 use guardsplat_engine::error::Result;
+use guardsplat_engine::resize::resize;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -22,7 +22,7 @@ mod weights;
 
 pub use config::ClipConfig;
 pub use model::{ClipModel, ImageTower, Parts, normalize};
-pub use preprocess::{normalized, preprocess, resize};
+pub use preprocess::{normalized, preprocess};
 pub use random_fourier::RandomFourierEncoder;
 pub use resnet::ResNet;
 pub use shipped::ShippedClip;
@@ -36,6 +36,7 @@ pub(crate) use tensor_file::{check_header, hash};
 pub(crate) use weights::write_whole;
 
 use crate::error::{Error, Result};
+use crate::resize::resize;
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use std::path::{Path, PathBuf};

@@ -11,9 +11,9 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::settings::Settings;
-use crate::clip::resize;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
+use crate::resize::resize;
 
 /// What rotated pictures show in their corners.
 pub(super) const CORNERS: [f32; 3] = [1.0; 3];

@@ -9,13 +9,14 @@ use rayon::prelude::*;
 use super::extractor::{ClipExtractor, Extractor};
 use super::hypothesis::searched_hypotheses;
 use super::sizes::larger_sides;
-use crate::clip::{Clip, resize};
+use crate::clip::Clip;
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::memory::Limits;
 use crate::message::Key;
 use crate::picture::Picture;
-use crate::quality::{Lpips, batch, unbatch};
+use crate::quality::{Lpips, batch};
+use crate::resize::{resize, resized};
 use crate::splat::{CpuRasterizer, Geometry, GpuRasterizer, Rasterizer, WeightCache, sh};
 use crate::stop::Stop;
 use crate::view::Camera;
@@ -199,7 +200,8 @@ impl Engine {
     /// # Errors
     /// Pictures without pixels, a failing device, or [`Error::Stopped`].
     pub fn read_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        self.read_with(pictures, |pictures| self.logits(pictures))
+        let side = self.extractor.side();
+        self.read_with(pictures, Some(side), |pictures| self.logits(pictures))
     }
 
     /// Logits of pictures that were put together from squares that the extractor looks at one by one.
@@ -207,7 +209,7 @@ impl Engine {
     /// # Errors
     /// Those of [`Engine::read_logits`].
     pub(super) fn read_square_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        self.read_with(pictures, |pictures| self.extractor.square_logits(pictures))
+        self.read_with(pictures, None, |pictures| self.extractor.square_logits(pictures))
     }
 
     /// Logits of pictures that are made `side` pixels wide and high first: the extractor's own side, or another one where
@@ -216,15 +218,25 @@ impl Engine {
     /// # Errors
     /// Those of [`Engine::read_logits`].
     pub(super) fn read_logits_at(&self, side: usize, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        self.read_with(pictures, |pictures| self.logits_at(side, pictures))
+        self.read_with(pictures, Some(side), |pictures| self.logits_at(side, pictures))
     }
 
-    fn read_with(&self, pictures: &[Picture], read: impl Fn(Tensor<4>) -> Result<Tensor<2>>) -> Result<Vec<Vec<f32>>> {
+    /// Logits of pictures, which are made `side` pixels wide and high first if that is given.
+    fn read_with(
+        &self,
+        pictures: &[Picture],
+        side: Option<usize>,
+        read: impl Fn(Tensor<4>) -> Result<Tensor<2>>,
+    ) -> Result<Vec<Vec<f32>>> {
         let mut rows = Vec::with_capacity(pictures.len());
         for same in pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
             for chunk in same.chunks(READ_BATCH) {
                 self.stop.check()?;
-                let chunk: Vec<&Picture> = chunk.iter().collect();
+                let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
+                    Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
+                    None => Vec::new(),
+                };
+                let chunk: Vec<&Picture> = if made.is_empty() { chunk } else { &made }.iter().collect();
                 let logits = read(batch(&chunk, &self.compute.device)?)?;
                 rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
             }
@@ -235,7 +247,7 @@ impl Engine {
     /// A picture at the side that the extractor takes in.
     ///
     /// # Errors
-    /// A picture without pixels, or a failing device.
+    /// A picture without pixels.
     pub fn resized(&self, picture: &Picture) -> Result<Picture> {
         self.resized_to(self.extractor.side(), picture)
     }
@@ -245,8 +257,7 @@ impl Engine {
     /// # Errors
     /// Those of [`Engine::resized`].
     pub(super) fn resized_to(&self, side: usize, picture: &Picture) -> Result<Picture> {
-        let pictures = resize(batch(&[picture], &self.compute.device)?, side, side);
-        Ok(unbatch(pictures)?.swap_remove(0))
+        resized(picture, side, side)
     }
 
     /// Values of a tensor on the host.

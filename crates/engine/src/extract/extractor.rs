@@ -1,10 +1,11 @@
 //! What reads a message from pictures: the part of the engine that embedding differentiates through, and readings ask.
 use burn::tensor::{Device, Tensor};
 
+use crate::clip::Clip;
 use crate::clip::config::{Tones, VisionTower};
-use crate::clip::{Clip, resize};
 use crate::error::{Error, Result};
 use crate::message::{Decoding, Key, Reader};
+use crate::resize::resize;
 
 /// Turns pictures into a number for each bit of a word.
 ///

@@ -54,8 +54,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::clip::resize;
     use crate::device::{DeviceChoice, open};
+    use crate::resize::resize;
 
     /// Side of the pictures that [`Sines`] takes in.
     const SIDE: usize = 32;

@@ -7,7 +7,7 @@ use crate::picture::Picture;
 
 /// That there are pictures, all of one size that is not empty, with as many numbers as that needs. The error says what
 /// is not so.
-pub(super) fn comparable(pictures: &[&Picture]) -> Result<()> {
+pub(crate) fn comparable(pictures: &[&Picture]) -> Result<()> {
     let bad = |reason| {
         Err(Error::BadOption {
             field: "pictures",

@@ -15,6 +15,7 @@ pub mod psnr;
 pub mod ssim;
 mod window;
 
+pub(crate) use batch::comparable;
 pub use batch::{batch, unbatch};
 pub use compare::{contact_sheet, difference};
 pub use cover::{covered, psnr_covered};

@@ -57,7 +57,7 @@ impl Extractor for Patches {
 
     fn logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
         let device = pictures.device();
-        let pictures = crate::clip::resize(pictures, SIDE, SIDE);
+        let pictures = crate::resize::resize(pictures, SIDE, SIDE);
         let count = pictures.dims()[0];
         self.read.fetch_add(count, Ordering::Relaxed);
         let values: Vec<f32> = pictures.try_into_vec_as::<f32>().unwrap();
