@@ -4,7 +4,7 @@ use guardsplat_codeword::Hypothesis;
 use super::blind::{BlindReading, Candidate, chosen};
 use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
 use super::led::{self, Ways};
-use super::restore::{read_restored, restored};
+use super::restore::{Restored, read_restored};
 use super::window::read_windows;
 use super::{Engine, Extractor, PooledLogits, without_borders};
 use crate::clip::config::Tones;
@@ -38,14 +38,14 @@ impl PictureLogits {
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
-        let restored = restored(engine, picture);
-        let picture = restored.as_ref();
+        let restored = Restored::of(engine, picture);
+        let picture = restored.picture.as_ref();
         let as_given = read_restored(engine, picture)?;
         let blind = match engine.extractor.tones() {
             Tones::Searched => None,
             Tones::Estimated => {
                 let others: Vec<_> = others.iter().filter_map(|other| other.blind.as_ref()).collect();
-                Some(BlindReading::read(engine, picture, &others)?)
+                Some(BlindReading::read(engine, &restored, &others)?)
             }
         };
         let searched = match &blind {

@@ -2,34 +2,37 @@
 use super::{Candidate, score, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
+use crate::extract::restore::Restored;
 use crate::extract::sizes::{larger_sides, mean, shorter_side};
 use crate::picture::Picture;
 
-/// Candidates for what was done to `picture`, which is `whole` at the side that the extractor takes in, with the mean of
-/// their logits at all sizes; best first, but the last of those given stays the last.
+/// Of the candidates of a picture so many are read at all sizes, and the last: what others read hardly ever counts, and larger
+/// pictures are five times the work.
+const AT_ALL_SIZES: usize = 12;
+
+/// Candidates for what was done to a picture, which is `whole` at the side that the extractor takes in, the best with the
+/// mean of their logits at all sizes; best first, but the last of those given stays the last.
 ///
 /// # Errors
 /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub(super) fn read(
     engine: &Engine,
-    picture: &Picture,
+    restored: &Restored<'_>,
     whole: &Picture,
     mut candidates: Vec<Candidate>,
 ) -> Result<Vec<Candidate>> {
     let mut readings: Vec<Vec<Vec<f32>>> = candidates.iter().map(|found| vec![found.logits.clone()]).collect();
-    for place in 0..candidates.len() {
-        let part = candidates[place].part;
-        // Each part is made small once, for all of its candidates.
-        if candidates[..place].iter().any(|before| before.part == part) {
-            continue;
-        }
-        let shown = part.of(picture);
+    let last = candidates.len().checked_sub(1);
+    let mut chosen: Vec<usize> = (0..last.unwrap_or(0).min(AT_ALL_SIZES)).chain(last).collect();
+    // Each part is made small once, for all of its candidates.
+    while let Some(part) = chosen.first().map(|place| candidates[*place].part) {
+        let (of_part, others): (Vec<_>, Vec<_>) = chosen.into_iter().partition(|place| candidates[*place].part == part);
+        chosen = others;
+        let shown = part.of(restored);
         for side in larger_sides(engine.extractor.as_ref(), shorter_side(&shown)) {
             let shown = engine.resized_to(side, &shown)?;
-            let of_part = (place..candidates.len()).filter(|other| candidates[*other].part == part);
-            let places: Vec<usize> = of_part.collect();
-            let undone = engine.each(&places, |place| Ok(undone(&candidates[*place], &shown, whole)))?;
-            let possible = places.into_iter().zip(undone);
+            let undone = engine.each(&of_part, |place| Ok(undone(&candidates[*place], &shown, whole)))?;
+            let possible = of_part.iter().copied().zip(undone);
             let (places, pictures): (Vec<usize>, Vec<Picture>) =
                 possible.filter_map(|(place, undone)| Some((place, undone?))).unzip();
             for (place, logits) in places.into_iter().zip(engine.read_logits_at(side, &pictures)?) {

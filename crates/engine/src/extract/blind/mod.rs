@@ -20,6 +20,7 @@ use std::fmt;
 
 use super::Engine;
 use super::photometric::{ToneChange, ground};
+use super::restore::Restored;
 use crate::error::Result;
 use crate::picture::Picture;
 use candidates::Search;
@@ -80,6 +81,7 @@ impl fmt::Display for Candidate {
         match self.part {
             Part::Whole => Ok(()),
             Part::Trimmed => f.write_str(", without borders"),
+            Part::WithoutBackdrop => f.write_str(", without its backdrop"),
             Part::Window(window) => write!(f, ", {window}"),
         }
     }
@@ -90,25 +92,28 @@ impl BlindReading {
     ///
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
-    pub fn read(engine: &Engine, picture: &Picture, others: &[&Self]) -> Result<Self> {
-        let whole = engine.resized(picture)?;
-        let parts = parts(engine, picture, &whole)?;
+    pub fn read(engine: &Engine, restored: &Restored<'_>, others: &[&Self]) -> Result<Self> {
+        let whole = engine.resized(&restored.picture)?;
+        let parts = parts(engine, restored, &whole)?;
         let mut search = Search::of_parts(engine, &whole, &parts)?;
         let hints = others.iter().rev().filter_map(|other| other.candidates.first());
         let hints: Vec<ToneChange> = hints.take(HINTS).map(|candidate| candidate.change).collect();
         // The whole, or what is within its borders.
         search.sweep(0, &hints)?;
         search.refine(STARTS)?;
-        if let Some(window) = search.promising()
-            && !search.is_clear()
-        {
-            search.sweep(window, &hints)?;
+        let backdrop = parts.iter().position(|(part, _)| *part == Part::WithoutBackdrop);
+        let promising = search.promising().filter(|place| Some(*place) != backdrop);
+        for place in [backdrop, promising].into_iter().flatten() {
+            if search.is_clear() {
+                break;
+            }
+            search.sweep(place, &hints)?;
             search.refine(1)?;
         }
         Ok(Self {
             bits: engine.bits,
             is_clear: search.is_certain(),
-            candidates: finer::read(engine, picture, &whole, search.best())?,
+            candidates: finer::read(engine, restored, &whole, search.best())?,
         })
     }
 

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use guardsplat_codeword::Window;
 
 use crate::error::Result;
+use crate::extract::restore::Restored;
 use crate::extract::window::{crop, windows_of};
 use crate::extract::{Engine, without_borders};
 use crate::picture::Picture;
@@ -18,15 +19,19 @@ pub(super) enum Part {
     Whole,
     /// All but borders of one colour.
     Trimmed,
+    /// All but the backdrop.
+    WithoutBackdrop,
     /// A window.
     Window(Window),
 }
 
 impl Part {
     /// What it is of a picture.
-    pub(super) fn of<'a>(&self, picture: &'a Picture) -> Cow<'a, Picture> {
+    pub(super) fn of<'a>(&self, restored: &'a Restored<'_>) -> Cow<'a, Picture> {
+        let picture = restored.picture.as_ref();
         match self {
             Self::Whole => Cow::Borrowed(picture),
+            Self::WithoutBackdrop => Cow::Borrowed(restored.without_backdrop.as_ref().unwrap_or(picture)),
             Self::Trimmed => without_borders(picture).map_or(Cow::Borrowed(picture), Cow::Owned),
             Self::Window(window) => Cow::Owned(crop(*window, picture)),
         }
@@ -35,7 +40,7 @@ impl Part {
     /// What a part must gain to be believed: there are many, and any shows some colours.
     pub(super) fn cost(&self) -> f64 {
         match self {
-            Self::Whole | Self::Trimmed => 0.0,
+            Self::Whole | Self::Trimmed | Self::WithoutBackdrop => 0.0,
             Self::Window(_) => BETTER,
         }
     }
@@ -43,12 +48,16 @@ impl Part {
 
 /// All parts at the side that the extractor takes in, `whole` being the picture so. First comes what is within its
 /// borders, or the whole if it has none.
-pub(super) fn parts(engine: &Engine, picture: &Picture, whole: &Picture) -> Result<Vec<(Part, Picture)>> {
+pub(super) fn parts(engine: &Engine, restored: &Restored<'_>, whole: &Picture) -> Result<Vec<(Part, Picture)>> {
+    let picture = restored.picture.as_ref();
     let mut parts = Vec::new();
     if let Some(trimmed) = without_borders(picture) {
         parts.push((Part::Trimmed, engine.resized(&trimmed)?));
     }
     parts.push((Part::Whole, whole.clone()));
+    if let Some(picture) = &restored.without_backdrop {
+        parts.push((Part::WithoutBackdrop, engine.resized(picture)?));
+    }
     for window in windows_of(picture) {
         // Made small one by one: a large picture need not fit in memory many times.
         parts.push((Part::Window(window), engine.resized(&crop(window, picture))?));

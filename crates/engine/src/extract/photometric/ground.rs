@@ -3,8 +3,11 @@
 use crate::picture::Picture;
 use crate::simd::{Instructions, Vectorised};
 
-/// Distance from the ground's colour up to which a pixel is ground, and from which on it is none.
+/// Distance from the ground's colour up to which a pixel is ground, and from which on it is none: noise and compression stay
+/// within.
 const DISTANCE: [f32; 2] = [0.06, 0.12];
+/// The same of a ground that a viewer drew: a dark scene has colours that are hardly further from a dark ground.
+const DRAWN: [f32; 2] = [0.02, 0.04];
 /// Share of the border that must be ground.
 const SHARE: f32 = 0.5;
 /// Share of values cut at black or white from which on a ground was that: noise that is as often up as down cuts half.
@@ -26,13 +29,29 @@ pub(in crate::extract) fn whitened_from(picture: &Picture, ground: [f32; 3]) -> 
     replaced(picture, ground, [1.0; 3])
 }
 
+/// The picture with its ground made white where that is plain, as no scene is; `None` where it is not, or is white or black.
+pub(in crate::extract) fn without_plain(picture: &Picture) -> Option<Picture> {
+    let ground = plain(picture)?;
+    // Compression makes such of white and black.
+    let is_clean = [0.0, 1.0]
+        .iter()
+        .any(|level| distance(&ground, [*level; 3]) <= 1.0 - NEARLY_WHITE);
+    let distances = if is_clean { DISTANCE } else { DRAWN };
+    Some(replaced_within(picture, ground, [1.0; 3], distances))
+}
+
 /// The picture with all of a colour made another one.
 pub(in crate::extract) fn replaced(picture: &Picture, colour: [f32; 3], by: [f32; 3]) -> Picture {
+    replaced_within(picture, colour, by, DISTANCE)
+}
+
+fn replaced_within(picture: &Picture, colour: [f32; 3], by: [f32; 3], distances: [f32; 2]) -> Picture {
     let mut pixels = vec![0.0; picture.pixels.len()];
     Instructions::widest().run(Replace {
         pixels: picture.pixels.as_chunks().0,
         colour,
         by,
+        distances,
         out: pixels.as_chunks_mut().0,
     });
     Picture { pixels, ..*picture }
@@ -43,6 +62,7 @@ struct Replace<'a> {
     pixels: &'a [[f32; 3]],
     colour: [f32; 3],
     by: [f32; 3],
+    distances: [f32; 2],
     out: &'a mut [[f32; 3]],
 }
 
@@ -51,14 +71,24 @@ impl Vectorised for Replace<'_> {
 
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let [near, far] = DISTANCE;
         for (out, pixel) in self.out.iter_mut().zip(self.pixels) {
-            let kept = ((distance(pixel, self.colour) - near) / (far - near)).clamp(0.0, 1.0);
+            let kept = share_beyond(self.distances, pixel, self.colour);
             for c in 0..3 {
                 out[c] = pixel[c] * kept + self.by[c] * (1.0 - kept);
             }
         }
     }
+}
+
+/// How much of a pixel is not of a ground of this colour.
+pub(in crate::extract) fn share_of_scene(pixel: &[f32; 3], ground: [f32; 3]) -> f32 {
+    share_beyond(DISTANCE, pixel, ground)
+}
+
+/// The same: nothing up to the first distance, all from the second on.
+#[inline(always)]
+fn share_beyond([near, far]: [f32; 2], pixel: &[f32; 3], ground: [f32; 3]) -> f32 {
+    ((distance(pixel, ground) - near) / (far - near)).clamp(0.0, 1.0)
 }
 
 /// The colour of the ground; `None` where the border is not of one colour, or is white or black already.
@@ -71,7 +101,7 @@ pub(in crate::extract) fn colour(picture: &Picture) -> Option<[f32; 3]> {
 }
 
 /// The colour of a ground that is plain, as no scene is; `None` where there is none, or it is white or black.
-pub(in crate::extract) fn plain(picture: &Picture) -> Option<[f32; 3]> {
+fn plain(picture: &Picture) -> Option<[f32; 3]> {
     let ground = colour(picture)?;
     let border = border(picture);
     let plain = border.iter().filter(|pixel| distance(pixel, ground) <= PLAIN).count();
@@ -130,13 +160,14 @@ fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
 
 /// The outermost pixels.
 fn border(picture: &Picture) -> Vec<[f32; 3]> {
-    let (width, height) = (picture.width as usize, picture.height as usize);
-    let pixels = picture.pixels.as_chunks::<3>().0.iter().enumerate();
-    let outermost = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        x == 0 || y == 0 || x + 1 == width || y + 1 == height
-    };
-    pixels.filter(|(i, _)| outermost(*i)).map(|(_, p)| *p).collect()
+    let (width, pixels) = (picture.width as usize, picture.pixels.as_chunks::<3>().0);
+    if width == 0 || pixels.len() <= 2 * width {
+        return pixels.to_vec();
+    }
+    let (first, rest) = pixels.split_at(width);
+    let (inner, last) = rest.split_at(rest.len() - width);
+    let sides = inner.chunks_exact(width).flat_map(|row| [row[0], row[width - 1]]);
+    first.iter().copied().chain(sides).chain(last.iter().copied()).collect()
 }
 
 fn median(mut values: Vec<f32>) -> f32 {
@@ -186,6 +217,48 @@ mod tests {
         // A wall has a texture.
         assert!(plain(&disc(0.5, 0.04)).is_none() && colour(&disc(0.5, 0.04)).is_some());
         assert!(plain(&disc(1.0, 0.0)).is_none() && plain(&disc(0.0, 0.0)).is_none());
+    }
+
+    #[test]
+    fn of_a_dark_ground_no_dark_scene_is_taken() {
+        // A disc that is a twentieth brighter than the ground.
+        let mut picture = disc(0.2, 0.0);
+        for pixel in picture.pixels.as_chunks_mut::<3>().0 {
+            if *pixel != [0.2; 3] {
+                *pixel = [0.25; 3];
+            }
+        }
+        let white = without_plain(&picture).unwrap();
+        let kept = white
+            .pixels
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .filter(|pixel| **pixel == [0.25; 3])
+            .count();
+        let of_ground = white
+            .pixels
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .filter(|pixel| **pixel == [1.0; 3])
+            .count();
+        assert!(kept > 250 && kept + of_ground == 32 * 32, "{kept} {of_ground}");
+        // What compression makes of white may be further from it.
+        let compressed = disc(0.99, 0.02);
+        let flat = compressed
+            .pixels
+            .iter()
+            .map(|v| if *v > 0.95 { 0.99 } else { *v })
+            .collect();
+        assert_eq!(
+            without_plain(&Picture {
+                pixels: flat,
+                ..compressed
+            })
+            .unwrap(),
+            disc(1.0, 0.0)
+        );
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Restoration: what is not of the scene is taken out of a picture before it is read.
 //!
 //! - **Uneven light.** Dark corners, or light from one side, as a [ground](uneven) shows it.
+//! - **A backdrop**, as a [gradient](backdrop) behind the scene. Where it is so bright that it may be uneven light, both are
+//!   tried.
 //! - **Noise.** A tower of sines reads exact colours, so that noise blurs what it reads. Worse, a white ground with noise is
 //!   not white any more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers
 //!   more of a picture than the scene does.
@@ -10,9 +12,11 @@
 //!   Elsewhere it is kept, for it tells what was done to its white.
 //!
 //! Nothing is guessed: the picture alone decides, so that no claim pays for it.
+mod backdrop;
 mod median;
 mod noise;
 mod plain;
+mod smooth_ground;
 mod uneven;
 
 use std::borrow::Cow;
@@ -22,6 +26,7 @@ use super::photometric::ground;
 use super::sizes::read_at_sizes;
 use crate::error::Result;
 use crate::picture::Picture;
+use smooth_ground::SmoothGround;
 
 /// Noise from which on a picture is restored, as a standard deviation: one step of 8 bits.
 const NOISE: f32 = 1.0 / 255.0;
@@ -35,7 +40,7 @@ const RADIUS: [usize; 2] = [1, 7];
 /// # Errors
 /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
 pub fn read_given(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
-    read_restored(engine, &restored(engine, picture))
+    read_restored(engine, &Restored::of(engine, picture).picture)
 }
 
 /// Logits of a picture that was restored, as it was given.
@@ -44,7 +49,7 @@ pub fn read_given(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
 /// Those of [`read_given`].
 pub(super) fn read_restored(engine: &Engine, restored: &Picture) -> Result<Vec<f32>> {
     let on_white = match engine.extractor.reads_exact_colours() {
-        true => ground::plain(restored).map(|ground| ground::whitened_from(restored, ground)),
+        true => ground::without_plain(restored),
         false => None,
     };
     let picture = on_white.as_ref().unwrap_or(restored);
@@ -64,15 +69,46 @@ pub fn read_rendered(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
     read_at_sizes(engine, &restored)
 }
 
-/// The picture as it is read; as it is where there is nothing to take out, or the extractor does not read exact colours.
-pub(super) fn restored<'a>(engine: &Engine, picture: &'a Picture) -> Cow<'a, Picture> {
-    if !engine.extractor.reads_exact_colours() {
-        return Cow::Borrowed(picture);
+/// A picture as it is read.
+pub(super) struct Restored<'a> {
+    /// As it is where there is nothing to take out, or the extractor does not read exact colours.
+    pub picture: Cow<'a, Picture>,
+    /// Without its backdrop, where what was taken for uneven light may be one.
+    pub without_backdrop: Option<Picture>,
+}
+
+impl<'a> Restored<'a> {
+    /// That of a picture that somebody gave.
+    pub fn of(engine: &Engine, picture: &'a Picture) -> Self {
+        if !engine.extractor.reads_exact_colours() {
+            return Self::without_alternative(Cow::Borrowed(picture));
+        }
+        let Some(ground) = SmoothGround::seen(picture) else {
+            return Self::without_alternative(cleared(Cow::Borrowed(picture)));
+        };
+        let without_backdrop = cleared(Cow::Owned(backdrop::taken_out(picture, &ground)));
+        match uneven::evened(picture, &ground) {
+            Some(even) => Self {
+                picture: cleared(Cow::Owned(even)),
+                without_backdrop: Some(without_backdrop.into_owned()),
+            },
+            None => Self::without_alternative(without_backdrop),
+        }
     }
-    let even = uneven::evened(picture).map_or(Cow::Borrowed(picture), Cow::Owned);
-    let clear = match noise::deviation(&even) >= NOISE {
-        true => Cow::Owned(without_noise(&even)),
-        false => even,
+
+    fn without_alternative(picture: Cow<'a, Picture>) -> Self {
+        Self {
+            picture,
+            without_backdrop: None,
+        }
+    }
+}
+
+/// Without noise and plain areas.
+fn cleared(picture: Cow<'_, Picture>) -> Cow<'_, Picture> {
+    let clear = match noise::deviation(&picture) >= NOISE {
+        true => Cow::Owned(without_noise(&picture)),
+        false => picture,
     };
     without_plain_areas(clear)
 }

@@ -1,0 +1,128 @@
+//! Pictures of a marked scene that people changed, read by `verify`.
+use std::sync::LazyLock;
+
+use guardsplat_tests::TestEnvironment;
+use serde_json::Value;
+
+const VERIFY: &str = "verify views --key k.key --message c0ff --device cpu --json";
+
+/// A scene, a key of 16 bits, and a mark. Made once for all tests.
+static MARKED: LazyLock<[(&str, Vec<u8>); 3]> = LazyLock::new(|| {
+    let environment = TestEnvironment::new();
+    environment.exits("sample in.ply --gaussians 5000 --sh-degree 1 --seed 4", 0);
+    environment.exits("key create --bits 16 --seed 5 -o k.key --device cpu", 0);
+    environment.exits(
+        "embed in.ply out.ply --key k.key --message c0ff --preset draft --device cpu --force",
+        0,
+    );
+    // Only the bytes: a folder in a static would never be removed.
+    ["in.ply", "k.key", "out.ply"].map(|name| (name, environment.read(name)))
+});
+
+fn marked() -> TestEnvironment {
+    let environment = TestEnvironment::new();
+    for (name, bytes) in MARKED.iter() {
+        environment.write(name, bytes);
+    }
+    environment
+}
+
+/// A view in a folder.
+fn picture(environment: &TestEnvironment, folder: &str, view: usize) -> image::RgbImage {
+    let bytes = environment.read(&format!("{folder}/view_00{view}.png"));
+    image::load_from_memory(&bytes).unwrap().to_rgb8()
+}
+
+/// A picture with noise of a twentieth, a twentieth brighter, and a grey square on it.
+fn changed(picture: &image::RgbImage) -> image::RgbImage {
+    let mut state = 7_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        // Uniform, with a standard deviation of 13 of 255 levels.
+        ((state >> 8) as f32 / 16_777_216.0 - 0.5) * 44.0
+    };
+    let mut changed = picture.clone();
+    for (x, y, pixel) in changed.enumerate_pixels_mut() {
+        let covered = x < 60 && (40..100).contains(&y);
+        for value in &mut pixel.0 {
+            let shown = if covered { 120.0 } else { f32::from(*value) * 1.05 };
+            *value = (shown + noise()).round().clamp(0.0, 255.0) as u8;
+        }
+    }
+    changed
+}
+
+#[test]
+fn short_messages_match_in_changed_pictures_also_where_nobody_says_which() {
+    let environment = marked();
+    environment.exits("render out.ply views --views 3 --size 400 --device cpu", 0);
+    let as_given = environment.json(VERIFY, 0);
+    assert_eq!(as_given["clip"], "guardsplat-2");
+    // The message is in a word of 64 bits.
+    assert_eq!((&as_given["bits"], &as_given["framing"]), (&64.into(), &Value::Null));
+    for view in 0..3 {
+        let picture = changed(&picture(&environment, "views", view));
+        picture
+            .save(environment.path(format!("views/view_00{view}.png")))
+            .unwrap();
+    }
+    let read = environment.json(VERIFY, 0);
+    assert_eq!((&read["verdict"], &read["message"]), (&"match".into(), &"c0ff".into()));
+    assert_eq!(read["bit_accuracy"], 1.0, "{read}");
+    // Whoever does not know the message reads it, and pays for all that it could have been.
+    let blind = environment.json("verify views --key k.key --device cpu --json", 0);
+    assert_eq!(
+        (&blind["verdict"], &blind["message"]),
+        (&"match".into(), &"c0ff".into())
+    );
+    assert!(blind["p_value"].as_f64() > read["p_value"].as_f64(), "{blind}");
+    environment.json("verify views --key k.key --message c0fe --device cpu --json", 2);
+    environment.json("verify in.ply --key k.key --device cpu --json", 2);
+    // Bit by bit sixteen are too few for a match.
+    environment.exits("key create --bits 16 --seed 5 --uncoded -o bits.key --device cpu", 0);
+    let short = environment.json("verify views --key bits.key --message c0ff --device cpu --json", 3);
+    assert_eq!(short["bits"], 16);
+}
+
+/// A picture over a backdrop, of what it is over white and over black.
+fn over(backdrop: impl Fn(f32, f32) -> [f32; 3], white: &image::RgbImage, black: &image::RgbImage) -> image::RgbImage {
+    let mut picture = black.clone();
+    let (width, height) = (picture.width() as f32, picture.height() as f32);
+    for (x, y, pixel) in picture.enumerate_pixels_mut() {
+        let behind = backdrop(x as f32 / width, y as f32 / height);
+        for (c, value) in pixel.0.iter_mut().enumerate() {
+            let shows = white.get_pixel(x, y).0[c].saturating_sub(*value);
+            *value = (f32::from(*value) + f32::from(shows) * behind[c]).round() as u8;
+        }
+    }
+    picture
+}
+
+#[test]
+fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
+    let environment = marked();
+    for ground in ["white", "black"] {
+        environment.exits(
+            &format!("render out.ply {ground} --views 3 --size 400 --background {ground} --device cpu"),
+            0,
+        );
+    }
+    std::fs::create_dir(environment.path("views")).unwrap();
+    let backdrops: [&dyn Fn(f32, f32) -> [f32; 3]; 3] = [
+        &|x, y| [0.45 - 0.3 * (x - 0.5).hypot(y - 0.5); 3],
+        &|_, y| [0.3 + 0.3 * y, 0.4 + 0.3 * y, 0.6 + 0.3 * y],
+        &|x, y| [0.5 + 0.3 * x + 0.1 * y, 0.6 + 0.2 * x + 0.15 * y, 0.8 + 0.1 * x],
+    ];
+    for (place, backdrop) in backdrops.into_iter().enumerate() {
+        for at in 0..3 {
+            let [white, black] = ["white", "black"].map(|ground| picture(&environment, ground, at));
+            let picture = over(backdrop, &white, &black);
+            picture.save(environment.path(format!("views/{at}.png"))).unwrap();
+        }
+        let read = environment.json(VERIFY, 0);
+        assert_eq!(read["verdict"], "match", "{place}: {read}");
+        // Bright ones may be white in uneven light as well.
+        let told = read["estimates"].to_string();
+        assert!(place == 0 || told.contains("without its backdrop"), "{told}");
+    }
+}
