@@ -67,8 +67,7 @@ impl Candidate {
 /// A part of the picture `whole` before that was done to it, its ground made white where it shows one; `None` where it can't
 /// have been done.
 fn undone_on_white(change: &ToneChange, part: &Picture, whole: &Picture) -> Option<Picture> {
-    let undone = change.undone(part, whole)?;
-    Some(ground::whitened(&undone).unwrap_or(undone))
+    change.undone(part, whole).map(ground::on_white)
 }
 
 /// In words.

@@ -55,10 +55,7 @@ pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f3
     }
     let mut read = Vec::with_capacity(different.len());
     for chunk in different.chunks(BATCH) {
-        let pictures = engine.each(chunk, |change| {
-            let undone = change.undone_at_any_rate(&small);
-            Ok(ground::whitened(&undone).unwrap_or(undone))
-        })?;
+        let pictures = engine.each(chunk, |change| Ok(ground::on_white(change.undone_at_any_rate(&small))))?;
         read.extend(engine.read_logits(&pictures)?);
     }
     let logits = |change: &Option<ToneChange>| {

@@ -3,7 +3,7 @@
 //! It says nothing of the scene, and covers more of a picture than the scene does. But it may also be a white ground in
 //! [uneven](super::uneven) light, and only what is read tells which of the two.
 use super::smooth_ground::SmoothGround;
-use crate::extract::photometric::ground::share_of_scene;
+use crate::extract::photometric::ground::{DISTANCE, share_of_scene};
 use crate::picture::Picture;
 
 /// The picture with its backdrop made black, or white if it is bright: neither adds to a reading, and edges blend into what is
@@ -12,7 +12,7 @@ pub(super) fn taken_out(picture: &Picture, ground: &SmoothGround) -> Picture {
     let mean = (0..3).map(|c| ground.darkest[c] + ground.brightest[c]).sum::<f64>() / 6.0;
     let by = if mean > 0.5 { 1.0 } else { 0.0 };
     ground.changed(picture, |pixel, backdrop| {
-        let kept = share_of_scene(&pixel, backdrop.map(|v| v as f32));
+        let kept = share_of_scene(&pixel, backdrop.map(|v| v as f32), DISTANCE);
         pixel.map(|v| v * kept + by * (1.0 - kept))
     })
 }

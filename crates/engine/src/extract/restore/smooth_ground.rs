@@ -19,7 +19,7 @@ const ROUNDS: usize = 8;
 const TERMS: usize = 6;
 
 /// The ground of a picture.
-pub(in crate::extract) struct SmoothGround {
+pub(super) struct SmoothGround {
     fit: Polynomial,
     /// The least and the most of each channel over the picture.
     pub darkest: [f64; 3],
