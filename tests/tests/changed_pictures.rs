@@ -98,9 +98,8 @@ fn over(backdrop: impl Fn(f32, f32) -> [f32; 3], white: &image::RgbImage, black:
     picture
 }
 
-#[test]
-fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
-    let environment = marked();
+/// Three views over white and over black, in folders of these names, and an empty folder of views.
+fn over_white_and_black(environment: &TestEnvironment) {
     for ground in ["white", "black"] {
         environment.exits(
             &format!("render out.ply {ground} --views 3 --size 400 --background {ground} --device cpu"),
@@ -108,6 +107,49 @@ fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
         );
     }
     std::fs::create_dir(environment.path("views")).unwrap();
+}
+
+/// A view over a backdrop, put into the folder of views.
+fn show(environment: &TestEnvironment, view: usize, backdrop: impl Fn(f32, f32) -> [f32; 3]) {
+    let [white, black] = ["white", "black"].map(|ground| picture(environment, ground, view));
+    let picture = over(backdrop, &white, &black);
+    picture.save(environment.path(format!("views/{view}.png"))).unwrap();
+}
+
+#[test]
+fn a_photograph_behind_several_pictures_is_none_of_the_scene() {
+    let environment = marked();
+    over_white_and_black(&environment);
+    // Gradients in one of four dark colours, by squares: such a background has large logits of its own.
+    let photograph = |x: f32, y: f32| {
+        let square = ((9.0 * x) as usize + 3 * (7.0 * y) as usize) % 4;
+        let colour = [[0.35, 0.2, 0.1], [0.1, 0.3, 0.15], [0.25, 0.3, 0.4], [0.15, 0.1, 0.2]][square];
+        std::array::from_fn(|c| colour[c] + 0.05 * x * y + 0.02 * (40.0 * x).sin())
+    };
+    // The scene covers little of it: a quarter of the picture shows a view.
+    let show = |view: usize, moved: f32| {
+        let behind = |x: f32, y: f32| photograph(x + moved, y - moved);
+        show(&environment, view, |x, y| behind((x + 0.2) / 2.0, (y + 0.3) / 2.0));
+        let mut whole = image::RgbImage::from_fn(800, 800, |x, y| {
+            image::Rgb(behind(x as f32 / 800.0, y as f32 / 800.0).map(|v| (255.0 * v).round() as u8))
+        });
+        let path = environment.path(format!("views/{view}.png"));
+        let part = image::open(&path).unwrap().to_rgb8();
+        image::imageops::replace(&mut whole, &part, 80, 120);
+        whole.save(path).unwrap();
+    };
+    (0..3).for_each(|view| show(view, 0.3 * view as f32));
+    environment.json(VERIFY, 2);
+    (0..3).for_each(|view| show(view, 0.0));
+    let read = environment.json(VERIFY, 0);
+    let told = read["estimates"].to_string();
+    assert!(told.contains("without what other pictures show, too"), "{read}");
+}
+
+#[test]
+fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
+    let environment = marked();
+    over_white_and_black(&environment);
     let backdrops: [&dyn Fn(f32, f32) -> [f32; 3]; 3] = [
         &|x, y| [0.45 - 0.3 * (x - 0.5).hypot(y - 0.5); 3],
         &|_, y| [0.3 + 0.3 * y, 0.4 + 0.3 * y, 0.6 + 0.3 * y],
@@ -115,9 +157,7 @@ fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
     ];
     for (place, backdrop) in backdrops.into_iter().enumerate() {
         for at in 0..3 {
-            let [white, black] = ["white", "black"].map(|ground| picture(&environment, ground, at));
-            let picture = over(backdrop, &white, &black);
-            picture.save(environment.path(format!("views/{at}.png"))).unwrap();
+            show(&environment, at, backdrop);
         }
         let read = environment.json(VERIFY, 0);
         assert_eq!(read["verdict"], "match", "{place}: {read}");

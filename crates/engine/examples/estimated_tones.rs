@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for folder in arguments {
         let mut read: Vec<PictureLogits> = Vec::new();
         for file in find_source(&[folder.clone().into()])?.pictures {
-            let picture = PictureLogits::read(&engine, &read_picture(&file, [1.0; 3])?, &read)?;
+            let picture = PictureLogits::read(&engine, &read_picture(&file, [1.0; 3])?, None, &read)?;
             read.push(picture);
         }
         let given: Vec<&[f32]> = read.iter().map(PictureLogits::as_given).collect();

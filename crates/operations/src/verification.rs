@@ -2,8 +2,8 @@
 use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, PictureLogits, PooledLogits, default_size, estimates, hypotheses, read_given, read_scene,
-    size_for_scene,
+    Comparison, Engine, PictureLogits, PooledLogits, StaticBackground, default_size, estimates, hypotheses, read_given,
+    read_scene, size_for_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
@@ -35,6 +35,9 @@ pub struct Views {
     /// The level of detail of streamed scenes that is read, 0 being the finest. For such files as were chosen on this machine.
     pub level: usize,
 }
+
+/// What is told of a picture whose static background was taken out, after what is estimated to have been done to it.
+const WITHOUT_BACKGROUND: &str = ", without what other pictures show, too";
 
 /// Logits of views or pictures.
 type Logits = Vec<Vec<f32>>;
@@ -138,12 +141,19 @@ pub fn read_hypotheses(
             ignored,
         });
     }
+    let mut background = StaticBackground::default();
+    for place in StaticBackground::places(suspect.pictures.len()) {
+        background.add(place, suspect.pictures[place].pixels(views.background)?.as_ref());
+    }
     let mut pictures = Vec::with_capacity(suspect.pictures.len());
+    let mut notes = Vec::with_capacity(suspect.pictures.len());
     for (index, picture) in suspect.pictures.iter().enumerate() {
         let picture = picture.pixels(views.background)?;
         shown.see("picture", index, &picture)?;
-        let read = PictureLogits::read(engine, &picture, &pictures)?;
+        let moving = background.taken_out(index, &picture);
+        let read = PictureLogits::read(engine, &picture, moving.as_ref(), &pictures)?;
         pictures.push(read);
+        notes.push(if moving.is_some() { WITHOUT_BACKGROUND } else { "" });
         progress(of_scenes.len() + index + 1, count(suspect, views));
     }
     let together = |(hypothesis, logits): (Hypothesis, PooledLogits)| {
@@ -155,8 +165,8 @@ pub fn read_hypotheses(
         readings: read.collect::<Result<_>>()?,
         estimates: estimates(&pictures)
             .into_iter()
-            .flatten()
-            .map(ToString::to_string)
+            .zip(notes)
+            .filter_map(|(estimate, note)| Some(format!("{}{note}", estimate?)))
             .collect(),
         ignored,
     })

@@ -182,7 +182,7 @@ enum Suspect {
 impl Suspect {
     fn read(engine: &Engine, picture: &Picture, searched: bool) -> Result<Self> {
         if searched {
-            return Ok(Self::Searched(PictureLogits::read(engine, picture, &[])?));
+            return Ok(Self::Searched(PictureLogits::read(engine, picture, None, &[])?));
         }
         Ok(Self::AsGiven(read_given(engine, picture)?))
     }

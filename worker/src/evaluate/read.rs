@@ -90,7 +90,7 @@ impl Views {
         // One at a time: large pictures of all views need not be there as floats.
         let pictures = self.images.iter().map(to_picture);
         if self.processed && engine.extractor.reads_exact_colours() {
-            let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture, &[])?));
+            let read = pictures.map(|picture| Ok(PictureLogits::read(engine, &picture, None, &[])?));
             return Ok(ViewReadings::Guessed(engine, read.collect::<Result<_>>()?, *message));
         }
         let mut logits = Vec::with_capacity(self.images.len());

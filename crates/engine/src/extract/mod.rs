@@ -24,7 +24,7 @@ pub use photometric::{corrections, read_corrections};
 pub use picture_logits::{PictureLogits, estimates, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
-pub use restore::{read_given, read_rendered};
+pub use restore::{StaticBackground, read_given, read_rendered};
 pub use suspect_kind::SuspectKind;
 pub(crate) use view_size::sufficient_side;
 pub use view_size::{likeness_to_finer, size_for_scene};

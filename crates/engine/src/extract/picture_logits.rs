@@ -33,14 +33,17 @@ struct Searched {
 
 impl PictureLogits {
     /// Reads a picture under every hypothesis that the engine searches. Where what was done is estimated, what was done to
-    /// `others` of the same suspect is tried, too, and guesses are read only if the estimate is not clear.
+    /// `others` of the same suspect is tried, too, and guesses are read only if the estimate is not clear. `moving` is the
+    /// picture without what [other pictures show, too](super::StaticBackground): as it was given it is read with that, else
+    /// without.
     ///
     /// # Errors
     /// A picture without pixels, a failing device, or [`Error::Stopped`](crate::Error::Stopped).
-    pub fn read(engine: &Engine, picture: &Picture, others: &[Self]) -> Result<Self> {
-        let restored = Restored::of(engine, picture);
+    pub fn read(engine: &Engine, picture: &Picture, moving: Option<&Picture>, others: &[Self]) -> Result<Self> {
+        let given = Restored::of(engine, picture);
+        let as_given = read_restored(engine, &given.picture)?;
+        let restored = moving.map_or(given, |moving| Restored::of(engine, moving));
         let picture = restored.picture.as_ref();
-        let as_given = read_restored(engine, picture)?;
         let blind = match engine.extractor.tones() {
             Tones::Searched => None,
             Tones::Estimated => {

@@ -157,7 +157,7 @@ fn changed_tones_are_found_and_the_work_is_bounded() {
         let message = random_message(&mut rng);
         let changed = done(logs, &marked(&patches, &message));
         read.store(0, Ordering::Relaxed);
-        let found = PictureLogits::read(&engine, &changed, &[]).unwrap();
+        let found = PictureLogits::read(&engine, &changed, None, &[]).unwrap();
         let passes = read.load(Ordering::Relaxed);
         // Guesses are read only where the estimate is not clear.
         let clear = hypotheses(&engine, std::slice::from_ref(&found)).unwrap().len() == 2;
@@ -198,7 +198,7 @@ fn fades_curves_and_wider_tints_are_found() {
     for (place, change) in changes.into_iter().enumerate() {
         let message = random_message(&mut rng);
         let changed = each(&marked(&patches, &message), change);
-        let found = PictureLogits::read(&engine, &changed, &[]).unwrap();
+        let found = PictureLogits::read(&engine, &changed, None, &[]).unwrap();
         let estimate = estimates(std::slice::from_ref(&found))[0].unwrap();
         assert!(
             right(estimate.logits(), &message) >= BITS as u32 - 1,
@@ -228,7 +228,7 @@ fn pictures_of_one_message_with_tones_of_their_own_are_read_together() {
     ];
     let read: Vec<_> = pictures
         .iter()
-        .map(|p| PictureLogits::read(&engine, p, &[]).unwrap())
+        .map(|p| PictureLogits::read(&engine, p, None, &[]).unwrap())
         .collect();
     let readings = hypotheses(&engine, &read).unwrap();
     assert_eq!(readings[1].0, Hypothesis::estimated());
@@ -254,7 +254,7 @@ fn words_that_nobody_marked_match_an_estimate_as_often_as_chance_says() {
         let colours: Vec<[f32; 3]> = (0..BITS)
             .map(|_| std::array::from_fn(|_| rng.random_range(0.0..1.0)))
             .collect();
-        let read = [PictureLogits::read(&engine, &picture(&colours), &[]).unwrap()];
+        let read = [PictureLogits::read(&engine, &picture(&colours), None, &[]).unwrap()];
         let (_, estimated) = hypotheses(&engine, &read).unwrap().swap_remove(1);
         for _ in 0..words {
             matched[right(&estimated.summed, &random_message(&mut rng)) as usize] += 1;
@@ -282,7 +282,7 @@ fn pictures_that_show_nothing_are_read_too() {
                 height,
                 pixels: vec![level; (3 * width * height) as usize],
             };
-            let read = [PictureLogits::read(&engine, &plain, &[]).unwrap()];
+            let read = [PictureLogits::read(&engine, &plain, None, &[]).unwrap()];
             let readings = hypotheses(&engine, &read).unwrap();
             assert!(
                 readings
@@ -296,5 +296,5 @@ fn pictures_that_show_nothing_are_read_too() {
         height: 0,
         pixels: vec![],
     };
-    assert!(PictureLogits::read(&engine, &none, &[]).is_err());
+    assert!(PictureLogits::read(&engine, &none, None, &[]).is_err());
 }

@@ -3,6 +3,8 @@
 //! - **Uneven light.** Dark corners, or light from one side, as a [ground](uneven) shows it.
 //! - **A backdrop**, as a [gradient](backdrop) behind the scene. Where it is so bright that it may be uneven light, both are
 //!   tried.
+//! - **What several pictures show alike**, as a photograph or a page [behind](static_background) all of them, where pictures are
+//!   searched. As they were given they are read with it.
 //! - **Noise.** A tower of sines reads exact colours, so that noise blurs what it reads. Worse, a white ground with noise is
 //!   not white any more: values beyond white are cut, which leaves it darker by four tenths of the noise, and a ground covers
 //!   more of a picture than the scene does.
@@ -17,6 +19,7 @@ mod median;
 mod noise;
 mod plain;
 mod smooth_ground;
+mod static_background;
 mod uneven;
 
 use std::borrow::Cow;
@@ -27,6 +30,7 @@ use super::sizes::read_at_sizes;
 use crate::error::Result;
 use crate::picture::Picture;
 use smooth_ground::SmoothGround;
+pub use static_background::StaticBackground;
 
 /// Noise from which on a picture is restored, as a standard deviation: one step of 8 bits.
 const NOISE: f32 = 1.0 / 255.0;
