@@ -41,6 +41,14 @@ pub struct WantedMark {
     pub together: usize,
 }
 
+impl WantedMark {
+    /// Reads no view that an embedding is verified on, or looks at to know when to stop.
+    pub(super) fn leave_out_views_looked_at(&mut self) {
+        let early = self.settings.early_stop.map_or(0, |stop| stop.views);
+        self.first_view = self.first_view.max(self.settings.verify.views + early);
+    }
+}
+
 /// Everything that some experiments need.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
@@ -224,10 +232,12 @@ pub fn plan(
                 }
             }
             Experiment::Trade => {
+                let trials = parsed(&[&none[..], &names::SHARED].concat())?;
                 for bits in free {
                     for variant in &trade.variants {
                         let name = format!("{}{}:{}", names::TRADE, trade.device, variant.name);
-                        add(*bits, &name, variant.settings, &none)?;
+                        plan.add(kind, *bits, &name, variant.settings, trials.clone())
+                            .leave_out_views_looked_at();
                     }
                 }
             }
@@ -263,92 +273,4 @@ fn parsed(texts: &[&str]) -> Result<Vec<Trial>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::evaluate::variants;
-    use guardsplat_engine::embed::Preset;
-
-    #[test]
-    fn a_mark_that_several_experiments_need_is_made_once() {
-        let standard = Preset::Standard.settings();
-        let trade = Trade {
-            device: "cpu".into(),
-            variants: variants(&standard, None, &[]).unwrap(),
-        };
-        let plan = plan(&Experiment::ALL, &standard, &[], &trade, &Robustness::default()).unwrap();
-        assert_eq!(plan.judged, [32]);
-        let timed: Vec<&str> = plan
-            .wanted
-            .iter()
-            .filter(|w| w.timed)
-            .map(|w| w.variant.as_str())
-            .collect();
-        assert_eq!(timed.len(), trade.variants.len());
-        assert!(timed.contains(&"trade:cpu:draft") && timed.contains(&"trade:cpu:standard"));
-        for (i, one) in plan.wanted.iter().enumerate() {
-            one.settings.check().unwrap();
-            let again = |other: &WantedMark| (other.bits, &other.variant) == (one.bits, &one.variant);
-            assert!(!plan.wanted[i + 1..].iter().any(again), "{} {}", one.bits, one.variant);
-        }
-        let claimed: Vec<usize> = plan.wanted.iter().filter(|w| w.claims).map(|w| w.bits).collect();
-        assert_eq!(claimed, [64]);
-        let standard = plan
-            .wanted
-            .iter()
-            .find(|w| w.bits == 32 && w.variant == "standard")
-            .unwrap();
-        let names: Vec<String> = standard.trials.iter().map(ToString::to_string).collect();
-        for name in [
-            "none",
-            "prune-random:0.25",
-            "format:spz",
-            "sh-degree:0",
-            "occlusion:0.2",
-        ] {
-            assert_eq!(names.iter().filter(|n| *n == name).count(), 1, "{name}");
-        }
-    }
-
-    #[test]
-    fn variants_can_be_chosen() {
-        let settings = Preset::Standard.settings();
-        let robustness = Robustness::default();
-        let mut plan = plan(
-            &[Experiment::Robustness],
-            &settings,
-            &[],
-            &Trade::default(),
-            &robustness,
-        )
-        .unwrap();
-        assert_eq!(plan.wanted.len(), 3);
-        let error = plan.keep_only(&["strong".into()]).unwrap_err().to_string();
-        assert!(error.contains("\"strong\" is none of standard, robust"), "{error}");
-        plan.keep_only(&[]).unwrap();
-        plan.keep_only(&[names::ROBUST.into()]).unwrap();
-        assert_eq!(plan.wanted.len(), 1);
-    }
-
-    #[test]
-    fn lengths_can_be_chosen() {
-        let plan = plan(
-            &[Experiment::Capacity],
-            &Preset::Standard.settings(),
-            &[32, 64],
-            &Trade::default(),
-            &Robustness::default(),
-        )
-        .unwrap();
-        let bits: Vec<usize> = plan.wanted.iter().map(|w| w.bits).collect();
-        assert_eq!(bits, [32, 64]);
-        let other = super::plan(
-            &[Experiment::Security],
-            &Preset::Standard.settings(),
-            &[16],
-            &Trade::default(),
-            &Robustness::default(),
-        )
-        .unwrap();
-        assert_eq!((other.wanted.len(), other.judged), (1, vec![16]));
-    }
-}
+mod tests;

@@ -75,9 +75,7 @@ impl Robustness {
             add(attack)?;
         }
         let wanted = plan.robustness(column.bits() as usize, column.variant(), *settings, trials);
-        // The views before are those that an embedding is verified on, and that it looks at to know when to stop.
-        let looked_at = settings.verify.views + settings.early_stop.map_or(0, |stop| stop.views);
-        wanted.first_view = wanted.first_view.max(looked_at);
+        wanted.leave_out_views_looked_at();
         if column.claims() {
             wanted.together = column.pictures() as usize;
         }

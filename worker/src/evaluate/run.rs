@@ -61,8 +61,8 @@ pub enum Progress {
 /// Carries out `plan`. `engine` makes the engine for a length and a seed, with the key, and says how long the key took if
 /// it was made now; it is called once for each pair that something is left to do for.
 ///
-/// Settings under which an embedding stops giving numbers leave a gap where many settings are tried (`trade`), and are tried
-/// again by the next run.
+/// Settings under which an embedding stops giving numbers, or that ask for weights that are not there, leave a gap where many
+/// settings are tried (`trade`), and are tried again by the next run.
 ///
 /// # Errors
 /// Whatever reading, embedding and writing may fail with. What was recorded before stays, and is not done again.
@@ -95,6 +95,14 @@ pub fn run(
                     total,
                     format!("{name}, {} bits, {}, seed {seed}", wanted.bits, wanted.variant),
                 ));
+                if wanted.timed && wanted.settings.lambda.lpips > 0.0 && !engine.has_lpips() {
+                    // Timed without, it would be another variant.
+                    progress(Progress::Failed(format!(
+                        "{name}, {}: without the weights of LPIPS (`models add`)",
+                        wanted.variant
+                    )));
+                    continue;
+                }
                 let one = MarkRun {
                     wanted,
                     options,

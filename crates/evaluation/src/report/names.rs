@@ -65,6 +65,16 @@ pub fn formats() -> Vec<String> {
         .collect()
 }
 
+/// What happens to pictures that people pass on: compressed, compressed hard, noisy, cropped, and a screenshot of a brighter
+/// screen. What variants of the settings are worth is told by the mean over these.
+pub const SHARED: [&str; 5] = [
+    "jpeg-turbo:50..95",
+    "jpeg-turbo:30",
+    "noise:0.05",
+    "crop:0.6",
+    "brightness:1.05+crop:0.8+fit:600+jpeg:80",
+];
+
 /// Compressed by the learned codec of quality 3, whose weights somebody has to give.
 pub const VAE: &str = "vae:3";
 /// Attacks of the paper's Table 2, in its order.

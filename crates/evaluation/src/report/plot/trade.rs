@@ -1,5 +1,5 @@
 //! Time on a logarithmic axis against what it buys: dots coloured by a third figure, with rings around those that nothing
-//! beats in all three respects.
+//! beats in all respects.
 use super::Axes;
 use super::canvas::{Area, Chart, HEIGHT, INK, WIDTH, draw, failed, ink, range, short};
 use super::scatter::{front, shade_legend, shaded};
@@ -79,7 +79,7 @@ pub fn trade(names: Axes<'_>, shade_name: &str, dots: &[TradeOff]) -> Result<Str
         if low <= high {
             shade_legend(&legend, shade_name, low, high)?;
         }
-        let text = "rings: nothing is better in all three; line: nothing is better in time and accuracy";
+        let text = "rings: nothing else is as good in everything told here; line: the best in time and accuracy";
         let middle = ink(12).pos(Pos::new(HPos::Center, VPos::Center));
         legend
             .draw(&Text::new(text, (WIDTH as i32 / 2, 36), middle))

@@ -1,6 +1,8 @@
 //! The front is what the definition says, and notes tell when seconds cannot be compared.
+use super::table::VIEWS;
 use super::*;
 use crate::report::named::{Experiment, Options, report};
+use crate::report::names::{NONE, SHARED};
 use crate::report::record::{Mark, Record};
 use crate::report::store::Records;
 use crate::report::testing::{mark, reading, records, timing};
@@ -34,7 +36,7 @@ fn made(records: &Records) -> Report {
 /// First and last cells of rows.
 fn fronts(report: &Report) -> Vec<(String, String)> {
     let rows = report.tables.iter().flat_map(|table| &table.rows);
-    rows.map(|row| (row.cells[0].to_string(), row.cells[11].to_string()))
+    rows.map(|row| (row.cells[0].to_string(), row.cells[12].to_string()))
         .collect()
 }
 
@@ -70,10 +72,13 @@ fn a_hand_computed_table() {
     assert_eq!(table.columns[3], "times standard");
     let cells: Vec<String> = table.rows[1].cells.iter().map(ToString::to_string).collect();
     assert_eq!(cells[2..7], ["10.0", "0.25", "100.0", "1300", "75.00"]);
-    assert_eq!(cells[8], "1 of 1 (21 to 100 %)");
+    assert_eq!(
+        (cells[7].as_str(), cells[9].as_str()),
+        ("not measured", "1 of 1 (21 to 100 %)")
+    );
     let notes = table.notes.join("\n");
     assert!(
-        notes.contains("told from 5 views") && notes.contains("was quiet before"),
+        notes.contains("whole messages from 5 views") && notes.contains("was quiet before"),
         "{notes}"
     );
     assert!(!notes.contains("runs of the program"));
@@ -169,4 +174,46 @@ fn attacks_and_other_experiments_are_left_out() {
     all.push(Record::Reading(reading(&standard, NONE, &[16])));
     let records = records(all);
     assert_eq!(fronts(&made(&records)), [pair("draft", "yes")]);
+}
+
+#[test]
+fn shared_pictures_decide_where_all_were_read_and_lengths_are_shown_together() {
+    let mut all = Vec::new();
+    for (variant, seconds, right) in [("draft", 10.0, 12), ("standard", 40.0, 14), ("steps-100", 45.0, 13)] {
+        let (one, records) = timed(variant, "lego", [seconds, 38.0], [true; 3]);
+        all.extend(records);
+        // Of one of the five all bits are read, of the others so many.
+        all.extend(SHARED.iter().enumerate().map(|(place, attack)| {
+            let right = if place == 0 { 16 } else { right };
+            Record::Reading(reading(&one, attack, &[right]))
+        }));
+    }
+    let report = made(&records(all.clone()));
+    let expected = [pair("draft", "yes"), pair("standard", "yes"), pair("steps-100", "–")];
+    assert_eq!(fronts(&report), expected);
+    assert_eq!(report.tables[0].rows[0].cells[7].to_string(), "80.00");
+    assert_eq!(report.plots.len(), 1);
+    assert!(report.plots[0].svg.contains("bits of shared pictures"));
+    let notes = report.tables[0].notes.join("\n");
+    assert!(notes.contains("the mean over jpeg-turbo:50..95"), "{notes}");
+
+    // A longer message in the same time is better, so both lengths of it are on the front of all.
+    let mut long = timed("standard", "lego", [40.0, 38.0], [true; 3]).0;
+    (long.embedding.bits, long.embedding.message) = (32, "c0ffee42".into());
+    all.push(Record::Mark(long.clone()));
+    all.push(Record::Reading(reading(&long, NONE, &[32])));
+    all.extend(
+        SHARED
+            .iter()
+            .map(|attack| Record::Reading(reading(&long, attack, &[24]))),
+    );
+    let report = made(&records(all));
+    assert_eq!((report.tables.len(), report.plots.len()), (2, 3));
+    let together = &report.plots[0].svg;
+    for label in ["draft, 16 bits", "standard, 16 bits", "standard, 32 bits"] {
+        assert!(together.contains(label), "{label}");
+    }
+    assert!(!together.contains("steps-100"));
+    let rings = |svg: &str| svg.matches(" r=\"8\"").count();
+    assert_eq!((rings(together), rings(&report.plots[1].svg)), (3, 2));
 }
