@@ -39,12 +39,14 @@ check_queries() {
     cargo run --quiet "${tool[@]}" -- deploy/monitoring/{dashboard.json,alerts.yaml} deploy/kubernetes/scaling.yaml
 }
 
-# Tests wait for servers and timers half of the time. Meanwhile is built what later stages need, at low priority.
+# Tests wait for servers and timers half of the time. Meanwhile is built what later stages need, and lints look at all of it,
+# at low priority: they share build scripts and macros with the build, and nothing else.
 start_building_beside() {
     beside_log=$(mktemp)
     # Cargo looks whether the tests are built before it runs them, and builds nothing else meanwhile: they come first.
     # A group of its own, so that nothing of it is left behind.
-    setsid nice -n 15 bash -c 'sleep 30 && bash deploy/fuzz.sh --build && bash deploy/credentials.sh build' >"$beside_log" 2>&1 &
+    setsid nice -n 15 bash -c 'sleep 30 && bash deploy/fuzz.sh --build && bash deploy/credentials.sh build &&
+        cargo clippy --release --workspace --all-targets --locked -- -D warnings' >"$beside_log" 2>&1 &
     beside=$!
     trap 'kill -- "-$beside" 2>/dev/null || true; rm -f "$beside_log"' EXIT
 }
@@ -63,17 +65,15 @@ for tool in fmt clippy; do
         exit 1
     fi
 done
-# What fails fastest comes first. Lints share build scripts and macros with the build, and nothing else; one profile
-# serves the tests and the quickstart, so that no dependency is built twice.
+# What fails fastest comes first. One profile serves the tests and the quickstart, so that no dependency is built twice.
 stage formatting cargo fmt --all --check
 stage protos bash deploy/check-api.sh
 stage queries check_queries
 stage dependencies bash deploy/check-dependencies.sh
-stage lints cargo clippy --release --workspace --all-targets --locked -- -D warnings
 stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 start_building_beside
 stage tests run_tests
-stage "build beside the tests" finish_building_beside
+stage "build and lints beside the tests" finish_building_beside
 TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
 stage page bash deploy/page.sh
 stage credentials bash deploy/credentials.sh

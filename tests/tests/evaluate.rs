@@ -278,7 +278,7 @@ fn variants_are_timed_once_and_plotted() {
     }
     assert_eq!((&marks[4]["steps"], &marks[0]["steps"]), (&1.into(), &2.into()));
     let page = String::from_utf8(environment.read("page.md")).unwrap();
-    for text in ["| one-step |", "times base", "On the front", "Timed from"] {
+    for text in ["| one-step |", "times base", "On the front", "Shared pictures", "Timed from"] {
         assert!(page.contains(text), "{text}: {page}");
     }
     let plot = String::from_utf8(environment.read("trade.svg")).unwrap();
@@ -292,7 +292,8 @@ fn variants_are_timed_once_and_plotted() {
     let own = r#"[{"name": "one-step", "settings": {"steps": 1}}, {"name": "new", "settings": {"steps": 1}}]"#;
     environment.write("own.json", own);
     environment.exits(&format!("{TRADE},new --document page.md"), 0);
-    assert_eq!(records(&environment).len(), 2 * (3 + 1) * 2);
+    // Two scenes, four variants: a mark, its pictures as they are, and shared in five ways.
+    assert_eq!(records(&environment).len(), 2 * (3 + 1) * (1 + 1 + 5));
     let page = String::from_utf8(environment.read("page.md")).unwrap();
     assert!(page.contains("| new |"), "{page}");
 }
