@@ -79,7 +79,7 @@ pub fn trade(names: Axes<'_>, shade_name: &str, dots: &[TradeOff]) -> Result<Str
         if low <= high {
             shade_legend(&legend, shade_name, low, high)?;
         }
-        let text = "rings: nothing else is as good in everything told here; line: the best in time and accuracy";
+        let text = "rings: no other is as good in all that is told here; line: the best in time and accuracy";
         let middle = ink(12).pos(Pos::new(HPos::Center, VPos::Center));
         legend
             .draw(&Text::new(text, (WIDTH as i32 / 2, 36), middle))
@@ -134,11 +134,14 @@ fn labels(area: &Area<'_>, chart: &Chart<'_, '_>, drawn: &[&TradeOff], taken: &m
                 bottom: top + size as i32,
             };
             let half = size as i32 / 2;
+            let centred = (x - width / 2).min(WIDTH as i32 - width - 2);
             let places = [
                 at(x + 11, y - half),
                 at(x - 11 - width, y - half),
-                at(x - width / 2, y - 11 - 2 * half),
-                at(x - width / 2, y + 11),
+                at(centred, y - 11 - 2 * half),
+                at(centred, y + 11),
+                at(x - 11 - width, y + 9),
+                at(x + 11, y + 9),
             ];
             let inside = |place: &&Patch| place.left >= 58 && place.right < WIDTH as i32 && place.top >= 30;
             let free = |place: &&Patch| inside(place) && !taken.iter().any(|other| other.meets(place));

@@ -12,7 +12,7 @@ use crate::statistics::{Direction, pareto_front};
 use line::{Line, Place};
 
 /// Variants that plots name, and of which the first that was measured is what times are told against.
-const NAMED: [&str; 5] = ["standard", "base", "draft", "robust", "paper"];
+const NAMED: [&str; 6] = ["standard", "base", "draft", "robust", "thorough", "paper"];
 /// Whole messages decide from as many views as `verify` asks for, where shared pictures were not read.
 const SUCCESS_VIEWS: u32 = 5;
 
@@ -82,10 +82,9 @@ pub(super) fn fill(report: &mut Report, selection: &Selection<'_>) -> Result<()>
                 .flat_map(|(_, lines)| lines)
                 .filter(|line| NAMED.contains(&line.name));
             let title = format!("{}, {}, {}", report.title, machine.0, machine.1);
-            let label = |line: &Line<'_>| format!("{}, {} bits", line.name, line.bits);
-            report
-                .plots
-                .push(plot(&title, machine.0, named.collect(), true, label)?);
+            let label = |line: &Line<'_>| format!("{} {}", line.name, line.bits);
+            let what = format!("{}; numbers are bits of a message", machine.0);
+            report.plots.push(plot(&title, &what, named.collect(), true, label)?);
         }
     }
     for (place, lines) in &places {

@@ -210,7 +210,7 @@ fn shared_pictures_decide_where_all_were_read_and_lengths_are_shown_together() {
     let report = made(&records(all));
     assert_eq!((report.tables.len(), report.plots.len()), (2, 3));
     let together = &report.plots[0].svg;
-    for label in ["draft, 16 bits", "standard, 16 bits", "standard, 32 bits"] {
+    for label in ["draft 16", "standard 16", "standard 32"] {
         assert!(together.contains(label), "{label}");
     }
     assert!(!together.contains("steps-100"));
