@@ -161,9 +161,12 @@ fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
     larger(larger(larger(0.0, red.abs()), green.abs()), blue.abs())
 }
 
-/// The outermost pixels.
 fn border(picture: &Picture) -> Vec<[f32; 3]> {
-    let (width, pixels) = (picture.width as usize, picture.pixels.as_chunks::<3>().0);
+    outermost(picture.width as usize, picture.pixels.as_chunks().0)
+}
+
+/// What a picture that is so wide has at its outermost pixels.
+pub(in crate::extract) fn outermost<T: Copy>(width: usize, pixels: &[T]) -> Vec<T> {
     if width == 0 || pixels.len() <= 2 * width {
         return pixels.to_vec();
     }

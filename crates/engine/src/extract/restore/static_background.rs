@@ -1,7 +1,7 @@
 //! A static background: what several pictures of one size show alike at the same place, as a photograph behind an object that
 //! is turned, or the page around a viewer. Background subtraction, as in video.
 //!
-//! Each picture sees the scene from another side, so that what stays is none of it. It must go: a background has logits of its
+//! Each picture sees the scene from another side, so that what stays all around is none of it. It must go: a background has logits of its
 //! own, in which pictures agree as if they had a mark. Pictures from nearly one side, of which most stays, tell nothing.
 use super::smooth_ground::SmoothGround;
 use crate::extract::photometric::ground;
@@ -17,8 +17,10 @@ const MEAN: u32 = 8;
 const MOST: u8 = 24;
 /// Share of a picture that must not stay, or the other one shows the same.
 const MOVES: f64 = 0.08;
-/// Share of a picture that must stay and be no ground.
-const STAYS: f64 = 0.05;
+/// Share of the outermost pixels that must be no ground; and of these, share that must stay. What is behind a scene reaches the
+/// border, while colours of a scene that two views happen to have at one place do not stay all around it.
+const BORDER: f64 = 0.05;
+const STAYS: f64 = 0.8;
 
 /// Pictures of one suspect, by their places among all of it.
 #[derive(Clone, Debug, Default)]
@@ -69,16 +71,18 @@ impl StaticBackground {
         }
         let pixels = picture.pixels.as_chunks::<3>().0;
         let seen = ground::seen(picture);
-        if let Some(ground) = seen {
-            let of_ground = pixels.iter().map(|pixel| ground::is_near(pixel, ground));
-            stays
-                .iter_mut()
-                .zip(of_ground)
-                .for_each(|(stays, ground)| *stays &= !ground);
+        let is_ground = |pixel: &[f32; 3]| seen.is_some_and(|ground| ground::is_near(pixel, ground));
+        for (stays, pixel) in stays.iter_mut().zip(pixels) {
+            *stays &= !is_ground(pixel);
         }
+        let border = ground::outermost(levels.width, pixels).into_iter();
+        let border: Vec<_> = border.zip(ground::outermost(levels.width, &stays)).collect();
+        let behind = border.iter().filter(|(pixel, _)| !is_ground(pixel));
+        let behind: Vec<bool> = behind.map(|(_, stays)| *stays).collect();
+        let reaches_border = behind.len() as f64 >= BORDER * border.len() as f64 && share(&behind) >= STAYS;
         let by = seen.unwrap_or([0.0; 3]);
         let out = pixels.iter().zip(&stays);
-        (share(&stays) >= STAYS).then(|| Picture {
+        reaches_border.then(|| Picture {
             pixels: out
                 .flat_map(|(pixel, stays)| if *stays { by } else { *pixel })
                 .collect(),
@@ -243,6 +247,20 @@ mod tests {
         let elsewhere = shown(200, [0.3, 0.4], |x, y| photograph(y, 1.0 - x));
         assert!(none(&[one.clone(), elsewhere]));
         assert!(none(&[one, shown(100, [0.3, 0.4], photograph)]));
+        // A wall that two views of a room have at one place, and a scene of one colour before white.
+        let wall = |moved: f32, around: fn(f32, f32) -> [f32; 3]| {
+            shown(200, [2.0; 2], |x, y| {
+                match is_disc([0.5; 2], x / 2.0 + 0.25, y / 2.0 + 0.25) {
+                    true => [0.6, 0.5, 0.4],
+                    false => around(x + moved, y - moved),
+                }
+            })
+        };
+        assert!(none(&[wall(0.0, photograph), wall(0.4, photograph)]));
+        assert!(none(&[
+            wall(0.0, |_, _| [1.0; 3]),
+            shown(200, [0.5; 2], |_, _| [1.0; 3])
+        ]));
         let empty = Picture {
             width: 0,
             height: 0,
