@@ -7,5 +7,6 @@ mod jobs;
 mod machine;
 
 fn main() -> std::process::ExitCode {
+    guardsplat_engine::memory::keep_freed();
     cli::run()
 }

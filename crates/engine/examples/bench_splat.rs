@@ -2,7 +2,9 @@
 //! `cargo run --release --example bench_splat -- SCENE.ply SIZE [VIEWS] [wgpu]`.
 use guardsplat_engine::device::{DeviceChoice, open};
 use guardsplat_engine::scene::{Gaussians, Scene};
-use guardsplat_engine::splat::{CpuRasterizer, GpuRasterizer, Learnable, Rasterizer, WeightCache, prepare, sh};
+use guardsplat_engine::splat::{
+    CpuRasterizer, Drawing, GpuRasterizer, Learnable, PreparedView, Rasterizer, WeightCache, prepare, sh,
+};
 use guardsplat_engine::view::Camera;
 use std::time::Instant;
 
@@ -37,7 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Prints the mean milliseconds a view of each stage.
+/// Prints the mean milliseconds a view of each stage; colours and their gradients are those of all views at once, as in a
+/// step of an embedding.
 fn measure(
     rasterizer: &dyn Rasterizer,
     gaussians: &Gaussians,
@@ -49,40 +52,44 @@ fn measure(
     let mut size = String::new();
     for _ in 0..ROUNDS {
         let mut ms = [0.0f64; STAGES.len()];
-        let (mut visible, mut pairs, mut weights, mut bytes) = (0, 0, 0, 0);
-        for camera in cameras {
-            let mut sum = vec![0.0; learnable.len()];
-            let mut clock = Instant::now();
-            let mut lap = |stage: usize| {
-                ms[stage] += clock.elapsed().as_secs_f64() * 1e3 / cameras.len() as f64;
-                clock = Instant::now();
-            };
-            let view = prepare(gaussians, camera, cache)?;
-            lap(0);
-            let colours = sh::colours(&gaussians.sh, None, &view);
-            lap(1);
-            let picture = rasterizer.render(&view, &colours, [1.0; 3])?;
-            lap(2);
-            let gradient = rasterizer.backward(&view, &picture.pixels)?;
-            lap(3);
-            sh::backward(
-                &learnable,
-                sh::ColourGradient {
-                    view: &view,
-                    colours: &colours,
-                    gradient: &gradient,
-                },
-                &mut sum,
-            );
-            lap(4);
-            visible += view.visible.len() / cameras.len();
-            pairs += view.tiles.pairs() / cameras.len();
-            weights += view.weight_count().unwrap_or(0) / cameras.len();
-            bytes += view.bytes() / cameras.len();
-        }
+        let mut sum = vec![0.0; learnable.len()];
+        let mut clock = Instant::now();
+        let mut lap = |stage: usize| {
+            ms[stage] = clock.elapsed().as_secs_f64() * 1e3 / cameras.len() as f64;
+            clock = Instant::now();
+        };
+        let prepared = cameras.iter().map(|camera| prepare(gaussians, camera, cache));
+        let prepared: Vec<PreparedView> = prepared.collect::<guardsplat_engine::Result<_>>()?;
+        let views: Vec<&PreparedView> = prepared.iter().collect();
+        lap(0);
+        let colours = sh::colours_of_views(&gaussians.sh, None, &views);
+        lap(1);
+        let drawings = views.iter().zip(&colours).map(|(view, colours)| Drawing {
+            view,
+            colours,
+            background: [1.0; 3],
+        });
+        let pictures = rasterizer.render_all(&drawings.collect::<Vec<_>>())?;
+        lap(2);
+        let gradients = rasterizer.backward_all(&views, &pictures)?;
+        lap(3);
+        let of_views = views.iter().zip(&colours).zip(&gradients);
+        let of_views = of_views.map(|((view, colours), gradient)| sh::ColourGradient {
+            view,
+            colours,
+            gradient,
+        });
+        sh::backward_of_views(&learnable, &of_views.collect::<Vec<_>>(), &mut sum);
+        lap(4);
         best = std::array::from_fn(|k| best[k].min(ms[k]));
-        let megabytes = bytes as f64 / 1e6;
-        size = format!("{visible} visible, {pairs} pairs, {weights} weights, {megabytes:.2} MB");
+        let mean = |of: fn(&PreparedView) -> usize| prepared.iter().map(of).sum::<usize>() / cameras.len();
+        size = format!(
+            "{} visible, {} pairs, {} weights, {:.2} MB",
+            mean(|view| view.visible.len()),
+            mean(|view| view.tiles.pairs()),
+            mean(|view| view.weight_count().unwrap_or(0)),
+            mean(PreparedView::bytes) as f64 / 1e6
+        );
     }
     let stages: Vec<String> = STAGES
         .iter()

@@ -3,11 +3,13 @@
 //! Needs are predicted from the sizes of arrays, not from what was measured on some machine; the few constants that no
 //! array explains are said where they stand. `memory-bench` (a program of the tests) holds predictions against peaks.
 pub mod admission;
+mod allocator;
 mod limits;
 mod prediction;
 mod requirements;
 mod usage;
 
+pub use allocator::keep_freed;
 pub use limits::Limits;
 pub use prediction::{
     EmbeddingWorkload, ModelBytes, SceneSize, ViewSize, embedding_requirements, picture_bytes, rendering_requirements,
