@@ -1,14 +1,15 @@
 //! Mean sines on the CPU: chunks of pixels over all cores, a vector register of them at a time.
 //!
-//! Sums have an order that depends on sizes alone, so the bytes are the same whatever the number of threads. Between
+//! Sums have an order that depends on the picture alone, so the bytes are the same whatever the number of threads. Between
 //! processors with and without fused multiplication and addition they differ in their last bits.
 use rayon::prelude::*;
 
-use super::kernel::{Block, Differentiate, LANES, Lanes, Slope, Sums, Wave, WeightedSums};
+use super::kernel::{Differentiate, LANES, Slope, Wave, WeightedSums};
+use super::plain::Distinct;
 use crate::simd::Instructions;
 
-/// Pixels of a task: their three colours fit the first cache.
-const CHUNK: usize = 1024;
+/// Pixels of a task: their three colours fit the first cache, and one of each block fits a block.
+const CHUNK: usize = LANES * LANES;
 /// A cosine is the sine so many turns on.
 pub(super) const QUARTER: f64 = 0.25;
 
@@ -16,31 +17,6 @@ pub(super) const QUARTER: f64 = 0.25;
 pub(super) fn waves(filters: &[f32], phases: &[f32], shift: f64) -> Vec<Wave> {
     let wave = |(filter, phase): (&[f32; 3], &f32)| Wave::new(filter, *phase, shift);
     filters.as_chunks().0.iter().zip(phases).map(wave).collect()
-}
-
-/// Pixels `first..first + count` of a planar picture, padded with zeros to whole blocks.
-fn blocks(picture: &[f32], first: usize, count: usize) -> Vec<Block> {
-    let pixels = picture.len() / 3;
-    let block = |start: usize| {
-        let mut block = Block([[0.0; LANES]; 3]);
-        let end = (start + LANES).min(first + count);
-        for (channel, lanes) in block.0.iter_mut().enumerate() {
-            let plane = &picture[channel * pixels..][start..end];
-            lanes[..plane.len()].copy_from_slice(plane);
-        }
-        block
-    };
-    (first..first + count).step_by(LANES).map(block).collect()
-}
-
-/// Weights of pixels `first..first + count`, padded with zeros to whole blocks.
-fn lanes(weights: &[f32], first: usize, count: usize) -> Vec<Lanes> {
-    let of_block = |weights: &[f32]| {
-        let mut lanes = [0.0; LANES];
-        lanes[..weights.len()].copy_from_slice(weights);
-        lanes
-    };
-    weights[first..first + count].chunks(LANES).map(of_block).collect()
 }
 
 /// `[views][waves]`, of pictures `[views][3][pixels]` with weights `[views][pixels]`; without, all weigh alike.
@@ -60,22 +36,16 @@ pub(super) fn means(
             let picture = &pictures[task / chunks * len..][..len];
             let first = task % chunks * CHUNK;
             let count = CHUNK.min(pixels - first);
+            let distinct = Distinct::of(picture, first, count);
+            let ones = [1.0; CHUNK];
+            let of_pixels = weights.map_or(&ones[..], |weights| &weights[task / chunks * pixels + first..]);
             let mut sums = vec![0.0; waves.len()];
-            let blocks = &blocks(picture, first, count);
-            match weights {
-                None => instructions.run(Sums {
-                    blocks,
-                    count,
-                    waves,
-                    sums: &mut sums,
-                }),
-                Some(weights) => instructions.run(WeightedSums {
-                    blocks,
-                    weights: &lanes(weights, task / chunks * pixels + first, count),
-                    waves,
-                    sums: &mut sums,
-                }),
-            }
+            instructions.run(WeightedSums {
+                blocks: &distinct.blocks,
+                weights: &distinct.weights(&of_pixels[..count]),
+                waves,
+                sums: &mut sums,
+            });
             sums
         })
         .collect();
@@ -112,33 +82,29 @@ pub(super) fn gradients(
             }
         })
         .collect();
-    let parts: Vec<Vec<Block>> = (0..views * chunks)
+    let parts: Vec<Distinct> = (0..views * chunks)
         .into_par_iter()
         .map(|task| {
             let view = task / chunks;
             let first = task % chunks * CHUNK;
-            let mut blocks = blocks(&pictures[view * len..][..len], first, CHUNK.min(pixels - first));
+            let mut distinct = Distinct::of(&pictures[view * len..][..len], first, CHUNK.min(pixels - first));
             instructions.run(Differentiate {
-                blocks: &mut blocks,
+                blocks: &mut distinct.blocks,
                 slopes: &slopes[view * waves.len()..][..waves.len()],
             });
-            blocks
+            distinct
         })
         .collect();
     let mut out = vec![0.0; pictures.len()];
-    for (task, blocks) in parts.iter().enumerate() {
+    for (task, distinct) in parts.iter().enumerate() {
         let first = task % chunks * CHUNK;
         let picture = &mut out[task / chunks * len..][..len];
-        for (index, Block(block)) in blocks.iter().enumerate() {
-            let start = first + index * LANES;
-            let count = LANES.min(pixels - start);
-            for (channel, lanes) in block.iter().enumerate() {
-                let out = &mut picture[channel * pixels + start..][..count];
-                out.copy_from_slice(&lanes[..count]);
-                if let Some(weights) = weights {
-                    let weights = &weights[task / chunks * pixels + start..];
-                    out.iter_mut().zip(weights).for_each(|(out, weight)| *out *= weight);
-                }
+        for channel in 0..3 {
+            let out = &mut picture[channel * pixels..][first..pixels.min(first + CHUNK)];
+            distinct.spread(channel, out);
+            if let Some(weights) = weights {
+                let weights = &weights[task / chunks * pixels + first..];
+                out.iter_mut().zip(weights).for_each(|(out, weight)| *out *= weight);
             }
         }
     }

@@ -6,6 +6,7 @@
 //! coarser than what a mark changes, so a mark cannot make its own colours common.
 use rayon::prelude::*;
 
+use super::plain::is_plain;
 use crate::power::power_of;
 use crate::simd::{Instructions, Vectorised};
 
@@ -66,15 +67,19 @@ impl Vectorised for Weigh<'_> {
         let mut grid = [0.0_f32; ROOM];
         let pixels = self.weights.len();
         for first in (0..pixels).step_by(BLOCK) {
-            let count = cells.fill(self.picture, pixels, first);
-            cells.count(&mut grid, count);
+            let (count, plain) = cells.fill(self.picture, pixels, first);
+            cells.count(&mut grid, count, plain);
         }
         let mut sums = [0.0_f64; BLOCK];
         for (block, weights) in self.weights.chunks_mut(BLOCK).enumerate() {
-            cells.fill(self.picture, pixels, block * BLOCK);
+            let (_, plain) = cells.fill(self.picture, pixels, block * BLOCK);
             let mut found = [0.0_f32; BLOCK];
-            for k in 0..BLOCK {
-                found[k] = power_of(cells.density(&grid, k), power);
+            if plain {
+                found = [power_of(cells.density(&grid, 0), power); BLOCK];
+            } else {
+                for k in 0..BLOCK {
+                    found[k] = power_of(cells.density(&grid, k), power);
+                }
             }
             for ((weight, found), sum) in weights.iter_mut().zip(&found).zip(&mut sums) {
                 *weight = *found;
@@ -105,35 +110,52 @@ impl Cells {
         }
     }
 
-    /// Finds pixels from `first` on in a picture of so many; returns how many there are.
+    /// Finds pixels from `first` on in a picture of so many; returns how many there are, and whether all have one colour, of
+    /// which only the first is found.
     #[inline(always)]
-    fn fill(&mut self, picture: &[f32], pixels: usize, first: usize) -> usize {
+    fn fill(&mut self, picture: &[f32], pixels: usize, first: usize) -> (usize, bool) {
         let count = BLOCK.min(pixels - first);
+        let plain = is_plain([0, 1, 2].map(|channel| &picture[channel * pixels + first..][..count]));
         for (channel, colours) in self.colours.iter_mut().enumerate() {
             colours[..count].copy_from_slice(&picture[channel * pixels + first..][..count]);
         }
-        for k in 0..BLOCK {
-            let (r, to_r) = place(self.colours[0][k]);
-            let (g, to_g) = place(self.colours[1][k]);
-            let (b, to_b) = place(self.colours[2][k]);
-            let corners = CORNERS as f32;
-            self.first[k] = whole((r * corners + g) * corners + b);
-            for i in 0..8 {
-                let red = if i >> 2 == 1 { to_r } else { 1.0 - to_r };
-                let green = if i >> 1 & 1 == 1 { to_g } else { 1.0 - to_g };
-                let blue = if i & 1 == 1 { to_b } else { 1.0 - to_b };
-                self.shares[i][k] = red * green * blue;
+        if plain {
+            self.find(0);
+        } else {
+            for k in 0..BLOCK {
+                self.find(k);
             }
         }
-        count
+        (count, plain)
     }
 
-    /// Adds the first `count` pixels to the grid, one after the other.
+    /// Finds the place of a pixel on the grid.
     #[inline(always)]
-    fn count(&self, grid: &mut [f32; ROOM], count: usize) {
-        for k in 0..count.min(BLOCK) {
+    fn find(&mut self, k: usize) {
+        let (r, to_r) = place(self.colours[0][k]);
+        let (g, to_g) = place(self.colours[1][k]);
+        let (b, to_b) = place(self.colours[2][k]);
+        let corners = CORNERS as f32;
+        self.first[k] = whole((r * corners + g) * corners + b);
+        for i in 0..8 {
+            let red = if i >> 2 == 1 { to_r } else { 1.0 - to_r };
+            let green = if i >> 1 & 1 == 1 { to_g } else { 1.0 - to_g };
+            let blue = if i & 1 == 1 { to_b } else { 1.0 - to_b };
+            self.shares[i][k] = red * green * blue;
+        }
+    }
+
+    /// Adds the first `count` pixels to the grid, one after the other, or all of one colour at once.
+    #[inline(always)]
+    fn count(&self, grid: &mut [f32; ROOM], count: usize, plain: bool) {
+        let (pixels, times) = if plain {
+            (1, count as f32)
+        } else {
+            (count.min(BLOCK), 1.0)
+        };
+        for k in 0..pixels {
             for i in 0..8 {
-                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k];
+                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
             }
         }
     }

@@ -44,39 +44,6 @@ pub(super) struct Slope {
     pub weights: [f32; 3],
 }
 
-/// Sums of the sines of each wave over the first `count` pixels.
-pub(super) struct Sums<'a> {
-    pub blocks: &'a [Block],
-    pub count: usize,
-    pub waves: &'a [Wave],
-    pub sums: &'a mut [f32],
-}
-
-impl Vectorised for Sums<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<const FUSED: bool>(self) {
-        let (whole, rest) = (self.count / LANES, self.count % LANES);
-        for (wave, sum) in self.waves.iter().zip(self.sums) {
-            let mut lanes = [0.0; LANES];
-            for block in &self.blocks[..whole] {
-                for i in 0..LANES {
-                    let (slope, r) = sine::<FUSED>(wave, block, i);
-                    lanes[i] = multiply_add::<FUSED>(slope, r, lanes[i]);
-                }
-            }
-            if rest > 0 {
-                for i in 0..rest {
-                    let (slope, r) = sine::<FUSED>(wave, &self.blocks[whole], i);
-                    lanes[i] = multiply_add::<FUSED>(slope, r, lanes[i]);
-                }
-            }
-            *sum = lanes.iter().sum();
-        }
-    }
-}
-
 /// Sums of the sines of each wave, times the weight of each pixel. Pixels that only fill a block have none.
 pub(super) struct WeightedSums<'a> {
     pub blocks: &'a [Block],

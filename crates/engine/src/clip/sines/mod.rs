@@ -14,6 +14,7 @@ mod density;
 mod flex;
 mod gpu;
 mod kernel;
+mod plain;
 mod pool;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
