@@ -1,5 +1,7 @@
 //! Antialiased bilinear resize, equal to torch's `interpolate(mode="bilinear", antialias=True, align_corners=False)`: of
 //! tensors differentiably, and of pictures on the host.
+use std::ops::Range;
+
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::error::Result;
@@ -33,24 +35,35 @@ pub fn resize(pictures: Tensor<4>, height: usize, width: usize) -> Tensor<4> {
 /// # Errors
 /// A picture without pixels, or whose pixels are not as many as its size says.
 pub fn resized(picture: &Picture, height: usize, width: usize) -> Result<Picture> {
+    let whole = [0..picture.width as usize, 0..picture.height as usize];
+    resized_part(picture, whole, height, width)
+}
+
+/// [`resized`] of these columns and rows of a picture.
+///
+/// # Errors
+/// Those of [`resized`]; the part must lie within the picture, and have pixels.
+pub fn resized_part(
+    picture: &Picture,
+    [columns, rows]: [Range<usize>; 2],
+    height: usize,
+    width: usize,
+) -> Result<Picture> {
     comparable(&[picture])?;
-    let row = 3 * picture.width as usize;
+    let row = 3 * columns.len();
+    let line = |y: usize| &picture.pixels[3 * ((rows.start + y) * picture.width as usize + columns.start)..][..row];
     let mut squashed = vec![0.0; height * row];
-    for (out, inputs) in squashed
-        .chunks_exact_mut(row)
-        .zip(axis(picture.height as usize, height))
-    {
-        let rows = picture.pixels[inputs.first * row..].chunks_exact(row);
-        let first = &picture.pixels[inputs.first * row..][..row];
+    for (out, inputs) in squashed.chunks_exact_mut(row).zip(axis(rows.len(), height)) {
+        let first = line(inputs.first);
         out.copy_from_slice(first);
-        for (weight, row) in inputs.weights.iter().zip(rows).skip(1) {
-            let values = row.iter().zip(first);
+        for (i, weight) in inputs.weights.iter().enumerate().skip(1) {
+            let values = line(inputs.first + i).iter().zip(first);
             out.iter_mut()
                 .zip(values)
                 .for_each(|(out, (v, first))| *out += weight * (v - first));
         }
     }
-    let columns: Vec<Inputs> = axis(picture.width as usize, width).collect();
+    let columns: Vec<Inputs> = axis(columns.len(), width).collect();
     let mut pixels = vec![[0.0_f32; 3]; height * width];
     for (out, row) in pixels.chunks_exact_mut(width.max(1)).zip(squashed.chunks_exact(row)) {
         for (out, inputs) in out.iter_mut().zip(&columns) {

@@ -1,4 +1,5 @@
 //! The parts that embedding and extraction share: device, what reads messages from pictures, and the renderer.
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
@@ -16,7 +17,7 @@ use crate::memory::Limits;
 use crate::message::Key;
 use crate::picture::Picture;
 use crate::quality::{Lpips, batch};
-use crate::resize::{resize, resized};
+use crate::resize::{resize, resized, resized_part};
 use crate::splat::{CpuRasterizer, Geometry, GpuRasterizer, Rasterizer, WeightCache, sh};
 use crate::stop::Stop;
 use crate::view::Camera;
@@ -226,22 +227,20 @@ impl Engine {
         &self,
         pictures: &[Picture],
         side: Option<usize>,
-        read: impl Fn(Tensor<4>) -> Result<Tensor<2>>,
+        read: impl Fn(Tensor<4>) -> Result<Tensor<2>> + Send + Sync,
     ) -> Result<Vec<Vec<f32>>> {
-        let mut rows = Vec::with_capacity(pictures.len());
-        for same in pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
-            for chunk in same.chunks(READ_BATCH) {
-                self.stop.check()?;
-                let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
-                    Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
-                    None => Vec::new(),
-                };
-                let chunk: Vec<&Picture> = if made.is_empty() { chunk } else { &made }.iter().collect();
-                let logits = read(batch(&chunk, &self.compute.device)?)?;
-                rows.extend(self.to_host(logits)?.chunks_exact(self.bits).map(<[f32]>::to_vec));
-            }
-        }
-        Ok(rows)
+        let alike = pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height));
+        let chunks: Vec<&[Picture]> = alike.flat_map(|alike| alike.chunks(READ_BATCH)).collect();
+        let rows = self.each(&chunks, |chunk| {
+            let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
+                Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
+                None => Vec::new(),
+            };
+            let chunk: Vec<&Picture> = if made.is_empty() { *chunk } else { &made }.iter().collect();
+            let logits = self.to_host(read(batch(&chunk, &self.compute.device)?)?)?;
+            Ok(logits.chunks_exact(self.bits).map(<[f32]>::to_vec).collect::<Vec<_>>())
+        })?;
+        Ok(rows.into_iter().flatten().collect())
     }
 
     /// A picture at the side that the extractor takes in.
@@ -258,6 +257,15 @@ impl Engine {
     /// Those of [`Engine::resized`].
     pub(super) fn resized_to(&self, side: usize, picture: &Picture) -> Result<Picture> {
         resized(picture, side, side)
+    }
+
+    /// Columns and rows of a picture, at the side that the extractor takes in.
+    ///
+    /// # Errors
+    /// Those of [`Engine::resized`].
+    pub(super) fn resized_part(&self, part: [Range<usize>; 2], picture: &Picture) -> Result<Picture> {
+        let side = self.extractor.side();
+        resized_part(picture, part, side, side)
     }
 
     /// Values of a tensor on the host.

@@ -53,7 +53,7 @@ impl PictureLogits {
         };
         let searched = match &blind {
             Some(blind) if blind.is_clear() => None,
-            _ => Some(Searched::read(engine, picture)?),
+            _ => Some(Searched::read(engine, picture, blind.as_ref())?),
         };
         Ok(Self {
             as_given,
@@ -69,14 +69,16 @@ impl PictureLogits {
 }
 
 impl Searched {
-    fn read(engine: &Engine, picture: &Picture) -> Result<Self> {
+    /// Windows are those of the `blind` reading, where there is one.
+    fn read(engine: &Engine, picture: &Picture, blind: Option<&BlindReading>) -> Result<Self> {
         let whole = read_whole(engine, picture)?;
         let trimmed = without_borders(picture)
             .map(|trimmed| read_whole(engine, &trimmed))
             .transpose()?;
-        let parts = match engine.extractor.reads_exact_colours() {
-            true => read_windows(engine, picture)?,
-            false => None,
+        let parts = match blind {
+            Some(blind) => Some(blind.windows().to_vec()).filter(|windows| !windows.is_empty()),
+            None if engine.extractor.reads_exact_colours() => read_windows(engine, picture)?,
+            None => None,
         };
         Ok(Self { whole, trimmed, parts })
     }

@@ -2,6 +2,8 @@
 //!
 //! A CLIP that averages over a picture reads a mark from any part of the scene, and whatever else the picture shows only
 //! adds to it. So the part need not fit the scene: it is to lie inside of it.
+use std::ops::Range;
+
 use guardsplat_codeword::{WINDOW_STEPS as STEPS, Window};
 
 use super::Engine;
@@ -12,8 +14,6 @@ use crate::picture::Picture;
 const TRIED: [(u32, u32); 2] = [(6, 3), (4, 2)];
 /// Pixels of a window's shorter side, at least; less is nothing to read.
 const LEAST_SIDE: u32 = 16;
-/// Windows that are read together.
-const BATCH: usize = 8;
 
 /// All windows that are read: 9 halves and 25 thirds.
 pub(super) fn windows() -> impl Iterator<Item = Window> {
@@ -39,25 +39,32 @@ pub(super) fn read_windows(engine: &Engine, picture: &Picture) -> Result<Option<
     if windows.is_empty() {
         return Ok(None);
     }
-    let mut logits = Vec::with_capacity(windows.len());
-    for chunk in windows.chunks(BATCH) {
-        // Made small one by one: a large picture need not fit in memory eight times.
-        let parts = chunk.iter().map(|window| engine.resized(&crop(*window, picture)));
-        logits.extend(engine.read_logits(&parts.collect::<Result<Vec<_>>>()?)?);
-    }
-    Ok(Some(logits))
+    Ok(Some(engine.read_logits(&small(engine, &windows, picture)?)?))
+}
+
+/// Windows of a picture, at the side that the extractor takes in.
+///
+/// # Errors
+/// A picture without pixels, or [`Error::Stopped`](crate::Error::Stopped).
+pub(super) fn small(engine: &Engine, windows: &[Window], picture: &Picture) -> Result<Vec<Picture>> {
+    engine.each(windows, |window| engine.resized_part(place(*window, picture), picture))
+}
+
+/// Columns and rows of a window.
+fn place(window: Window, picture: &Picture) -> [Range<usize>; 2] {
+    let place = |side: u32, twelfths: u32| (u64::from(side) * u64::from(twelfths) / u64::from(STEPS)) as usize;
+    [(window.left, picture.width), (window.top, picture.height)]
+        .map(|(first, side)| place(side, first)..place(side, first + window.side))
 }
 
 /// A part of a picture.
 pub(super) fn crop(window: Window, picture: &Picture) -> Picture {
-    let place = |side: u32, twelfths: u32| (u64::from(side) * u64::from(twelfths) / u64::from(STEPS)) as usize;
-    let [left, right] = [window.left, window.left + window.side].map(|at| place(picture.width, at));
-    let [top, bottom] = [window.top, window.top + window.side].map(|at| place(picture.height, at));
-    let row = |y: usize| &picture.pixels[3 * (y * picture.width as usize + left)..][..3 * (right - left)];
+    let [columns, rows] = place(window, picture);
+    let row = |y: usize| &picture.pixels[3 * (y * picture.width as usize + columns.start)..][..3 * columns.len()];
     Picture {
-        width: (right - left) as u32,
-        height: (bottom - top) as u32,
-        pixels: (top..bottom).flat_map(row).copied().collect(),
+        width: columns.len() as u32,
+        height: rows.len() as u32,
+        pixels: rows.flat_map(row).copied().collect(),
     }
 }
 

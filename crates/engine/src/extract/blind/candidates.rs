@@ -23,6 +23,8 @@ pub(super) struct Search<'a> {
     /// The whole, at the side that the extractor takes in: contrast is changed about its mean.
     whole: &'a Picture,
     parts: &'a [(Part, Picture)],
+    /// Logits of the parts before anything is undone.
+    as_they_are: Rows,
     found: Vec<Candidate>,
     /// Candidates from which a refinement has begun.
     refined: Vec<Candidate>,
@@ -36,24 +38,24 @@ impl<'a> Search<'a> {
     /// # Errors
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn of_parts(engine: &'a Engine, whole: &'a Picture, parts: &'a [(Part, Picture)]) -> Result<Self> {
-        let mut found = Vec::with_capacity(parts.len());
-        for chunk in parts.chunks(BATCH) {
-            let pictures: Vec<Picture> = chunk.iter().map(|(_, small)| small.clone()).collect();
-            for ((part, _), logits) in chunk.iter().zip(engine.read_logits(&pictures)?) {
-                let score = score::of_logits(&logits);
-                found.extend(score.is_finite().then(|| Candidate {
-                    part: *part,
-                    white: false,
-                    change: ToneChange::default(),
-                    score: score - part.cost(),
-                    logits,
-                }));
-            }
-        }
+        let pictures: Vec<Picture> = parts.iter().map(|(_, small)| small.clone()).collect();
+        let as_they_are = engine.read_logits(&pictures)?;
+        let found = parts.iter().zip(&as_they_are).filter_map(|((part, _), logits)| {
+            let score = score::of_logits(logits);
+            score.is_finite().then(|| Candidate {
+                part: *part,
+                white: false,
+                change: ToneChange::default(),
+                score: score - part.cost(),
+                logits: logits.clone(),
+            })
+        });
+        let found = found.collect();
         Ok(Self {
             engine,
             whole,
             parts,
+            as_they_are,
             found,
             refined: Vec::new(),
             spread: None,
@@ -178,6 +180,13 @@ impl<'a> Search<'a> {
         best
     }
 
+    /// Logits of the windows as they are, in their order.
+    pub fn windows(&self) -> Rows {
+        let parts = self.parts.iter().zip(&self.as_they_are);
+        let windows = parts.filter(|((part, _), _)| matches!(part, Part::Window(_)));
+        windows.map(|(_, logits)| logits.clone()).collect()
+    }
+
     fn add(&mut self, part: Part, found: Vec<Read>) {
         self.found.extend(found.into_iter().map(|read| Candidate {
             part,
@@ -207,8 +216,7 @@ fn reader<'a, U: Fn(&ToneChange) -> Option<Picture> + Send + Sync>(
 ) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, U> {
     move |changes| {
         let mut logits = Vec::with_capacity(changes.len());
-        // Not all at once: a thousand pictures are a gigabyte.
-        for chunk in changes.chunks(4 * BATCH) {
+        for chunk in changes.chunks(BATCH) {
             let before = engine.each(chunk, |change| Ok(undone(change)))?;
             let possible: Vec<Picture> = before.iter().flatten().cloned().collect();
             let mut read = read(engine, &possible)?.into_iter();

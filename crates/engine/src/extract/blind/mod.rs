@@ -27,8 +27,8 @@ use candidates::Search;
 pub(super) use joint::chosen;
 use parts::{Part, parts};
 
-/// Corrected pictures that are read together.
-const BATCH: usize = 16;
+/// Corrected pictures that are in memory together: a thousand are a gigabyte.
+const BATCH: usize = 64;
 /// Places from which a search is refined, unless one is clear before.
 const STARTS: usize = 2;
 /// Pictures read before whose changes are tried, the last ones.
@@ -50,6 +50,7 @@ pub(super) struct BlindReading {
     bits: usize,
     candidates: Vec<Candidate>,
     is_clear: bool,
+    windows: Vec<Vec<f32>>,
 }
 
 impl Candidate {
@@ -112,8 +113,14 @@ impl BlindReading {
         Ok(Self {
             bits: engine.bits,
             is_clear: search.is_certain(),
+            windows: search.windows(),
             candidates: finer::read(engine, restored, &whole, search.best())?,
         })
+    }
+
+    /// Logits of its windows as they are, in their order; none of a picture that is too small for them.
+    pub fn windows(&self) -> &[Vec<f32>] {
+        &self.windows
     }
 
     /// The best candidates, best first.

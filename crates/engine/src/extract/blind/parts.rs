@@ -5,7 +5,7 @@ use guardsplat_codeword::Window;
 
 use crate::error::Result;
 use crate::extract::restore::Restored;
-use crate::extract::window::{crop, windows_of};
+use crate::extract::window::{self, crop, windows_of};
 use crate::extract::{Engine, without_borders};
 use crate::picture::Picture;
 
@@ -58,9 +58,8 @@ pub(super) fn parts(engine: &Engine, restored: &Restored<'_>, whole: &Picture) -
     if let Some(picture) = &restored.without_backdrop {
         parts.push((Part::WithoutBackdrop, engine.resized(picture)?));
     }
-    for window in windows_of(picture) {
-        // Made small one by one: a large picture need not fit in memory many times.
-        parts.push((Part::Window(window), engine.resized(&crop(window, picture))?));
-    }
+    let windows: Vec<Window> = windows_of(picture).collect();
+    let small = window::small(engine, &windows, picture)?;
+    parts.extend(windows.into_iter().map(Part::Window).zip(small));
     Ok(parts)
 }

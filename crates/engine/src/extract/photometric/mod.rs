@@ -20,8 +20,8 @@ use super::{Engine, Extractor};
 use crate::error::Result;
 use crate::picture::Picture;
 
-/// Corrected pictures that are read together.
-const BATCH: usize = 16;
+/// Corrected pictures that are in memory together.
+const BATCH: usize = 64;
 
 /// All corrections that this extractor needs, none first: what [`read_corrections`] reads.
 pub fn corrections(extractor: &dyn Extractor) -> Vec<PhotometricCorrection> {
