@@ -57,6 +57,19 @@ finish_building_beside() {
     return 1
 }
 
+# Both wait for servers, an interpreter and a browser most of the time.
+check_python_and_page() {
+    local page_log status=0
+    page_log=$(mktemp)
+    (stage page bash deploy/page.sh) >"$page_log" 2>&1 &
+    local page=$!
+    TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh || status=$?
+    wait "$page" || status=$?
+    cat "$page_log"
+    rm -f "$page_log"
+    return "$status"
+}
+
 stage setup setup
 stage "setup of tests" setup_tests
 for tool in fmt clippy; do
@@ -74,8 +87,7 @@ stage build cargo test --release --workspace --locked "${kinds[@]}" --no-run
 start_building_beside
 stage tests run_tests
 stage "build and lints beside the tests" finish_building_beside
-TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh
-stage page bash deploy/page.sh
+stage "python and page" check_python_and_page
 stage credentials bash deploy/credentials.sh
 # Longer runs, and other inputs, are for people: docs/fuzzing.md.
 stage fuzz env FUZZ_SEED=1 bash deploy/fuzz.sh 5

@@ -1,6 +1,7 @@
 //! The worker's day: waits for a job, carries it out, says what became of it, until it is to leave.
 use std::time::{Duration, Instant};
 
+use guardsplat_engine::memory;
 use guardsplat_engine::stop::Stop;
 use guardsplat_proto::v1::Job;
 use tonic::Code;
@@ -62,6 +63,8 @@ impl Worker {
             };
             if let Some((lease, job)) = leased {
                 self.attempt(&lease, &job).await?;
+                // The next job may be long in coming, and its peak is its own.
+                memory::give_back_freed();
             }
         }
     }

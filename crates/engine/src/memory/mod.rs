@@ -9,7 +9,7 @@ mod prediction;
 mod requirements;
 mod usage;
 
-pub use allocator::keep_freed;
+pub use allocator::{give_back_freed, keep_freed};
 pub use limits::Limits;
 pub use prediction::{
     EmbeddingWorkload, ModelBytes, SceneSize, ViewSize, embedding_requirements, picture_bytes, rendering_requirements,

@@ -137,6 +137,7 @@ mod tests {
                     bits: BITS,
                     candidates,
                     is_clear: false,
+                    windows: Vec::new(),
                 }
             })
             .collect();
@@ -153,6 +154,7 @@ mod tests {
             bits: BITS,
             candidates: Vec::new(),
             is_clear: false,
+            windows: Vec::new(),
         };
         let found = chosen(&[&none, pictures[0]]);
         assert!(found[0].is_none() && found[1].is_some());
