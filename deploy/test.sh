@@ -59,11 +59,14 @@ finish_building_beside() {
 
 # Both wait for servers, an interpreter and a browser most of the time.
 check_python_and_page() {
-    local page_log status=0
+    local page_log python page status=0
     page_log=$(mktemp)
+    # In shells of their own, where a command that fails ends them.
+    (TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh) &
+    python=$!
     (stage page bash deploy/page.sh) >"$page_log" 2>&1 &
-    local page=$!
-    TARGETS_BUILT="${kinds[*]}" stage python bash deploy/python.sh || status=$?
+    page=$!
+    wait "$python" || status=$?
     wait "$page" || status=$?
     cat "$page_log"
     rm -f "$page_log"
