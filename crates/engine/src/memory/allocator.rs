@@ -28,7 +28,8 @@ pub fn keep_freed() {
     }
 }
 
-/// Gives the kernel what was freed, as a program that waits for its next job should.
+/// Gives the kernel what was freed, but for the end of each thread's heap (64 MiB at most), as a program that waits for its
+/// next job should.
 #[allow(unsafe_code)]
 pub fn give_back_freed() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -73,6 +74,6 @@ mod tests {
         assert!(kept >= before + 140, "{before} {kept}");
         give_back_freed();
         let left = held();
-        assert!(left <= before + 20, "{before} {kept} {left}");
+        assert!(left <= before + 70, "{before} {kept} {left}");
     }
 }
