@@ -22,7 +22,6 @@ pub mod speed;
 mod submission;
 mod tokens;
 
-use std::pin::Pin;
 use std::sync::Arc;
 
 use super::Ledger;
@@ -55,15 +54,6 @@ pub trait Factory: Send + Sync {
     async fn open_several(&self, count: usize) -> Vec<Arc<dyn Ledger>> {
         vec![self.open().await; count]
     }
-}
-
-/// Runs one test on two threads. Boxed, so that the runtime is compiled once and not for each of two hundred tests.
-pub(crate) fn run(test: Pin<Box<dyn Future<Output = ()>>>) {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build();
-    runtime.unwrap().block_on(test);
 }
 
 /// Makes a test of every function of the suite; each gets a factory of its own from `$factory`, or is skipped where that
@@ -173,13 +163,11 @@ macro_rules! conformance_suite {
         );
     };
     (@tests $factory:expr; $($test:ident)*) => {$(
-        #[test]
-        fn $test() {
-            $crate::ledger::conformance::run(Box::pin(async {
-                if let Some(factory) = $factory {
-                    $crate::ledger::conformance::$test(&factory).await;
-                }
-            }));
+        #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+        async fn $test() {
+            if let Some(factory) = $factory {
+                $crate::ledger::conformance::$test(&factory).await;
+            }
         }
     )*};
 }
