@@ -6,9 +6,10 @@ const ROOM: libc::c_int = 64 << 20;
 /// Bytes at the end of a heap that may be free before they are given back.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const KEPT: libc::c_int = 256 << 20;
-/// Blocks from this size on are the kernel's, which has them back at once.
+/// Blocks from this size on are the kernel's, which has them back at once: the most that all versions of the library take.
+/// Without it they would be those of 128 KiB and more, once anything is set.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-const LARGE: libc::c_int = 256 << 20;
+const LARGE: libc::c_int = 32 << 20;
 
 /// Has the C library keep what this process frees, up to 256 MiB of each heap. For programs that embed, at their start.
 ///
