@@ -142,6 +142,34 @@ mod tests {
     }
 
     #[test]
+    fn what_is_plain_stays_exactly_so_and_a_part_is_a_picture_of_its_own() {
+        let value = |i: u32| if i % 83 < 40 { 0.7 } else { (i as f32 * 0.37).sin() };
+        let picture = Picture {
+            width: 83,
+            height: 61,
+            pixels: (0..83 * 61).flat_map(|i| [value(i), 0.3, value(i)]).collect(),
+        };
+        let plain = resized_part(&picture, [3..40, 5..61], 16, 16).unwrap();
+        assert!(
+            plain
+                .pixels
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .all(|pixel| *pixel == [0.7, 0.3, 0.7])
+        );
+        let [columns, rows] = [20..71, 9..50];
+        let line = |y: usize| &picture.pixels[3 * (y * 83 + columns.start)..3 * (y * 83 + columns.end)];
+        let crop = Picture {
+            width: columns.len() as u32,
+            height: rows.len() as u32,
+            pixels: rows.clone().flat_map(line).copied().collect(),
+        };
+        let part = resized_part(&picture, [columns.clone(), rows.clone()], 16, 12).unwrap();
+        assert_eq!(part, resized(&crop, 16, 12).unwrap());
+    }
+
+    #[test]
     fn a_picture_is_resized_as_tensors_are() {
         let of = |width: u32, height: u32| Picture {
             width,

@@ -231,7 +231,7 @@ impl Engine {
     ) -> Result<Vec<Vec<f32>>> {
         let alike = pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height));
         let chunks: Vec<&[Picture]> = alike.flat_map(|alike| alike.chunks(READ_BATCH)).collect();
-        let rows = self.each(&chunks, |chunk| {
+        let rows = |chunk: &&[Picture]| {
             let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
                 Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
                 None => Vec::new(),
@@ -239,8 +239,16 @@ impl Engine {
             let chunk: Vec<&Picture> = if made.is_empty() { *chunk } else { &made }.iter().collect();
             let logits = self.to_host(read(batch(&chunk, &self.compute.device)?)?)?;
             Ok(logits.chunks_exact(self.bits).map(<[f32]>::to_vec).collect::<Vec<_>>())
-        })?;
-        Ok(rows.into_iter().flatten().collect())
+        };
+        // Packing keeps a tower of sines waiting. Transformers use all cores anyway, and a batch of them fills memory.
+        let of_chunks = match self.extractor.reads_exact_colours() {
+            true => self.each(&chunks, rows)?,
+            false => {
+                let one = |chunk| self.stop.check().and_then(|()| rows(chunk));
+                chunks.iter().map(one).collect::<Result<Vec<_>>>()?
+            }
+        };
+        Ok(of_chunks.into_iter().flatten().collect())
     }
 
     /// A picture at the side that the extractor takes in.

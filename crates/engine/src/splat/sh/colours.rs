@@ -1,5 +1,6 @@
 //! Colours of what views show, sixteen Gaussians side by side where enough of them are seen.
 use rayon::prelude::*;
+use std::ops::Range;
 
 use super::lanes::{LANES, Lanes, Number};
 use super::{MAX_COEFFICIENTS, ROWS, WORTH_LANES, basis, basis_of, below, parts, terms};
@@ -127,7 +128,7 @@ impl<'a> Coefficients<'a> {
 
     /// Puts those of some rows side by side, with what is added.
     #[inline(always)]
-    fn put_side_by_side(&self, rows: std::ops::Range<usize>, out: &mut [Lanes; 3 * MAX_COEFFICIENTS]) {
+    fn put_side_by_side(&self, rows: Range<usize>, out: &mut [Lanes; 3 * MAX_COEFFICIENTS]) {
         for (i, row) in rows.enumerate().take(LANES) {
             let (plain, changed) = self.row(row);
             let (both, rest) = plain.split_at(changed.len());
@@ -145,7 +146,7 @@ impl<'a> Coefficients<'a> {
 /// Colours of some rows in all views.
 struct Task<'a> {
     of: Coefficients<'a>,
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     views: Vec<Part<'a>>,
 }
 
