@@ -46,6 +46,7 @@ class VerifyOptions(TypedDict):
     views: int
     size: int | None
     background: list[float]
+    original: str | None
     cameras: EngineCameras
     kind: str | None
     seed: int

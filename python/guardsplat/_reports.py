@@ -115,6 +115,9 @@ class Verdict:
     """The way that agreed best, where it is not the first."""
     estimates: list[str] | None
     """What is estimated to have been done to each picture, where that was estimated."""
+    explained_by_original: list[float | None] | None
+    """Of each picture the share of it that the original explains, where it was compared with one; ``None`` where it does not
+    show the original's scene."""
     ignored_rows: int
     """Rows of the scene that were ignored."""
     reason: str | None

@@ -42,6 +42,7 @@ def verify(
     *,
     key: KeyOrPath,
     message: str | bytes | None = None,
+    original: str | os.PathLike[str] | None = None,
     views: int = 20,
     size: int | None = None,
     background: str | Iterable[float] = "white",
@@ -63,6 +64,8 @@ def verify(
             point of 0 to 1; of numpy, torch, or anything with ``__array__`` or DLPack.
         key: the key, or its file.
         message: what to compare with, in hexadecimal or as bytes. Without it nothing is decided.
+        original: the unmarked scene, a path. Pictures that do not match as they are given are compared with it, so that
+            neither what is behind the scene nor a filter matters.
         views: views that a scene is read from.
         size: their side in pixels; what the key's CLIP takes in unless given.
         background: ``white``, ``black`` or three numbers: what is behind a scene, or shows through transparent pixels.
@@ -81,6 +84,7 @@ def verify(
         "views": within("views", views, 1, 10_000),
         "size": None if size is None else within("size", size, 16, 4096),
         "background": rgb,
+        "original": None if original is None else os.fspath(original),
         "cameras": _cameras.to_engine(cameras),
         "kind": kind,
         "seed": seed_of(seed),

@@ -5,9 +5,10 @@ use std::time::Instant;
 use guardsplat_engine::extract::find_source;
 use guardsplat_engine::picture::Picture;
 use guardsplat_engine::scene::BadRows;
+use guardsplat_operations::comparison::read_and_compare;
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::{Suspect, SuspectPicture};
-use guardsplat_operations::verification::{Views, read_and_compare};
+use guardsplat_operations::verification::Views;
 use guardsplat_operations::verification_report::{VerificationReport, VerifyReport};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -25,6 +26,7 @@ pub struct Options {
     views: usize,
     size: Option<u32>,
     background: [f32; 3],
+    original: Option<PathBuf>,
     cameras: Option<Cameras>,
     kind: Option<String>,
     seed: u64,
@@ -84,7 +86,8 @@ pub fn verify(
         let clip = options.clip.as_deref();
         let mut engine = load::engine(path, inner, clip, device, load::Work::Reading, false, options.memory)?;
         engine.stop = context.stop.clone();
-        let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
+        let original = options.original.as_deref();
+        let compared = read_and_compare(&engine, &suspect, &views, original, message.as_ref(), |done, total| {
             context.at("reading", done, total);
         })?;
         json(&VerifyReport {

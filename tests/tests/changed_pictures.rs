@@ -166,3 +166,50 @@ fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
         assert!(place == 0 || told.contains("without its backdrop"), "{told}");
     }
 }
+
+#[test]
+fn one_picture_over_anything_and_with_a_filter_is_compared_with_the_original() {
+    let environment = marked();
+    over_white_and_black(&environment);
+    let filter = |v: f32, c: usize| [0.05 + 0.9 * v.powf(0.8), 0.02 + 0.9 * v, 0.9 * v.powf(1.2)][c];
+    let photograph = |x: f32, y: f32| {
+        let square = ((9.0 * x) as usize + 3 * (7.0 * y) as usize) % 4;
+        let colour = [[0.8, 0.5, 0.3], [0.1, 0.3, 0.15], [0.5, 0.6, 0.8], [0.15, 0.1, 0.2]][square];
+        std::array::from_fn(|c| colour[c] + 0.05 * x * y + 0.02 * (40.0 * x).sin())
+    };
+    show(&environment, 1, photograph);
+    let path = environment.path("views/1.png");
+    let mut picture = image::open(&path).unwrap().to_rgb8();
+    for pixel in picture.pixels_mut() {
+        for (c, value) in pixel.0.iter_mut().enumerate() {
+            *value = (255.0 * filter(f32::from(*value) / 255.0, c)).round() as u8;
+        }
+    }
+    picture.save(&path).unwrap();
+    let blind = environment.json(VERIFY, 2);
+    assert_eq!(blind["explained_by_original"], Value::Null, "{blind}");
+    let found = environment.json(&format!("{VERIFY} --original in.ply"), 0);
+    assert_eq!(
+        found["framing"], "compared with the original, tones fitted to it",
+        "{found}"
+    );
+    assert!(found["explained_by_original"][0].as_f64() > Some(0.9), "{found}");
+    // The original says nothing of another message, and nothing at all of a scene that the picture does not show.
+    environment.json(
+        "verify views --key k.key --message c0fe --device cpu --json --original in.ply",
+        2,
+    );
+    environment.exits("sample other.ply --gaussians 5000 --sh-degree 1 --seed 77", 0);
+    let other = environment.json(&format!("{VERIFY} --original other.ply"), 2);
+    assert_eq!(other["explained_by_original"], serde_json::json!([null]), "{other}");
+    // One that is not there is told, whether it is needed or not.
+    let missing = "verify white --key k.key --message c0ff --device cpu --json --original nothing.ply";
+    environment.exits(missing, 1);
+    // Pictures of what is not marked show the scene, and have no message.
+    environment.exits("render in.ply unmarked --views 2 --size 400 --device cpu", 0);
+    let unmarked = environment.json(
+        "verify unmarked --key k.key --message c0ff --device cpu --json --original in.ply",
+        2,
+    );
+    assert_eq!(unmarked["explained_by_original"].as_array().map(Vec::len), Some(2));
+}

@@ -1,5 +1,6 @@
 //! What programs do with the engine, from what users choose to what they are told: shared by the offline commands, the
 //! jobs of a server and the Python package, so that all give the same bytes and figures. No command line, no gRPC.
+pub mod comparison;
 pub mod comparison_sheet;
 pub mod create_key;
 pub mod embed_levels;
@@ -9,6 +10,7 @@ pub mod error_text;
 pub mod forecast;
 pub mod inspect;
 pub mod load;
+pub mod registered;
 pub mod render;
 pub mod sample;
 pub mod search;

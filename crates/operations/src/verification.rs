@@ -1,13 +1,15 @@
-//! What a verification finds: reads scenes and pictures, and says whether the message is there.
-use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
+//! What a verification reads of scenes and pictures, as they are and under every hypothesis.
+use std::path::Path;
+
+use guardsplat_codeword::Hypothesis;
 use guardsplat_engine::Result;
 use guardsplat_engine::extract::{
-    Comparison, Engine, PictureLogits, PooledLogits, StaticBackground, default_size, estimates, hypotheses, read_given,
-    read_scene, size_for_scene,
+    Engine, PictureLogits, PooledLogits, StaticBackground, default_size, estimates, hypotheses, read_given, read_scene,
+    size_for_scene,
 };
 use guardsplat_engine::memory::{MemoryRequirements, admission, picture_bytes};
 use guardsplat_engine::picture::Picture;
-use guardsplat_engine::scene::{BadRows, Ignored, Scene};
+use guardsplat_engine::scene::{BadRows, Gaussians, Ignored, Scene};
 use guardsplat_engine::splat::Geometry;
 use guardsplat_engine::view::{Camera, SceneKind, ViewSampler, Viewpoints};
 
@@ -34,6 +36,17 @@ pub struct Views {
     pub with_files: bool,
     /// The level of detail of streamed scenes that is read, 0 being the finest. For such files as were chosen on this machine.
     pub level: usize,
+}
+
+impl Views {
+    /// Where the viewers of a scene are.
+    pub(crate) fn sampler(&self, gaussians: &Gaussians) -> Result<ViewSampler> {
+        let viewpoints = Viewpoints {
+            kind: self.kind,
+            cameras: &self.cameras,
+        };
+        ViewSampler::seen_from(gaussians, self.seed, viewpoints)
+    }
 }
 
 /// What is told of a picture whose static background was taken out, after what is estimated to have been done to it.
@@ -79,18 +92,12 @@ fn read_scenes(
     let total = count(suspect, views);
     for path in &suspect.scenes {
         // A scene of fine splats is drawn at twice the side, and is not read yet.
-        let largest = views.size.unwrap_or_else(|| 2 * default_size(engine));
-        let rest = MemoryRequirements {
-            models: engine.model_bytes(false),
-            pictures: picture_bytes(largest, largest),
-            ..MemoryRequirements::of_program()
-        };
-        admission::admit_reading(path, &engine.limits, rest)?;
-        let memory = engine.limits.left(&rest);
-        let scene = match views.with_files {
-            true => Scene::read_level(path, views.level, views.bad_rows, memory)?,
-            false => Scene::read_within(path, views.bad_rows, memory)?,
-        };
+        let scene = loaded(
+            engine,
+            path,
+            views,
+            views.size.unwrap_or_else(|| 2 * default_size(engine)),
+        )?;
         ignored.extend(scene.ignored().cloned());
         let gaussians = scene.into_gaussians();
         let before = logits.len();
@@ -98,11 +105,7 @@ fn read_scenes(
             progress(before + done, total);
             shown.see("view", before + done - 1, picture)
         };
-        let viewpoints = Viewpoints {
-            kind: views.kind,
-            cameras: &views.cameras,
-        };
-        let sampler = ViewSampler::seen_from(&gaussians, views.seed, viewpoints)?;
+        let sampler = views.sampler(&gaussians)?;
         let size = match views.size {
             Some(size) => size,
             None => size_for_scene(engine, &Geometry::new(&gaussians), &sampler)?,
@@ -111,6 +114,21 @@ fn read_scenes(
         logits.extend(reading.views);
     }
     Ok((logits, ignored))
+}
+
+/// A scene of the suspect or the original, if memory has room for it beside views with sides of `largest` pixels.
+pub(crate) fn loaded(engine: &Engine, path: &Path, views: &Views, largest: u32) -> Result<Scene> {
+    let rest = MemoryRequirements {
+        models: engine.model_bytes(false),
+        pictures: picture_bytes(largest, largest),
+        ..MemoryRequirements::of_program()
+    };
+    admission::admit_reading(path, &engine.limits, rest)?;
+    let memory = engine.limits.left(&rest);
+    Ok(match views.with_files {
+        true => Scene::read_level(path, views.level, views.bad_rows, memory)?,
+        false => Scene::read_within(path, views.bad_rows, memory)?,
+    })
 }
 
 /// What was read under every hypothesis.
@@ -170,82 +188,4 @@ pub fn read_hypotheses(
             .collect(),
         ignored,
     })
-}
-
-/// What was read, and how it compares with a raw message.
-pub struct Compared {
-    /// What was read under the hypothesis that agrees best.
-    pub reading: PooledLogits,
-    /// How it compares, if there is a message, or a coded one is read.
-    pub comparison: Option<Comparison>,
-    /// What was undone for it.
-    pub hypothesis: Hypothesis,
-    /// Hypotheses under which the pictures were read.
-    pub hypotheses: usize,
-    /// What is estimated to have been done to each picture, in words, if it was estimated.
-    pub estimates: Vec<String>,
-    /// Rows of scenes that were ignored.
-    pub ignored: Vec<Ignored>,
-}
-
-/// Reads `suspect` and compares it with `message`. Pictures that do not match as they are given are read under every other
-/// hypothesis besides, and so are those of a message that is too short to match, unless all of it is right. Each hypothesis
-/// pays by its share of the rate ([`shares`]): half is for pictures as they are, so that those who change nothing hardly pay
-/// for those who do. Without a message a coded one is compared with what it reads itself, and pays for all messages.
-pub fn read_and_compare(
-    engine: &Engine,
-    suspect: &Suspect,
-    views: &Views,
-    message: Option<&Message>,
-    mut progress: impl FnMut(usize, usize),
-) -> Result<Compared> {
-    // Nobody looks at what was compared with a raw message.
-    let mut shown = Thumbnails::default();
-    let (reading, ignored) = read(engine, suspect, views, &mut shown, &mut progress)?;
-    let mut best = Compared {
-        reading,
-        comparison: None,
-        hypothesis: Hypothesis::default(),
-        hypotheses: 1,
-        estimates: Vec::new(),
-        ignored,
-    };
-    let compare = |reading: &PooledLogits, tries: u64| {
-        let code = &engine.message_code;
-        let (message, tries) = match (message, code.messages()) {
-            (Some(message), _) => (*message, tries),
-            (None, Some(messages)) => (code.read(&reading.summed)?, tries.saturating_mul(messages)),
-            (None, None) => return Ok(None),
-        };
-        reading
-            .compare(code, &message, &engine.acceptance_rule(tries as usize))
-            .map(Some)
-    };
-    // Without pictures there is nothing to guess. With them the first reading has what it would have among all.
-    let given = if suspect.pictures.is_empty() { 1 } else { 2 };
-    let Some(as_given) = compare(&best.reading, given)? else {
-        return Ok(best);
-    };
-    // Of a message that is too short for a match the best reading is told all the same.
-    let all = as_given.decision.matched_bits == as_given.decision.bits;
-    let decided = given == 1 || all || as_given.decision.verdict == Verdict::Match;
-    let mut p_value = as_given.decision.p_value;
-    best.comparison = Some(as_given);
-    if decided {
-        return Ok(best);
-    }
-    let HypothesisReadings {
-        readings: read,
-        estimates,
-        ..
-    } = read_hypotheses(engine, suspect, views, &mut shown, progress)?;
-    (best.hypotheses, best.estimates) = (read.len(), estimates);
-    let tries = shares(&read.iter().map(|(hypothesis, _)| *hypothesis).collect::<Vec<_>>());
-    for ((hypothesis, reading), tries) in read.into_iter().zip(tries).skip(1) {
-        if let Some(comparison) = compare(&reading, tries)?.filter(|found| found.decision.p_value < p_value) {
-            p_value = comparison.decision.p_value;
-            (best.reading, best.hypothesis, best.comparison) = (reading, hypothesis, Some(comparison));
-        }
-    }
-    Ok(best)
 }

@@ -5,7 +5,7 @@ use guardsplat_engine::extract::{Comparison, PooledLogits};
 use guardsplat_engine::scene::Ignored;
 use serde::Serialize;
 
-use super::verification::Compared;
+use super::comparison::{Compared, Way};
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -48,6 +48,10 @@ pub struct VerificationReport {
     /// What is estimated to have been done to each picture, where that was estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<String>,
+    /// Of each picture the share of it that the original explains, where it was compared with one; nothing where it does not
+    /// show the original's scene.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub explained_by_original: Vec<Option<f64>>,
     /// Rows of the scene that are no Gaussians of it and were ignored.
     pub ignored_rows: usize,
     /// Why nothing could be decided.
@@ -58,10 +62,13 @@ impl VerificationReport {
     /// What a comparison says.
     pub fn of(code: &MessageCode, compared: &Compared) -> Result<Self> {
         let found = Self::new(code, &compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
-        let as_given = compared.hypothesis == Hypothesis::default();
         Ok(Self {
-            hypotheses: compared.hypotheses,
-            hypothesis: (!as_given).then(|| compared.hypothesis.to_string()),
+            hypotheses: compared.ways,
+            hypothesis: match compared.way {
+                Way::Undone(hypothesis) => (hypothesis != Hypothesis::default()).then(|| hypothesis.to_string()),
+                Way::Registered(tones) => Some(tones.to_string()),
+            },
+            explained_by_original: compared.explained.clone(),
             estimates: compared.estimates.clone(),
             ..found
         })
@@ -93,6 +100,7 @@ impl VerificationReport {
             hypotheses: 1,
             hypothesis: None,
             estimates: Vec::new(),
+            explained_by_original: Vec::new(),
             ignored_rows: ignored.iter().map(Ignored::count).sum(),
             reason: match decision {
                 Some(decision) => decision.reason.clone(),

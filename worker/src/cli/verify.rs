@@ -12,9 +12,10 @@ use guardsplat_engine::scene::{BadRows, Ignored};
 
 use super::display::Display;
 use super::{Background, Budget, Exit, Kind, print_json, print_line};
+use guardsplat_operations::comparison::read_and_compare;
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::Suspect;
-use guardsplat_operations::verification::{Views, read_and_compare};
+use guardsplat_operations::verification::Views;
 use guardsplat_operations::verification_report::{VerificationReport, VerifyReport};
 
 #[derive(Args)]
@@ -29,6 +30,10 @@ pub struct Arguments {
     /// The message to compare with, in hexadecimal
     #[arg(long, value_name = "HEX")]
     message: Option<String>,
+    /// The unmarked scene: pictures that do not match as they are given are compared with it, so that neither what is behind
+    /// the scene nor a filter matters
+    #[arg(long, value_name = "SCENE")]
+    original: Option<PathBuf>,
     /// Where to compute: auto, wgpu or cpu
     #[arg(long, default_value = "auto")]
     device: DeviceChoice,
@@ -95,7 +100,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         level: arguments.level as usize,
     };
     let mut display = Display::new("reading");
-    let compared = read_and_compare(&engine, &suspect, &views, message.as_ref(), |done, total| {
+    let original = arguments.original.as_deref();
+    let compared = read_and_compare(&engine, &suspect, &views, original, message.as_ref(), |done, total| {
         display.set(done, total, String::new);
     })?;
     drop(display);
@@ -146,6 +152,14 @@ fn tell(report: &VerificationReport, comparison: Option<&Comparison>, ignored: &
     });
     if let Some(hypothesis) = &report.hypothesis {
         print_line(&format!("read best of {} ways: {hypothesis}", report.hypotheses));
+    }
+    let explained = &report.explained_by_original;
+    if !explained.is_empty() {
+        let shown = explained.iter().flatten().count();
+        print_line(&format!(
+            "{shown} of {} pictures show the original's scene",
+            explained.len()
+        ));
     }
     if let Some(reason) = &report.reason {
         print_line(reason);

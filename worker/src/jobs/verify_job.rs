@@ -10,10 +10,11 @@ use guardsplat_proto::v1::{FramedReading, SeenView, VerifyResult, VerifySpec};
 use super::attempt::{Attempt, Outcome};
 use super::convert;
 use super::error::{Error, Result};
+use guardsplat_operations::comparison::read_and_compare;
 use guardsplat_operations::load;
 use guardsplat_operations::suspect::Suspect;
 use guardsplat_operations::thumbnails::Thumbnails;
-use guardsplat_operations::verification::{read_and_compare, read_hypotheses};
+use guardsplat_operations::verification::read_hypotheses;
 use guardsplat_operations::verification_report::VerificationReport;
 
 /// A reading that was compared, or is for the server to decide on.
@@ -71,7 +72,7 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
                 read.readings,
             )
         } else {
-            let compared = read_and_compare(engine, &suspect, &views, message.as_ref(), progress)?;
+            let compared = read_and_compare(engine, &suspect, &views, None, message.as_ref(), progress)?;
             (VerificationReport::of(&engine.message_code, &compared)?, Vec::new())
         };
         Ok(Verified {

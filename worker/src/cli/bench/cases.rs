@@ -22,8 +22,9 @@ use super::Arguments;
 use super::spread::Spread;
 use crate::cli::display::Display;
 use crate::machine::Machine;
+use guardsplat_operations::comparison::read_and_compare;
 use guardsplat_operations::suspect::Suspect;
-use guardsplat_operations::verification::{Views, read_and_compare};
+use guardsplat_operations::verification::Views;
 use guardsplat_operations::{create_key, load};
 
 /// Bits of the key, and its seed: seconds don't depend on it.
@@ -253,8 +254,8 @@ impl Files {
             level: 0,
         };
         let suspect = Suspect::from(find_source(&[path.to_owned()])?);
-        let found = read_and_compare(&given.engine, &suspect, &views, Some(&given.message), |_, _| {})?;
-        Ok((!suspect.pictures.is_empty()).then_some(found.hypotheses))
+        let found = read_and_compare(&given.engine, &suspect, &views, None, Some(&given.message), |_, _| {})?;
+        Ok((!suspect.pictures.is_empty()).then_some(found.ways))
     }
 }
 
