@@ -106,6 +106,20 @@ def test_other_arrays_are_refused_with_row_and_limit(
     assert (error.field, error.row) == ("pictures", 1) and error.limit is not None and limit in error.limit
 
 
+def test_a_picture_with_a_filter_is_compared_with_the_original(
+    pictures: Any, scene: Path, key: guardsplat.Key, folder: Path
+) -> None:
+    # One picture, since those of one scene would be guessed together.
+    filtered = (0.05 + 0.9 * (pictures[0] / 255.0) ** np.array([0.8, 1.0, 1.2])).astype(np.float32)
+    blind = read(filtered, key)
+    found = read(filtered, key, original=scene)
+    assert blind.explained_by_original is None
+    assert found.explained_by_original is not None and (found.explained_by_original[0] or 0) > 0.9
+    assert (found.matched_bits or 0) > (blind.matched_bits or 0), (found, blind)
+    with pytest.raises(guardsplat.GuardSplatError, match="nothing"):
+        read(filtered, key, original=folder / "nothing.ply")
+
+
 def test_nothing_and_things_that_are_no_suspects(key: guardsplat.Key) -> None:
     with pytest.raises(guardsplat.BadOption, match="there is none"):
         read([], key)

@@ -74,7 +74,10 @@ def main():
     parser.add_argument("--size", type=int, default=800)
     given = parser.parse_args()
     name = pathlib.Path(given.original).name.split(".")[0]
-    print("scene,change,picture,verdict,right_bits,seconds,with_original,right_bits,seconds,explained,bits")
+    print(
+        "scene,change,picture,verdict,right_bits,seconds,"
+        "verdict_with_original,right_bits_with_original,seconds_with_original,explained,bits"
+    )
     with tempfile.TemporaryDirectory() as folder:
         white, black = (
             rendered(given.worker, given.marked, given.pictures, given.size, given.seed, ground, folder)
