@@ -40,7 +40,7 @@ pub use reading::RegisteredTones;
 use refine::{Freedoms, refined};
 
 /// Share of a picture's variance, where the original is seen, that a registration explains at least. Wrong ones explained up
-/// to 0.82, right ones from 0.94 on (`docs/verify.md`, "With the original").
+/// to 0.82, right ones from 0.93 on (`docs/verify.md`, "With the original").
 const EXPLAINED: f64 = 0.85;
 
 /// Share of a picture that the original covers at least: the colours of fewer pixels are met by chance.
