@@ -46,9 +46,10 @@ BACKDROPS = {
 }
 
 
-def rendered(worker, scene, folder, ground):
+def rendered(worker, scene, folder, ground, views=VIEWS, size=SIZE, seed=SEED):
+    """Held-out views of a scene over a ground, each of numbers from 0 to 1."""
     out = Path(folder) / ground
-    render = [worker, "render", scene, out, "--views", str(VIEWS), "--size", str(SIZE), "--seed", str(SEED)]
+    render = [worker, "render", scene, out, "--views", str(views), "--size", str(size), "--seed", str(seed)]
     subprocess.run([*render, "--background", ground, "--device", "cpu"], check=True, capture_output=True)
     return [numpy.asarray(Image.open(path).convert("RGB"), float) / 255 for path in sorted(out.glob("*.png"))]
 
@@ -78,4 +79,5 @@ def main():
                 print(",".join(map(str, [*row, told["verdict"]])), flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -16,6 +16,7 @@ import subprocess
 import tempfile
 
 import numpy as np
+from backdrops import rendered
 from PIL import Image
 
 
@@ -38,15 +39,6 @@ CHANGES = {
     "photograph, filter, JPEG 85": (filtered, 85),
     "photograph, cropped to 0.7, JPEG 80": (cropped, 80),
 }
-
-
-def rendered(worker, scene, views, size, seed, ground, folder):
-    """Views over a ground, each of numbers from 0 to 1."""
-    out = pathlib.Path(folder, ground)
-    options = ["--views", str(views), "--size", str(size), "--seed", str(seed), "--background", ground]
-    subprocess.run([worker, "render", scene, out, *options, "--device", "cpu"], check=True, capture_output=True)
-    files = sorted(out.glob("*.png"))
-    return [np.asarray(Image.open(file).convert("RGB"), np.float32) / 255 for file in files]
 
 
 def photograph(folder, index, size):
@@ -80,7 +72,7 @@ def main():
     )
     with tempfile.TemporaryDirectory() as folder:
         white, black = (
-            rendered(given.worker, given.marked, given.pictures, given.size, given.seed, ground, folder)
+            rendered(given.worker, given.marked, folder, ground, given.pictures, given.size, given.seed)
             for ground in ("white", "black")
         )
         for index, (on_white, on_black) in enumerate(zip(white, black)):

@@ -24,22 +24,16 @@ fn percent(logits: &[f32], message: &Message) -> Result<f64> {
     Ok(100.0 * Reading::from_logits(logits)?.bit_accuracy(message)?)
 }
 
-/// Where a point is in a picture, as shares of its sides, if it is in front of the camera and inside.
-fn place(camera: &Camera, point: [f32; 3]) -> Option<[f32; 2]> {
-    let [x, y, z]: [f32; 3] = std::array::from_fn(|row| {
-        (0..3).map(|k| camera.rotation[row][k] * point[k]).sum::<f32>() + camera.translation[row]
-    });
-    let at = [
-        (camera.fx * x / z + camera.cx) / camera.width as f32,
-        (camera.fy * y / z + camera.cy) / camera.height as f32,
-    ];
-    (z > 0.2 && at.iter().all(|v| (-0.5..1.5).contains(v))).then_some(at)
-}
-
 fn error(gaussians: &Gaussians, truth: &Camera, found: &Camera) -> f32 {
+    // Shares of the sides: the two are of pictures of different sizes.
+    let place = |camera: &Camera, point: [f32; 3]| {
+        let [x, y] = camera.pixel(point);
+        [x / camera.width as f32, y / camera.height as f32]
+    };
     let distance = |point: &[f32; 3]| {
-        let ([x, y], [u, v]) = (place(truth, *point)?, place(found, *point).unwrap_or([9.0; 2]));
-        Some(800.0 * ((x - u).powi(2) + (y - v).powi(2)).sqrt())
+        let ([x, y], [u, v]) = (place(truth, *point), place(found, *point));
+        let inside = [x, y].iter().all(|v| (0.0..1.0).contains(v));
+        inside.then(|| 800.0 * ((x - u).powi(2) + (y - v).powi(2)).sqrt())
     };
     let mut distances: Vec<f32> = gaussians.positions.iter().step_by(EVERY).filter_map(distance).collect();
     distances.sort_by(f32::total_cmp);

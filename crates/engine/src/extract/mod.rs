@@ -4,6 +4,7 @@ mod engine;
 mod extractor;
 mod hypothesis;
 mod led;
+mod linear;
 mod photometric;
 mod picture_logits;
 mod pictures;

@@ -85,8 +85,13 @@ impl Camera {
         })
     }
 
+    /// Where a point of the world is seen, x and y in pixels; of a point behind the camera that means nothing.
+    pub fn pixel(&self, p: [f32; 3]) -> [f32; 2] {
+        let [x, y, z] = self.to_camera(p);
+        [self.fx * x / z + self.cx, self.fy * y / z + self.cy]
+    }
+
     /// World to camera coordinates.
-    #[cfg(test)]
     pub(crate) fn to_camera(&self, p: [f32; 3]) -> [f32; 3] {
         std::array::from_fn(|row| dot(self.rotation[row], p) + self.translation[row])
     }
@@ -117,13 +122,9 @@ mod tests {
     fn a_window_is_that_part_of_the_picture() {
         let camera = Camera::look_at([0.0, 0.0, -3.0], [0.1, 0.2, 0.0], [0.0, -1.0, 0.0], 0.8, 64, 48);
         let window = camera.window(0.5, [1.0, 0.25]);
-        let pixel = |camera: &Camera, point| {
-            let [x, y, z] = camera.to_camera(point);
-            [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
-        };
         for point in [[0.0; 3], [0.4, -0.3, 0.5]] {
-            let [x, y] = pixel(&camera, point);
-            let [u, v] = pixel(&window, point);
+            let [x, y] = camera.pixel(point);
+            let [u, v] = window.pixel(point);
             // The right half, from an eighth of the height.
             assert!((u - 2.0 * (x - 32.0)).abs() < 1e-3 && (v - 2.0 * (y - 6.0)).abs() < 1e-3);
         }

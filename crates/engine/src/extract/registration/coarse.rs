@@ -5,6 +5,7 @@ use super::Original;
 use super::drawn::Drawn;
 use super::observed::Observed;
 use crate::error::Result;
+use crate::extract::stands_for;
 use crate::picture::Picture;
 use crate::resize::resized;
 use crate::view::{Camera, Split};
@@ -22,8 +23,6 @@ const INSIDE: f32 = 0.25;
 const LEAST: f32 = 6.0;
 /// What contrast may have been multiplied by: with none left anything looks like anything.
 const CONTRAST: [f32; 2] = [0.4, 2.5];
-/// Pixels of people's pictures for each of a view's.
-const TIMES: f32 = 800.0 / SIDE as f32;
 
 /// The best cameras, best first, one of each view.
 ///
@@ -34,7 +33,7 @@ pub(super) fn guesses(original: &Original<'_>, picture: &Picture, count: usize) 
     let views: Vec<u64> = (0..VIEWS).collect();
     let best = original.engine.each(&views, |index| {
         let camera = original.sampler.camera(Split::Training, *index, SIDE);
-        let drawn = Drawn::of(original.engine, &original.geometry, &camera, TIMES)?;
+        let drawn = Drawn::of(original.engine, &original.geometry, &camera, stands_for(SIDE))?;
         let laid = SIZES
             .par_iter()
             .map(|size| laid_over(&observed, &camera, &drawn, *size));

@@ -17,7 +17,6 @@
 mod coarse;
 mod drawn;
 mod fit;
-mod linear;
 mod observed;
 mod pose;
 mod reading;
@@ -143,7 +142,7 @@ impl<'a> Original<'a> {
     /// How far in front of a camera the scene is.
     fn depth(&self, camera: &Camera) -> f64 {
         let extent = self.sampler.extent();
-        let ahead = crate::view::vector::dot(camera.rotation[2], extent.centre) + camera.translation[2];
+        let ahead = camera.to_camera(extent.centre)[2];
         f64::from(ahead.max(0.3 * extent.radius))
     }
 }

@@ -90,11 +90,6 @@ mod tests {
         std::array::from_fn(|k| centre[k] + from_centre[k])
     }
 
-    fn pixel(camera: &Camera, point: [f32; 3]) -> [f32; 2] {
-        let [x, y, z] = camera.to_camera(point);
-        [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
-    }
-
     #[test]
     fn each_number_moves_the_picture_by_about_a_pixel() {
         let (camera, depth) = (camera(), 4.5);
@@ -105,7 +100,7 @@ mod tests {
             step[freedom] = 1.0;
             let after = moved(&camera, depth, &step);
             let distances = points.map(|point| {
-                let ([x, y], [u, v]) = (pixel(&camera, point), pixel(&after, point));
+                let ([x, y], [u, v]) = (camera.pixel(point), after.pixel(point));
                 ((x - u).powi(2) + (y - v).powi(2)).sqrt()
             });
             let largest = distances.into_iter().fold(0.0, f32::max);
@@ -134,7 +129,7 @@ mod tests {
         let after = dollied(&camera, 4.5, 1.5);
         for at in [[0.0; 2], [80.0, -30.0]] {
             let point = seen(&camera, at, 4.5);
-            let ([x, y], [u, v]) = (pixel(&camera, point), pixel(&after, point));
+            let ([x, y], [u, v]) = (camera.pixel(point), after.pixel(point));
             assert!((x - u).abs() < 1e-2 && (y - v).abs() < 1e-2, "{x} {y}, {u} {v}");
         }
     }

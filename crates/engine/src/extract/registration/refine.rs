@@ -3,10 +3,10 @@ use rayon::prelude::*;
 
 use super::Original;
 use super::fit::{Fit, State};
-use super::linear::solve;
 use super::observed::Observed;
 use super::pose::{FREEDOMS, moved};
 use crate::error::Result;
+use crate::extract::linear::solve;
 use crate::view::Camera;
 
 /// How far a number is moved to see what that changes, in about pixels.
@@ -139,7 +139,7 @@ impl Equations {
         for p in 0..count {
             damped[p * count + p] += damping * (own(p) + 1e-4 * largest) + 1e-12;
         }
-        let solved = solve(damped, self.towards.clone())?;
+        let solved = solve(damped, self.towards.clone(), 0.0)?;
         let length = solved.iter().map(|[s]| s.abs()).fold(0.0, f64::max);
         let shorter = (LONGEST / length.max(1e-9)).min(1.0);
         let mut step = [0.0; FREEDOMS];

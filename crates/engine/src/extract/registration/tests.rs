@@ -60,12 +60,8 @@ fn before_squares(original: &Original<'_>, camera: &Camera, changed: impl Fn([f3
 
 /// How far apart two cameras show the scene, pixels: the root of the mean square.
 fn apart(gaussians: &Gaussians, a: &Camera, b: &Camera) -> f32 {
-    let place = |camera: &Camera, point: [f32; 3]| {
-        let [x, y, z] = camera.to_camera(point);
-        [camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy]
-    };
     let square = |point: &[f32; 3]| {
-        let ([x, y], [u, v]) = (place(a, *point), place(b, *point));
+        let ([x, y], [u, v]) = (a.pixel(*point), b.pixel(*point));
         (x - u).powi(2) + (y - v).powi(2)
     };
     let positions = &gaussians.positions;

@@ -1,5 +1,5 @@
 //! What was done to the tones of a picture, from two pictures of one view: least squares over its pixels.
-use super::linear::solve;
+use crate::extract::linear::solve;
 
 /// Weight of no change at all, for each pixel: a scene of one colour says little of others.
 const NO_CHANGE: f64 = 1e-3;
@@ -23,7 +23,7 @@ impl<const N: usize> Tone<N> {
         for p in 0..N {
             a[N * p + p] += NO_CHANGE * total.max(1e-6);
         }
-        let solved = solve(a, y).unwrap_or_default();
+        let solved = solve(a, y, 0.0).unwrap_or_default();
         Self(std::array::from_fn(|p| solved.get(p).copied().unwrap_or_default()))
     }
 

@@ -2,6 +2,7 @@
 //!
 //! A polynomial of degree two of the place in each channel, fitted to the ground by least squares, what is none left out
 //! (trimmed, in rounds).
+use crate::extract::linear::solve;
 use crate::picture::Picture;
 
 /// Squares a side whose mean colours are looked at, at most, and the pixels of one, at least: noise averages out.
@@ -118,28 +119,16 @@ fn terms([x, y]: [f64; 2]) -> [f64; TERMS] {
 impl Polynomial {
     /// Through blocks, by least squares; `None` where they do not determine it.
     fn fitted(blocks: &[&Block]) -> Option<Self> {
-        let mut matrix = [[0.0; TERMS + 3]; TERMS];
+        let (mut products, mut sums) = (vec![0.0; TERMS * TERMS], vec![[0.0; 3]; TERMS]);
         for block in blocks {
             let terms = terms(block.at);
-            for (row, a) in matrix.iter_mut().zip(terms) {
-                for (sum, b) in row.iter_mut().zip(terms.iter().chain(&block.colour)) {
-                    *sum += a * b;
-                }
+            for (p, a) in terms.into_iter().enumerate() {
+                (0..TERMS).for_each(|q| products[p * TERMS + q] += a * terms[q]);
+                (0..3).for_each(|c| sums[p][c] += a * block.colour[c]);
             }
         }
-        // Elimination by Gauss and Jordan; the matrix is symmetric and positive, so that no pivot has to be looked for.
-        for i in 0..TERMS {
-            let pivot = matrix[i][i];
-            if pivot.is_nan() || pivot <= 1e-9 * blocks.len() as f64 {
-                return None;
-            }
-            let row = matrix[i].map(|v| v / pivot);
-            for (k, other) in matrix.iter_mut().enumerate() {
-                let factor = if k == i { pivot - 1.0 } else { other[i] };
-                other.iter_mut().zip(row).for_each(|(v, r)| *v -= factor * r);
-            }
-        }
-        Some(Self(std::array::from_fn(|c| matrix.map(|row| row[TERMS + c]))))
+        let solved = solve(products, sums, 1e-9 * blocks.len() as f64)?;
+        Some(Self(std::array::from_fn(|c| std::array::from_fn(|p| solved[p][c]))))
     }
 
     fn at(&self, place: [f64; 2]) -> [f64; 3] {

@@ -1,8 +1,8 @@
 //! Small systems of linear equations.
 
-/// Solves `a x = y` for symmetric positive definite `a` (n by n, rows) and each column of `y` (n by m), by Cholesky's
-/// decomposition; `None` where it is none.
-pub(super) fn solve<const M: usize>(mut a: Vec<f64>, mut y: Vec<[f64; M]>) -> Option<Vec<[f64; M]>> {
+/// Solves `a x = y` for symmetric positive definite `a` (n by n, rows, of which the lower triangle counts) and each column of
+/// `y` (n by m), by Cholesky's decomposition; `None` where a pivot is not above `least`.
+pub(super) fn solve<const M: usize>(mut a: Vec<f64>, mut y: Vec<[f64; M]>, least: f64) -> Option<Vec<[f64; M]>> {
     let n = y.len();
     for j in 0..n {
         for k in 0..j {
@@ -12,7 +12,7 @@ pub(super) fn solve<const M: usize>(mut a: Vec<f64>, mut y: Vec<[f64; M]>) -> Op
             }
         }
         let pivot = a[j * n + j];
-        if !(pivot > 0.0 && pivot.is_finite()) {
+        if !(pivot > least && pivot.is_finite()) {
             return None;
         }
         let root = pivot.sqrt();
@@ -43,7 +43,7 @@ mod tests {
     fn what_is_solved_solves() {
         let a = [4.0, 1.0, -1.0, 1.0, 3.0, 0.5, -1.0, 0.5, 2.0];
         let y = [[1.0, 0.0], [2.0, -1.0], [3.0, 5.0]];
-        let x = solve(a.to_vec(), y.to_vec()).unwrap();
+        let x = solve(a.to_vec(), y.to_vec(), 0.0).unwrap();
         for (row, wanted) in a.chunks_exact(3).zip(y) {
             for (m, wanted) in wanted.into_iter().enumerate() {
                 let got: f64 = row.iter().zip(&x).map(|(a, x)| a * x[m]).sum();
@@ -54,8 +54,8 @@ mod tests {
 
     #[test]
     fn what_has_no_solution_has_none() {
-        assert_eq!(solve(vec![1.0, 2.0, 2.0, 1.0], vec![[1.0]; 2]), None);
-        assert_eq!(solve(vec![f64::NAN], vec![[1.0]]), None);
-        assert_eq!(solve::<1>(Vec::new(), Vec::new()), Some(Vec::new()));
+        assert_eq!(solve(vec![1.0, 2.0, 2.0, 1.0], vec![[1.0]; 2], 0.0), None);
+        assert_eq!(solve(vec![f64::NAN], vec![[1.0]], 0.0), None);
+        assert_eq!(solve::<1>(Vec::new(), Vec::new(), 0.0), Some(Vec::new()));
     }
 }
