@@ -84,7 +84,7 @@ impl Multipart {
 
     /// Gives them up, and returns once nothing is left.
     pub(super) async fn abort(mut self) -> StoreResult<()> {
-        self.under_way.shutdown().await;
+        ended(&mut self.under_way).await;
         match self.upload.take() {
             Some(mut upload) => Ok(upload.abort().await?),
             None => Ok(()),
@@ -101,10 +101,16 @@ impl Drop for Multipart {
         };
         let mut under_way = std::mem::take(&mut self.under_way);
         runtime.spawn(async move {
-            under_way.shutdown().await;
+            ended(&mut under_way).await;
             if let Err(error) = upload.abort().await {
                 tracing::warn!(%error, "parts of an upload are left in the store");
             }
         });
     }
+}
+
+/// Waits for parts whose upload is to be given up. One that is cut off may still be stored after the upload was given up,
+/// and then stays: S3 says so of its own.
+async fn ended(under_way: &mut JoinSet<object_store::Result<()>>) {
+    while under_way.join_next().await.is_some() {}
 }

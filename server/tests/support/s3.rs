@@ -11,7 +11,7 @@ use futures::stream;
 use http_body_util::{BodyExt, StreamBody};
 use hyper::body::{Frame, Incoming};
 use hyper::service::{Service, service_fn};
-use hyper::{Request, Response, StatusCode};
+use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioExecutor, TokioIo};
 use hyper_util::server::conn::auto::Builder;
 use s3s::Body;
@@ -41,6 +41,11 @@ pub struct Faults {
     pub cut: AtomicU64,
     /// Milliseconds that every request takes longer.
     pub latency: AtomicU64,
+    /// Milliseconds that a part takes longer once it has arrived; then nobody needs to wait for it any more.
+    pub stored_late: AtomicU64,
+    /// Parts that have arrived and are not stored yet, and uploads that were given up meanwhile.
+    late: AtomicU64,
+    pub given_up_early: AtomicU64,
     /// Nothing is answered at all.
     pub silent: AtomicBool,
     /// Requests so far, and those of them with a fault.
@@ -199,7 +204,13 @@ async fn answer(
         Fault::None if !request.uri().path().starts_with(&format!("/{BUCKET}")) => {
             Ok(refused(StatusCode::NOT_FOUND, "NoSuchBucket"))
         }
-        Fault::None => Ok(service.call(request).await?),
+        Fault::None if is_part(&request) => store_part(service, faults, request).await,
+        Fault::None => {
+            if request.method() == Method::DELETE && faults.late.load(Ordering::Relaxed) > 0 {
+                faults.given_up_early.fetch_add(1, Ordering::Relaxed);
+            }
+            Ok(service.call(request).await?)
+        }
         Fault::Refused => Ok(refused(StatusCode::SERVICE_UNAVAILABLE, "SlowDown")),
         Fault::Unanswered => {
             service.call(request).await?;
@@ -216,6 +227,30 @@ async fn answer(
             ))
         }
     }
+}
+
+fn is_part(request: &Request<Incoming>) -> bool {
+    let query = request.uri().query().unwrap_or_default();
+    request.method() == Method::PUT && query.contains("partNumber")
+}
+
+/// As S3 does: a part that has arrived is stored even if whoever sent it is gone.
+async fn store_part(
+    service: SharedS3Service,
+    faults: Arc<Faults>,
+    request: Request<Incoming>,
+) -> Result<Response<Body>, Failure> {
+    let (head, body) = request.into_parts();
+    let body = body.collect().await?.to_bytes();
+    let stored = tokio::spawn(async move {
+        faults.late.fetch_add(1, Ordering::Relaxed);
+        tokio::time::sleep(Duration::from_millis(faults.stored_late.load(Ordering::Relaxed))).await;
+        let request = Request::from_parts(head, Body::from(body));
+        let stored = service.as_ref().call(request).await;
+        faults.late.fetch_sub(1, Ordering::Relaxed);
+        stored
+    });
+    Ok(stored.await??)
 }
 
 fn refused(status: StatusCode, code: &str) -> Response<Body> {

@@ -71,6 +71,31 @@ async fn what_is_there_is_whole() {
     }
 }
 
+/// A part that is cut off on its way may be stored after its upload was given up: it is waited for, or it stays for ever.
+#[tokio::test]
+async fn a_part_that_is_stored_late_does_not_stay() {
+    let bench = Bench::s3().await;
+    let Laid::S3(endpoint) = &bench.place else {
+        panic!("not on S3")
+    };
+    endpoint.faults.stored_late.store(500, Relaxed);
+    let data = bytes(7 * CHUNK_BYTES);
+    let begun = async || {
+        let mut writer = bench.store.write(&upload(), Announced::of(&data)).await.unwrap();
+        for chunk in data.chunks(CHUNK_BYTES).take(6) {
+            writer.chunk(chunk.to_vec()).await.unwrap();
+        }
+        // The part has arrived, and is not stored yet.
+        tokio::time::sleep(Duration::from_millis(250)).await;
+        writer
+    };
+    begun().await.abort().await.unwrap();
+    drop(begun().await);
+    tokio::time::sleep(Duration::from_millis(1000)).await;
+    assert!(bench.files().is_empty(), "{:?}", bench.files());
+    assert_eq!(endpoint.faults.given_up_early.load(Relaxed), 0);
+}
+
 #[tokio::test]
 async fn a_store_that_is_away_is_told_in_seconds() {
     let bench = Bench::s3().await;

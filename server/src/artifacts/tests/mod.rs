@@ -71,7 +71,7 @@ impl Bench {
 
     /// Waits for the store to be without files; a dropped writer is cleaned up behind its back.
     async fn becomes_empty(&self) {
-        for _ in 0..200 {
+        for _ in 0..1000 {
             if self.files().is_empty() {
                 return;
             }
