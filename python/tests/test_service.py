@@ -111,6 +111,9 @@ def test_verdicts(client: guardsplat.Client, of_server: Path, scene: Path, folde
         plt.imsave(views / f"{index}.png", picture)
     found = client.verify(views, key="website", message=MESSAGE)
     assert found.verdict == found.VERDICT_MATCH and found.views == 2
+    # Pictures that match as given need no original, and one that is sent along does no harm.
+    beside = client.verify(views, key="website", message=MESSAGE, original=scene)
+    assert beside.verdict == beside.VERDICT_MATCH and not beside.explained_by_original
     none = client.verify(scene, key="website", message=MESSAGE, views=5)
     assert none.verdict == none.VERDICT_NO_MATCH and none.views == 5
 

@@ -54,6 +54,7 @@ mod tests {
         Candidate {
             asset,
             owner: Uuid::now_v7(),
+            sha256: [0; 32],
             payload,
             sealed_nonce: notary::new_nonce(master, asset).unwrap().sealed,
         }

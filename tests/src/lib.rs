@@ -1,4 +1,5 @@
 //! Helpers of the end-to-end tests: the programs, a folder to run them in, and the scenes to run them on.
+pub mod backdrops;
 pub mod environment;
 mod installed;
 pub mod memory;

@@ -2,6 +2,7 @@
 use std::sync::LazyLock;
 
 use guardsplat_tests::TestEnvironment;
+use guardsplat_tests::backdrops::{busy, filtered, over};
 use serde_json::Value;
 
 const VERIFY: &str = "verify views --key k.key --message c0ff --device cpu --json";
@@ -84,20 +85,6 @@ fn short_messages_match_in_changed_pictures_also_where_nobody_says_which() {
     assert_eq!(short["bits"], 16);
 }
 
-/// A picture over a backdrop, of what it is over white and over black.
-fn over(backdrop: impl Fn(f32, f32) -> [f32; 3], white: &image::RgbImage, black: &image::RgbImage) -> image::RgbImage {
-    let mut picture = black.clone();
-    let (width, height) = (picture.width() as f32, picture.height() as f32);
-    for (x, y, pixel) in picture.enumerate_pixels_mut() {
-        let behind = backdrop(x as f32 / width, y as f32 / height);
-        for (c, value) in pixel.0.iter_mut().enumerate() {
-            let shows = white.get_pixel(x, y).0[c].saturating_sub(*value);
-            *value = (f32::from(*value) + f32::from(shows) * behind[c]).round() as u8;
-        }
-    }
-    picture
-}
-
 /// Three views over white and over black, in folders of these names, and an empty folder of views.
 fn over_white_and_black(environment: &TestEnvironment) {
     for ground in ["white", "black"] {
@@ -171,21 +158,9 @@ fn a_mark_is_read_over_the_gradients_that_viewers_have_behind_a_scene() {
 fn one_picture_over_anything_and_with_a_filter_is_compared_with_the_original() {
     let environment = marked();
     over_white_and_black(&environment);
-    let filter = |v: f32, c: usize| [0.05 + 0.9 * v.powf(0.8), 0.02 + 0.9 * v, 0.9 * v.powf(1.2)][c];
-    let photograph = |x: f32, y: f32| {
-        let square = ((9.0 * x) as usize + 3 * (7.0 * y) as usize) % 4;
-        let colour = [[0.8, 0.5, 0.3], [0.1, 0.3, 0.15], [0.5, 0.6, 0.8], [0.15, 0.1, 0.2]][square];
-        std::array::from_fn(|c| colour[c] + 0.05 * x * y + 0.02 * (40.0 * x).sin())
-    };
-    show(&environment, 1, photograph);
+    show(&environment, 1, busy);
     let path = environment.path("views/1.png");
-    let mut picture = image::open(&path).unwrap().to_rgb8();
-    for pixel in picture.pixels_mut() {
-        for (c, value) in pixel.0.iter_mut().enumerate() {
-            *value = (255.0 * filter(f32::from(*value) / 255.0, c)).round() as u8;
-        }
-    }
-    picture.save(&path).unwrap();
+    filtered(image::open(&path).unwrap().to_rgb8()).save(&path).unwrap();
     let blind = environment.json(VERIFY, 2);
     assert_eq!(blind["explained_by_original"], Value::Null, "{blind}");
     let found = environment.json(&format!("{VERIFY} --original in.ply"), 0);
@@ -202,6 +177,11 @@ fn one_picture_over_anything_and_with_a_filter_is_compared_with_the_original() {
     environment.exits("sample other.ply --gaussians 5000 --sh-degree 1 --seed 77", 0);
     let other = environment.json(&format!("{VERIFY} --original other.ply"), 2);
     assert_eq!(other["explained_by_original"], serde_json::json!([null]), "{other}");
+    // The marked scene is none: it has the message whatever is compared with it.
+    environment.refuses(
+        &format!("{VERIFY} --original out.ply"),
+        &["out.ply carries the message"],
+    );
     // One that is not there is told, whether it is needed or not.
     let missing = "verify white --key k.key --message c0ff --device cpu --json --original nothing.ply";
     environment.exits(missing, 1);

@@ -41,6 +41,10 @@ pub struct Arguments {
     /// Where a scene's viewers are, a file as `embed` was given, or artifacts/ID
     #[arg(long, value_name = "FILE")]
     cameras: Option<String>,
+    /// The unmarked scene, or artifacts/ID: pictures are compared with it besides, so that neither what is behind the scene
+    /// nor a filter matters
+    #[arg(long, value_name = "SCENE")]
+    original: Option<String>,
     /// The kind of scene, which says where its viewers are; found from the scene unless given
     #[arg(long, value_enum, conflicts_with = "cameras")]
     kind: Option<SceneKind>,
@@ -100,14 +104,20 @@ pub async fn run(context: &Context, arguments: &Arguments) -> Result<Exit> {
         Some(given) => owner::find(context, given).await?.name,
         None => String::new(),
     };
-    let cameras = arguments.cameras.as_deref().map(inputs::Input::scene);
-    let inputs: Vec<_> = found.into_iter().chain(cameras).collect();
-    let inputs = inputs::send(context, &inputs).await?;
+    let count = found.len();
+    let others = [&arguments.cameras, &arguments.original];
+    let sent = others
+        .iter()
+        .filter_map(|other| other.as_deref())
+        .map(inputs::Input::scene);
+    let inputs = inputs::send(context, &found.into_iter().chain(sent).collect::<Vec<_>>()).await?;
     let mut suspects = inputs.names.clone();
-    let cameras = arguments.cameras.as_ref().and_then(|_| suspects.pop());
+    let mut sent = suspects.split_off(count).into_iter();
+    let [cameras, original] = others.map(|other| other.as_ref().and_then(|_| sent.next()).unwrap_or_default());
     let spec = Spec::Verify(VerifySpec {
         suspects,
-        cameras: cameras.unwrap_or_default(),
+        cameras,
+        original,
         key: key.name.clone(),
         message: message.unwrap_or_default(),
         asset: asset.unwrap_or_default(),

@@ -28,6 +28,8 @@ pub struct VerifyReport {
     framings: Option<u32>,
     assets: Option<u64>,
     framing: Option<String>,
+    /// Of each picture how much of it the original explains, where one was given; null where it does not show its scene.
+    explained_by_original: Vec<Option<f64>>,
     asset: Option<String>,
     owner: Option<String>,
     payload_number: Option<i64>,
@@ -79,6 +81,11 @@ impl From<&VerifyResult> for VerifyReport {
             asset_registered_later: result.asset_registered_later,
             redacted: result.redacted,
             framing: some(&result.framing),
+            explained_by_original: result
+                .explained_by_original
+                .iter()
+                .map(|&explained| Some(explained).filter(|&explained| explained > 0.0))
+                .collect(),
             asset: some(&result.asset),
             owner: some(&result.owner),
             payload_number: result.payload_number,

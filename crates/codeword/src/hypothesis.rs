@@ -42,6 +42,34 @@ pub enum PhotometricCorrection {
     /// Whatever was done to its tones, and whichever part of it shows the scene, was estimated from the picture and the
     /// key alone. The message that is claimed has no say in it, so however many were looked at, one is paid for.
     Estimated,
+    /// It is compared with the unmarked original, registered with it: what it shows otherwise is read, and whatever lies behind
+    /// the scene is not. The message that is claimed has no say in it, either.
+    Registered(RegisteredTones),
+}
+
+/// How the tones of a picture are taken that is compared with the original. Both ways are read, and whoever takes the better
+/// one pays for both: a fit undoes any filter, and a part of the mark with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegisteredTones {
+    /// As they are: nobody changed them.
+    AsGiven,
+    /// Changed from those of the original by a filter, which is fitted.
+    Fitted,
+}
+
+impl RegisteredTones {
+    /// All ways.
+    pub const ALL: [Self; 2] = [Self::AsGiven, Self::Fitted];
+}
+
+/// In words.
+impl fmt::Display for RegisteredTones {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AsGiven => "compared with the original, tones as given",
+            Self::Fitted => "compared with the original, tones fitted to it",
+        })
+    }
 }
 
 /// What a channel is taken to have been multiplied by where no background tells, for a factor of
@@ -82,6 +110,14 @@ impl Hypothesis {
             ..Self::default()
         }
     }
+
+    /// Each picture is compared with the original.
+    pub fn registered(tones: RegisteredTones) -> Self {
+        Self {
+            correction: PhotometricCorrection::Registered(tones),
+            ..Self::default()
+        }
+    }
 }
 
 /// In words, "as given" where nothing is undone.
@@ -94,6 +130,7 @@ impl fmt::Display for Hypothesis {
             PhotometricCorrection::WhiteBalance(beyond) => undone.push(white_balance(beyond)),
             PhotometricCorrection::Tone(tone) => undone.push(format!("{tone} undone")),
             PhotometricCorrection::Estimated => undone.push("tones and part estimated from each picture".into()),
+            PhotometricCorrection::Registered(tones) => undone.push(tones.to_string()),
         }
         if self.quarter_turns > 0 {
             undone.push(format!("turned by {} degrees", 90 * u32::from(self.quarter_turns)));
@@ -172,6 +209,10 @@ mod tests {
         assert_eq!(
             Hypothesis::estimated().to_string(),
             "tones and part estimated from each picture"
+        );
+        assert_eq!(
+            Hypothesis::registered(RegisteredTones::Fitted).to_string(),
+            "compared with the original, tones fitted to it"
         );
         let led = Hypothesis {
             leader: Some(2),

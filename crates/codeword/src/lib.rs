@@ -31,7 +31,9 @@ pub use claim::{Answer, Claim, Comparison, Confidences, HypothesisReading, ReadP
 pub use code::{Code, Decoded, Layout, PAPER_LENGTHS, Payload, Scheme};
 pub use decision::Decision;
 pub use error::{Error, Result};
-pub use hypothesis::{Hypothesis, PhotometricCorrection, Tone, WINDOW_STEPS, Window, tint_without_ground};
+pub use hypothesis::{
+    Hypothesis, PhotometricCorrection, RegisteredTones, Tone, WINDOW_STEPS, Window, tint_without_ground,
+};
 pub use limits::{MAX_BITS, VERSION};
 pub use message::{Message, MessageLength};
 pub use message_code::MessageCode;

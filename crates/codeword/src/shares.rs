@@ -1,9 +1,9 @@
 //! How the rate of false positives is shared among the readings of one suspect.
 //!
 //! Most suspects are as they were given, and what was done to others can mostly be estimated; guesses come last, and many
-//! at once. So half of the rate is for files as given, half of the rest for the estimate, half of what is left then for
-//! guesses about one picture that the others follow, and all that is left for guesses about all pictures, alike within a
-//! kind. A reading with one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend
+//! at once. So half of the rate is for files as given, half of the rest for what differs from the original where that is at
+//! hand, half of what is left then for the estimate, half of the rest for guesses about one picture that the others follow,
+//! and all that is left for guesses about all pictures, alike within a kind. A reading with one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend
 //! on what was read and not on any message, and together are no more than the rate (a weighted union bound, Holm 1979).
 use crate::hypothesis::{Hypothesis, PhotometricCorrection};
 
@@ -11,17 +11,32 @@ use crate::hypothesis::{Hypothesis, PhotometricCorrection};
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     AsGiven,
+    Registered,
     Estimated,
     Led,
     Guessed,
+}
+
+impl Kind {
+    /// From what is likely beforehand to what is a guess.
+    const ALL: [Self; 5] = [
+        Self::AsGiven,
+        Self::Registered,
+        Self::Estimated,
+        Self::Led,
+        Self::Guessed,
+    ];
 }
 
 fn kind(hypothesis: &Hypothesis) -> Kind {
     match *hypothesis {
         given if given == Hypothesis::default() => Kind::AsGiven,
         led if led.leader.is_some() => Kind::Led,
-        estimated if estimated.correction == PhotometricCorrection::Estimated => Kind::Estimated,
-        _ => Kind::Guessed,
+        other => match other.correction {
+            PhotometricCorrection::Registered(_) => Kind::Registered,
+            PhotometricCorrection::Estimated => Kind::Estimated,
+            _ => Kind::Guessed,
+        },
     }
 }
 
@@ -29,7 +44,7 @@ fn kind(hypothesis: &Hypothesis) -> Kind {
 pub fn shares(hypotheses: &[Hypothesis]) -> Vec<u64> {
     let kinds: Vec<Kind> = hypotheses.iter().map(kind).collect();
     let count = |wanted| kinds.iter().filter(|kind| **kind == wanted).count() as u64;
-    let there = [Kind::AsGiven, Kind::Estimated, Kind::Led, Kind::Guessed].map(|kind| (kind, count(kind)));
+    let there = Kind::ALL.map(|kind| (kind, count(kind)));
     let there: Vec<_> = there.into_iter().filter(|(_, count)| *count > 0).collect();
     let of = |wanted: Kind| {
         let place = there.iter().position(|(kind, _)| *kind == wanted).unwrap_or(0);
@@ -43,7 +58,7 @@ pub fn shares(hypotheses: &[Hypothesis]) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hypothesis::Tone;
+    use crate::hypothesis::{RegisteredTones, Tone};
 
     fn guess(i: usize) -> Hypothesis {
         Hypothesis {
@@ -100,5 +115,10 @@ mod tests {
             [2, 4, 16, 16, 8]
         );
         assert_eq!(shares(&[guess(1), guess(2), guess(3)]), [3, 3, 3]);
+        let [as_they_are, fitted] = RegisteredTones::ALL.map(Hypothesis::registered);
+        assert_eq!(
+            shares(&[given, Hypothesis::estimated(), guess(1), as_they_are, fitted]),
+            [2, 8, 8, 8, 8]
+        );
     }
 }

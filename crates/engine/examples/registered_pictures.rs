@@ -6,10 +6,10 @@
 use std::path::Path;
 use std::time::Instant;
 
-use guardsplat_codeword::{Message, Reading};
+use guardsplat_codeword::{Message, Reading, RegisteredTones};
 use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::extract::{Engine, Original, RegisteredTones, read_given};
+use guardsplat_engine::extract::{Engine, Original, read_given};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{Gaussians, Scene};

@@ -10,14 +10,17 @@ use serde::{Deserialize, Serialize};
 pub const SCHEMA: &str = "guardsplat.evidence";
 /// The version of the fields below, which new reports have. Those of version 1 are read as well; they name neither the
 /// worker nor what was tried before; those of version 2 share the rate alike among readings; those of version 3 count bits
-/// alike, however clearly they were read. Any other is refused, never guessed at.
-pub const VERSION: u32 = 4;
+/// alike, however clearly they were read; those of version 4 have no suspect compared with the original. Any other is
+/// refused, never guessed at.
+pub const VERSION: u32 = 5;
 /// The oldest version that is read.
 pub(crate) const FIRST_VERSION: u32 = 1;
 /// The last version in which all readings had the same part of the rate.
 pub(crate) const ALIKE_VERSION: u32 = 2;
 /// The last version in which matches were counted, without ranks.
 pub(crate) const COUNTED_VERSION: u32 = 3;
+/// The last version in which no suspect was compared with the original.
+pub(crate) const BLIND_VERSION: u32 = 4;
 
 /// Everything that a report says. The order of fields is the order of the JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -126,7 +129,7 @@ pub struct Input {
 pub enum Role {
     /// What was asked about.
     Suspect,
-    /// The scene before it was marked.
+    /// The scene before it was marked: what was marked, or what a suspect was compared with.
     Original,
     /// The scene after it was marked.
     Marked,

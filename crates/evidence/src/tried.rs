@@ -66,6 +66,8 @@ pub enum HypothesisKind {
     Estimated,
     /// What was done to one of several pictures, the others as they agree with it. Not before version 4.
     Led,
+    /// Anything: it was compared with the unmarked original. Not before version 5.
+    Registered,
 }
 
 impl Tried {

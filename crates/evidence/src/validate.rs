@@ -3,7 +3,9 @@
 //! Whether numbers agree with each other is another matter, which a check tells: a report that is wrong can be read.
 use crate::embedding::Embedding;
 use crate::error::{Error, Result};
-use crate::evidence::{ALIKE_VERSION, COUNTED_VERSION, Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION};
+use crate::evidence::{
+    ALIKE_VERSION, BLIND_VERSION, COUNTED_VERSION, Evidence, EvidenceKind, FIRST_VERSION, SCHEMA, VERSION,
+};
 use crate::history::History;
 use crate::limits::{BITS, FRAMINGS, INPUTS, NAME_BYTES, NOTE_BYTES, NOTES, PICTURE_SIDE, PICTURES_BYTES, VIEWS};
 use crate::tried::{HypothesisKind, Tried};
@@ -117,6 +119,9 @@ impl Evidence {
                 _ if group.kind == HypothesisKind::Estimated && !shared => "an estimate is told since version 3",
                 _ if group.kind == HypothesisKind::Led && self.version <= COUNTED_VERSION => {
                     "that one picture leads is told since version 4"
+                }
+                _ if group.kind == HypothesisKind::Registered && self.version <= BLIND_VERSION => {
+                    "pictures are compared with the original since version 5"
                 }
                 _ => continue,
             };

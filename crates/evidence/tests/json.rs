@@ -336,6 +336,24 @@ fn ranks_and_leading_pictures_are_of_version_4() {
     assert_eq!(refused(3, &led), "verification.tried.framings");
 }
 
+/// Signed by version 4.
+#[test]
+fn originals_are_of_version_5() {
+    let document = include_bytes!("reports_of_before/match-version-4.json");
+    let checked = check(document, &samples::key().verifying_key());
+    assert!(
+        matches!(checked.answer, Answer::Genuine) && checked.holds(),
+        "{:#?}",
+        checked.findings
+    );
+    let mut evidence = checked.evidence.unwrap();
+    assert_eq!(evidence.version, 4);
+    evidence.verification.as_mut().unwrap().tried.framings[1].kind = HypothesisKind::Registered;
+    assert!(matches!(evidence.to_json(), Err(Error::BadField { field, .. }) if field == "verification.tried.framings"));
+    evidence.version = 5;
+    evidence.to_json().unwrap();
+}
+
 #[test]
 fn more_than_the_rate_is_not_given() {
     let mut evidence = samples::matching();

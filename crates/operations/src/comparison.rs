@@ -2,9 +2,9 @@
 use std::path::Path;
 
 use guardsplat_codeword::{Hypothesis, Message, Verdict, shares};
-use guardsplat_engine::Result;
-use guardsplat_engine::extract::{Comparison, Engine, PooledLogits, RegisteredTones, find_source};
+use guardsplat_engine::extract::{Comparison, Engine, PooledLogits, find_source};
 use guardsplat_engine::scene::Ignored;
+use guardsplat_engine::{Error, Result};
 
 use crate::registered::{RegisteredReadings, read_registered};
 use crate::suspect::Suspect;
@@ -18,7 +18,7 @@ pub struct Compared {
     /// How it compares, if there is a message, or a coded one is read.
     pub comparison: Option<Comparison>,
     /// That way.
-    pub way: Way,
+    pub way: Hypothesis,
     /// Ways in which the pictures were read.
     pub ways: usize,
     /// What is estimated to have been done to each picture, in words, if it was estimated.
@@ -28,15 +28,6 @@ pub struct Compared {
     pub explained: Vec<Option<f64>>,
     /// Rows of scenes that were ignored.
     pub ignored: Vec<Ignored>,
-}
-
-/// A way in which pictures are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Way {
-    /// With this undone.
-    Undone(Hypothesis),
-    /// As they differ from the original, their tones taken so.
-    Registered(RegisteredTones),
 }
 
 /// Compares readings with the message, if there is one.
@@ -70,7 +61,7 @@ impl Compared {
     }
 
     /// Keeps a reading that agrees better than all before.
-    fn offer(&mut self, claimed: &Claimed<'_>, way: Way, reading: PooledLogits, tries: u64) -> Result<()> {
+    fn offer(&mut self, claimed: &Claimed<'_>, way: Hypothesis, reading: PooledLogits, tries: u64) -> Result<()> {
         if let Some(comparison) = claimed.compare(&reading, tries)?
             && comparison.decision.p_value < self.p_value()
         {
@@ -78,6 +69,26 @@ impl Compared {
         }
         Ok(())
     }
+}
+
+/// Refuses a scene that carries the message itself: whatever is compared with it could match by that.
+fn refuse_marked(claimed: &Claimed<'_>, original: &Path, views: &Views) -> Result<()> {
+    let scene = Suspect {
+        scenes: vec![original.to_owned()],
+        pictures: Vec::new(),
+    };
+    let (reading, _) = read(claimed.engine, &scene, views, &mut Thumbnails::default(), |_, _| {})?;
+    let found = claimed.compare(&reading, 1)?;
+    if found.is_some_and(|found| found.decision.verdict == Verdict::Match) {
+        return Err(Error::BadOption {
+            field: "original",
+            reason: format!(
+                "{} carries the message: give the scene before it was marked",
+                original.display()
+            ),
+        });
+    }
+    Ok(())
 }
 
 /// Reads `suspect` and compares it with `message`. Pictures that do not match as they are given are read under every other
@@ -89,7 +100,7 @@ impl Compared {
 /// the rest of the rate, and hypotheses have what is left if that does not match, either.
 ///
 /// # Errors
-/// Those of reading scenes and pictures, and a message of another length.
+/// Those of reading scenes and pictures, a message of another length, and an original that carries the message.
 pub fn read_and_compare(
     engine: &Engine,
     suspect: &Suspect,
@@ -111,7 +122,7 @@ pub fn read_and_compare(
     let mut best = Compared {
         comparison: claimed.compare(&reading, given)?,
         reading,
-        way: Way::Undone(Hypothesis::default()),
+        way: Hypothesis::default(),
         ways: 1,
         estimates: Vec::new(),
         explained: Vec::new(),
@@ -122,21 +133,20 @@ pub fn read_and_compare(
     if given == 1 || best.is_match() || best.comparison.as_ref().is_none_or(all_right) {
         return Ok(best);
     }
-    let mut parts = 1;
+    let mut tried = Vec::new();
     if let Some(original) = original {
+        refuse_marked(&claimed, original, views)?;
         let scene_views = best.reading.views.len() - suspect.pictures.len();
         let of_scenes = best.reading.views[..scene_views].to_vec();
         let RegisteredReadings { readings, explained } =
             read_registered(engine, suspect, views, original, &of_scenes, &mut progress)?;
         best.explained = explained;
         best.ways += readings.len();
-        if !readings.is_empty() {
-            parts = 2;
-        }
-        // Half of what pictures as given leave.
+        // Half of what pictures as given leave: there are guesses, too.
         let tries = 4 * readings.len() as u64;
-        for (tones, reading) in readings {
-            best.offer(&claimed, Way::Registered(tones), reading, tries)?;
+        for (way, reading) in readings {
+            tried.push(way);
+            best.offer(&claimed, way, reading, tries)?;
         }
         if best.is_match() {
             return Ok(best);
@@ -148,9 +158,11 @@ pub fn read_and_compare(
     // As given they were read before.
     best.ways += readings.len() - 1;
     best.estimates = estimates;
-    let tries = shares(&readings.iter().map(|(hypothesis, _)| *hypothesis).collect::<Vec<_>>());
+    let compared = tried.len();
+    tried.extend(readings.iter().map(|(hypothesis, _)| *hypothesis));
+    let tries = shares(&tried).split_off(compared);
     for ((hypothesis, reading), tries) in readings.into_iter().zip(tries).skip(1) {
-        best.offer(&claimed, Way::Undone(hypothesis), reading, parts * tries)?;
+        best.offer(&claimed, hypothesis, reading, tries)?;
     }
     Ok(best)
 }

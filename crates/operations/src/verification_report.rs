@@ -5,7 +5,7 @@ use guardsplat_engine::extract::{Comparison, PooledLogits};
 use guardsplat_engine::scene::Ignored;
 use serde::Serialize;
 
-use super::comparison::{Compared, Way};
+use super::comparison::Compared;
 
 /// Why a reading that has nothing to be compared with decides nothing.
 const NOTHING_TO_COMPARE: &str = "any scene reads as some message; one to compare with decides";
@@ -64,10 +64,7 @@ impl VerificationReport {
         let found = Self::new(code, &compared.reading, compared.comparison.as_ref(), &compared.ignored)?;
         Ok(Self {
             hypotheses: compared.ways,
-            hypothesis: match compared.way {
-                Way::Undone(hypothesis) => (hypothesis != Hypothesis::default()).then(|| hypothesis.to_string()),
-                Way::Registered(tones) => Some(tones.to_string()),
-            },
+            hypothesis: (compared.way != Hypothesis::default()).then(|| compared.way.to_string()),
             explained_by_original: compared.explained.clone(),
             estimates: compared.estimates.clone(),
             ..found

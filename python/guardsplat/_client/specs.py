@@ -85,6 +85,8 @@ class Verify(Submission, total=False):
     """Decides them."""
     cameras: FileOrArtifact
     """Where a scene's viewers are."""
+    original: FileOrArtifact
+    """The unmarked scene: pictures are compared with it besides."""
     kind: str
     """The kind of a scene."""
     ignore_bad_rows: bool
@@ -102,6 +104,9 @@ class VerifyAndWait(Verify, Waiting, total=False):
 class KeyAndWait(Submission, Waiting, total=False):
     """To make a key, and wait for it."""
 
+
+OTHER_FILES = ("cameras", "original")
+"""Files that options name; the fields of the specs are called the same."""
 
 WAITING: frozenset[str] = Waiting.__optional_keys__
 
@@ -151,13 +156,13 @@ def _size(options: dict[str, Any]) -> int:
     return 0 if size is None else within("size", size, 16, 4096)
 
 
-def embed_spec(scene: str, key: str, cameras: str, options: dict[str, Any]) -> jobs.EmbedSpec:
-    """The spec of an ``embed`` job."""
+def embed_spec(scene: str, key: str, files: dict[str, str], options: dict[str, Any]) -> jobs.EmbedSpec:
+    """The spec of an ``embed`` job; `files` are those of :data:`OTHER_FILES` that were sent."""
     message = options.get("message")
     return jobs.EmbedSpec(
         scene=scene,
         key=key,
-        cameras=cameras,
+        **files,
         message="" if message is None else message_of(message),
         asset=options.get("asset") or "",
         preset=_of("preset", jobs.EmbedSpec.Preset, "PRESET_", options.get("preset", "standard")),
@@ -171,13 +176,13 @@ def embed_spec(scene: str, key: str, cameras: str, options: dict[str, Any]) -> j
     )
 
 
-def verify_spec(suspects: list[str], key: str, cameras: str, options: dict[str, Any]) -> jobs.VerifySpec:
-    """The spec of a ``verify`` job."""
+def verify_spec(suspects: list[str], key: str, files: dict[str, str], options: dict[str, Any]) -> jobs.VerifySpec:
+    """The spec of a ``verify`` job; `files` are those of :data:`OTHER_FILES` that were sent."""
     message = options.get("message")
     return jobs.VerifySpec(
         suspects=suspects,
         key=key,
-        cameras=cameras,
+        **files,
         message="" if message is None else message_of(message),
         asset=options.get("asset") or "",
         owner=options.get("owner") or "",

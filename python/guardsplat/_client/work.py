@@ -16,7 +16,18 @@ from ..v1 import key_service_pb2 as keys
 from ..v1 import registry_service_pb2 as registry
 from .calls import Calls
 from .inputs import inputs_of, is_name
-from .specs import WAITING, FileOrArtifact, Submission, Verify, embed_spec, key_spec, known, state_of, verify_spec
+from .specs import (
+    OTHER_FILES,
+    WAITING,
+    FileOrArtifact,
+    Submission,
+    Verify,
+    embed_spec,
+    key_spec,
+    known,
+    state_of,
+    verify_spec,
+)
 from .specs import Embed as EmbedOptions
 from .wire import Call, Close, Open, Read, Steps
 
@@ -36,24 +47,24 @@ class Work(Calls):
     def submit_embed(self, scene: FileOrArtifact, options: dict[str, Any]) -> Steps[jobs.Job]:
         known(options, EmbedOptions)
         # What is wrong with options is told before anything is sent.
-        embed_spec("", "", "", options)
+        embed_spec("", "", {}, options)
         key = yield from self.key(options["key"])
 
-        def spec(names: list[str], cameras: str) -> jobs.Job:
-            return jobs.Job(embed=embed_spec(names[0], key, cameras, options))
+        def spec(names: list[str], files: dict[str, str]) -> jobs.Job:
+            return jobs.Job(embed=embed_spec(names[0], key, files, options))
 
         return (yield from self._send_and_create([scene], options, spec))
 
     def submit_verify(self, suspects: Any, options: dict[str, Any]) -> Steps[jobs.Job]:
         known(options, Verify)
-        verify_spec([], "", "", options)
+        verify_spec([], "", {}, options)
         inputs = inputs_of(suspects)
         key = yield from self.key(options["key"])
         if options.get("owner"):
             options = {**options, "owner": (yield from self.owner(options["owner"]))}
 
-        def spec(names: list[str], cameras: str) -> jobs.Job:
-            return jobs.Job(verify=verify_spec(list(dict.fromkeys(names)), key, cameras, options))
+        def spec(names: list[str], files: dict[str, str]) -> jobs.Job:
+            return jobs.Job(verify=verify_spec(list(dict.fromkeys(names)), key, files, options))
 
         return (yield from self._send_and_create(inputs, options, spec))
 
@@ -65,12 +76,16 @@ class Work(Calls):
             names = []
             for one in inputs:
                 names.append((yield from self._sent(one, sent)))
-            cameras = options.get("cameras")
-            camera_file = "" if cameras is None else (yield from self._sent(cameras, sent))
+            files = {}
+            for field in OTHER_FILES:
+                if (file := options.get(field)) is not None:
+                    files[field] = yield from self._sent(file, sent)
             title = Path(os.fspath(inputs[0])).name
-            job = yield from self._create(spec(names, camera_file), title, options)
+            job = yield from self._create(spec(names, files), title, options)
             # Of a request that was made before: what was sent then.
-            needed = {job.embed.scene, job.embed.cameras, *job.verify.suspects, job.verify.cameras}
+            read = job.embed if job.HasField("embed") else job.verify
+            needed = {job.embed.scene, *job.verify.suspects}
+            needed |= {getattr(read, field, "") for field in OTHER_FILES}
             return job
         finally:
             for name in sent:

@@ -166,7 +166,7 @@ class EmbedSpec(_message.Message):
     def __init__(self, scene: _Optional[str] = ..., key: _Optional[str] = ..., message: _Optional[str] = ..., preset: _Optional[_Union[EmbedSpec.Preset, str]] = ..., seed: _Optional[int] = ..., size: _Optional[int] = ..., force: bool = ..., ignore_bad_rows: bool = ..., asset: _Optional[str] = ..., robust_to: _Optional[_Iterable[_Union[EmbedSpec.Distortion, str]]] = ..., cameras: _Optional[str] = ..., scene_kind: _Optional[_Union[EmbedSpec.SceneKind, str]] = ..., credentials: bool = ...) -> None: ...
 
 class VerifySpec(_message.Message):
-    __slots__ = ("suspects", "key", "message", "views", "size", "seed", "ignore_bad_rows", "asset", "owner", "search", "cameras", "scene_kind")
+    __slots__ = ("suspects", "key", "message", "views", "size", "seed", "ignore_bad_rows", "asset", "owner", "search", "cameras", "scene_kind", "original")
     SUSPECTS_FIELD_NUMBER: _ClassVar[int]
     KEY_FIELD_NUMBER: _ClassVar[int]
     MESSAGE_FIELD_NUMBER: _ClassVar[int]
@@ -179,6 +179,7 @@ class VerifySpec(_message.Message):
     SEARCH_FIELD_NUMBER: _ClassVar[int]
     CAMERAS_FIELD_NUMBER: _ClassVar[int]
     SCENE_KIND_FIELD_NUMBER: _ClassVar[int]
+    ORIGINAL_FIELD_NUMBER: _ClassVar[int]
     suspects: _containers.RepeatedScalarFieldContainer[str]
     key: str
     message: str
@@ -191,7 +192,8 @@ class VerifySpec(_message.Message):
     search: bool
     cameras: str
     scene_kind: EmbedSpec.SceneKind
-    def __init__(self, suspects: _Optional[_Iterable[str]] = ..., key: _Optional[str] = ..., message: _Optional[str] = ..., views: _Optional[int] = ..., size: _Optional[int] = ..., seed: _Optional[int] = ..., ignore_bad_rows: bool = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., search: bool = ..., cameras: _Optional[str] = ..., scene_kind: _Optional[_Union[EmbedSpec.SceneKind, str]] = ...) -> None: ...
+    original: str
+    def __init__(self, suspects: _Optional[_Iterable[str]] = ..., key: _Optional[str] = ..., message: _Optional[str] = ..., views: _Optional[int] = ..., size: _Optional[int] = ..., seed: _Optional[int] = ..., ignore_bad_rows: bool = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., search: bool = ..., cameras: _Optional[str] = ..., scene_kind: _Optional[_Union[EmbedSpec.SceneKind, str]] = ..., original: _Optional[str] = ...) -> None: ...
 
 class KeySpec(_message.Message):
     __slots__ = ("bits", "seed", "seeded")
@@ -294,7 +296,7 @@ class Credentials(_message.Message):
     def __init__(self, artifact: _Optional[str] = ..., manifest: _Optional[str] = ..., soft_binding: _Optional[str] = ..., test_certificate: bool = ..., job: _Optional[str] = ...) -> None: ...
 
 class VerifyResult(_message.Message):
-    __slots__ = ("verdict", "p_value", "threshold", "matched_bits", "needed_bits", "bits", "views", "message", "bit_accuracy", "bit_accuracy_worst_view", "mean_abs_logit", "view_agreement", "reason", "duration", "device", "clip", "ignored_rows", "hypotheses", "framings", "assets", "framing", "asset", "owner", "payload_number", "corrected_bits", "evidence_html", "evidence_json", "assets_paid", "readings_paid", "first_seen_time", "asset_commit_time", "asset_registered_later", "redacted", "credentials", "rank_sum", "needed_rank_sum")
+    __slots__ = ("verdict", "p_value", "threshold", "matched_bits", "needed_bits", "bits", "views", "message", "bit_accuracy", "bit_accuracy_worst_view", "mean_abs_logit", "view_agreement", "reason", "duration", "device", "clip", "ignored_rows", "hypotheses", "framings", "assets", "framing", "asset", "owner", "payload_number", "corrected_bits", "evidence_html", "evidence_json", "assets_paid", "readings_paid", "first_seen_time", "asset_commit_time", "asset_registered_later", "redacted", "credentials", "rank_sum", "needed_rank_sum", "explained_by_original")
     class Verdict(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         VERDICT_UNSPECIFIED: _ClassVar[VerifyResult.Verdict]
@@ -343,6 +345,7 @@ class VerifyResult(_message.Message):
     CREDENTIALS_FIELD_NUMBER: _ClassVar[int]
     RANK_SUM_FIELD_NUMBER: _ClassVar[int]
     NEEDED_RANK_SUM_FIELD_NUMBER: _ClassVar[int]
+    EXPLAINED_BY_ORIGINAL_FIELD_NUMBER: _ClassVar[int]
     verdict: VerifyResult.Verdict
     p_value: float
     threshold: float
@@ -379,7 +382,8 @@ class VerifyResult(_message.Message):
     credentials: _containers.RepeatedCompositeFieldContainer[Credentials]
     rank_sum: int
     needed_rank_sum: int
-    def __init__(self, verdict: _Optional[_Union[VerifyResult.Verdict, str]] = ..., p_value: _Optional[float] = ..., threshold: _Optional[float] = ..., matched_bits: _Optional[int] = ..., needed_bits: _Optional[int] = ..., bits: _Optional[int] = ..., views: _Optional[int] = ..., message: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., mean_abs_logit: _Optional[float] = ..., view_agreement: _Optional[float] = ..., reason: _Optional[str] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., ignored_rows: _Optional[int] = ..., hypotheses: _Optional[int] = ..., framings: _Optional[int] = ..., assets: _Optional[int] = ..., framing: _Optional[str] = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., payload_number: _Optional[int] = ..., corrected_bits: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., assets_paid: _Optional[int] = ..., readings_paid: _Optional[int] = ..., first_seen_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_commit_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_registered_later: bool = ..., redacted: bool = ..., credentials: _Optional[_Iterable[_Union[Credentials, _Mapping]]] = ..., rank_sum: _Optional[int] = ..., needed_rank_sum: _Optional[int] = ...) -> None: ...
+    explained_by_original: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, verdict: _Optional[_Union[VerifyResult.Verdict, str]] = ..., p_value: _Optional[float] = ..., threshold: _Optional[float] = ..., matched_bits: _Optional[int] = ..., needed_bits: _Optional[int] = ..., bits: _Optional[int] = ..., views: _Optional[int] = ..., message: _Optional[str] = ..., bit_accuracy: _Optional[float] = ..., bit_accuracy_worst_view: _Optional[float] = ..., mean_abs_logit: _Optional[float] = ..., view_agreement: _Optional[float] = ..., reason: _Optional[str] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., device: _Optional[str] = ..., clip: _Optional[str] = ..., ignored_rows: _Optional[int] = ..., hypotheses: _Optional[int] = ..., framings: _Optional[int] = ..., assets: _Optional[int] = ..., framing: _Optional[str] = ..., asset: _Optional[str] = ..., owner: _Optional[str] = ..., payload_number: _Optional[int] = ..., corrected_bits: _Optional[int] = ..., evidence_html: _Optional[str] = ..., evidence_json: _Optional[str] = ..., assets_paid: _Optional[int] = ..., readings_paid: _Optional[int] = ..., first_seen_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_commit_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., asset_registered_later: bool = ..., redacted: bool = ..., credentials: _Optional[_Iterable[_Union[Credentials, _Mapping]]] = ..., rank_sum: _Optional[int] = ..., needed_rank_sum: _Optional[int] = ..., explained_by_original: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class KeyResult(_message.Message):
     __slots__ = ("key", "bit_accuracy_unseen", "bit_accuracy_unseen_noisy", "duration", "device")

@@ -141,6 +141,8 @@ pub struct Candidate {
     pub asset: AssetId,
     /// Whose it is.
     pub owner: OwnerId,
+    /// SHA-256 of its original.
+    pub sha256: [u8; 32],
     /// Its number among the assets of its key.
     pub payload: i64,
     /// Its nonce and blinding, sealed.

@@ -11,20 +11,20 @@ use crate::ledger::{ArtifactId, ArtifactRow};
 /// the same bytes. Encoded the same way every time: fields in order, without unknown ones.
 pub fn asked(job: &Job) -> [u8; 32] {
     let mut job = job.clone();
-    let cameras = match &mut job.spec {
+    let others = match &mut job.spec {
         Some(Spec::Embed(spec)) => {
             spec.scene.clear();
-            &mut spec.cameras
+            vec![&mut spec.cameras]
         }
         Some(Spec::Verify(spec)) => {
             spec.suspects.clear();
-            &mut spec.cameras
+            vec![&mut spec.cameras, &mut spec.original]
         }
-        Some(Spec::CreateKey(_)) | None => &mut String::new(),
+        Some(Spec::CreateKey(_)) | None => Vec::new(),
     };
-    // That the last of its artifacts are cameras, and no suspect.
-    if !cameras.is_empty() {
-        *cameras = "given".into();
+    // What the last of its artifacts are, which are no suspects.
+    for name in others.into_iter().filter(|name| !name.is_empty()) {
+        *name = "given".into();
     }
     Sha256::digest(job.encode_to_vec()).into()
 }

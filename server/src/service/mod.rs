@@ -31,6 +31,7 @@ pub(crate) mod message;
 pub(crate) mod names;
 pub(crate) mod opaque_token;
 pub(crate) mod operations;
+pub(crate) mod other_files;
 pub(crate) mod ownership;
 pub(crate) mod page;
 pub mod placement;

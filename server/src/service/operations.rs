@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, AttemptRow, FailureReason, JobRow, JobSpec, JobState};
 use crate::service::clock::timestamp;
 use crate::service::names::ResourceKind;
-use crate::service::{Service, clock, keys, lease, to_proto};
+use crate::service::{Service, clock, keys, lease, other_files, to_proto};
 
 impl Service {
     /// Queues a job that failed once more, if it could be carried out.
@@ -41,15 +41,15 @@ impl Service {
 
 /// What a job reads.
 fn inputs(job: &JobRow) -> Result<Vec<ArtifactId>> {
-    let (names, cameras) = match &job.spec {
-        JobSpec::Embed(spec) => (std::slice::from_ref(&spec.scene), spec.cameras.as_str()),
-        JobSpec::Verify(spec) => (&spec.suspects[..], spec.cameras.as_str()),
-        JobSpec::CreateKey(_) => (&[][..], ""),
+    let (names, others) = match &job.spec {
+        JobSpec::Embed(spec) => (std::slice::from_ref(&spec.scene), other_files::of_embed(spec)),
+        JobSpec::Verify(spec) => (&spec.suspects[..], other_files::of_verify(spec)),
+        JobSpec::CreateKey(_) => (&[][..], Vec::new()),
     };
     names
         .iter()
         .map(String::as_str)
-        .chain(Some(cameras).filter(|name| !name.is_empty()))
+        .chain(others.iter().map(|other| other.name))
         .map(|name| ResourceKind::Artifact.parse("name", name))
         .collect()
 }

@@ -11,6 +11,10 @@ use crate::service::violations::Violations;
 const SIDE: u64 = 336;
 /// Views of a scene that is verified, where a request names no number.
 const VIEWS: u64 = 20;
+/// Pixels of views that are drawn of an original to find from where a picture was taken, and most pictures that this is
+/// done for (`crates/engine/src/extract/registration/mod.rs`, `crates/operations/src/registered.rs`).
+const REGISTRATION: u64 = 250_000_000;
+const REGISTERED: u64 = 16;
 /// What a pixel is counted in.
 const GIGA: u64 = 1_000_000_000;
 
@@ -54,15 +58,22 @@ fn of_embed(spec: &EmbedSpec) -> u64 {
     views * square(spec.size)
 }
 
-/// Pixels that a verification draws if all suspects are scenes, which only their content tells.
+/// Pixels that a verification draws if all suspects are scenes, and if those that may be pictures are compared with an
+/// original besides: which of both they are only their content tells.
 fn of_verify(spec: &VerifySpec) -> u64 {
     let views = match spec.views {
         0 => VIEWS,
         views => views.into(),
     };
+    let suspects = spec.suspects.len() as u64;
+    let registered = match spec.original.is_empty() {
+        true => 0,
+        false => suspects.min(REGISTERED),
+    };
     views
-        .saturating_mul(spec.suspects.len() as u64)
+        .saturating_mul(suspects)
         .saturating_mul(square(spec.size))
+        .saturating_add(registered * REGISTRATION)
 }
 
 fn square(side: u32) -> u64 {

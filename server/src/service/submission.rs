@@ -12,6 +12,7 @@ use crate::ledger::queue::PRIORITIES;
 use crate::ledger::{ArtifactId, JobSpec, KeyId, KeyOrder, Seed};
 use crate::service::claims::{self, Claim};
 use crate::service::names::ResourceKind;
+use crate::service::other_files::{self, OtherFile};
 use crate::service::violations::Violations;
 use crate::service::{fingerprint, text};
 
@@ -27,7 +28,7 @@ pub struct Submission {
     pub display_name: String,
     /// What it does.
     pub spec: JobSpec,
-    /// Artifacts it reads: the scene or the suspects, and then its cameras, where there are any.
+    /// Artifacts it reads: the scene or the suspects, and then its [`other_files`], where there are any.
     pub inputs: Vec<ArtifactId>,
     /// The key it needs, and the field that named it.
     pub key: Option<KeyId>,
@@ -131,9 +132,9 @@ fn embed(spec: &EmbedSpec, problems: &mut Violations) -> Result<Option<Wanted>> 
     side("job.embed.size", spec.size, problems);
     let message = (!spec.message.is_empty()).then(|| ("job.embed.message", spec.message.clone()));
     scene_kind("job.embed.scene_kind", spec.scene_kind, &spec.cameras, problems);
-    let cameras = cameras("job.embed.cameras", &spec.cameras, problems)?;
+    let others = others(other_files::of_embed(spec), problems)?;
     Ok(scene.map(|scene| Wanted {
-        inputs: std::iter::once(scene).chain(cameras).collect(),
+        inputs: std::iter::once(scene).chain(others).collect(),
         key,
         message,
         claim,
@@ -185,7 +186,7 @@ fn verify(spec: &VerifySpec, problems: &mut Violations) -> Result<Option<Wanted>
     );
     side("job.verify.size", spec.size, problems);
     scene_kind("job.verify.scene_kind", spec.scene_kind, &spec.cameras, problems);
-    inputs.extend(cameras("job.verify.cameras", &spec.cameras, problems)?);
+    inputs.extend(others(other_files::of_verify(spec), problems)?);
     let claim = problems.take(claims::of_verify(spec))?.flatten();
     let message = (!spec.message.is_empty()).then(|| ("job.verify.message", spec.message.clone()));
     Ok(Some(Wanted {
@@ -207,12 +208,13 @@ fn scene_kind(field: &str, number: i32, cameras: &str, problems: &mut Violations
     );
 }
 
-/// A file of cameras, where one is named.
-fn cameras(field: &str, name: &str, problems: &mut Violations) -> Result<Option<ArtifactId>> {
-    match name {
-        "" => Ok(None),
-        name => problems.take(ResourceKind::Artifact.parse(field, name)),
+/// Cameras and the like, where they are named.
+fn others(files: Vec<OtherFile<'_>>, problems: &mut Violations) -> Result<Vec<ArtifactId>> {
+    let mut found = Vec::with_capacity(files.len());
+    for OtherFile { field, name, .. } in files {
+        found.extend(problems.take(ResourceKind::Artifact.parse(field, name))?);
     }
+    Ok(found)
 }
 
 fn create_key(spec: &KeySpec, problems: &mut Violations) {

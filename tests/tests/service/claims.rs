@@ -2,6 +2,7 @@
 //! the evidence is checked without a server. With the shipped CLIP, since the mark has to be read.
 use std::time::Duration;
 
+use guardsplat_tests::backdrops::{busy, over};
 use guardsplat_tests::{Service, TestEnvironment};
 use serde_json::Value;
 
@@ -184,4 +185,33 @@ fn a_real_scene_is_marked_as_a_user_would_and_found_on_a_page() {
     let right = ["part estimated", " % of its sides from "];
     assert!(right.iter().any(|words| framing.contains(words)), "{found}");
     service.json("verify in.ply --key site --search", 2);
+    over_a_photograph_the_original_tells(&service, &asset);
+}
+
+/// One picture over a photograph is claimed with the original at hand.
+fn over_a_photograph_the_original_tells(service: &Service, asset: &str) {
+    let environment = &service.environment;
+    let [white, black] = ["white", "black"].map(|ground| {
+        environment.exits(
+            &format!("render out.ply {ground} --views 1 --size 480 --background {ground} --device cpu"),
+            0,
+        );
+        let path = environment.path(ground).join("view_000.png");
+        image::open(path).unwrap().into_rgb8()
+    });
+    over(busy, &white, &black).save(environment.path("shown.png")).unwrap();
+    let found = service.json("verify shown.png --key site --search --original in.ply", 0);
+    assert_eq!(found["asset"], asset, "{found}");
+    assert!(found["explained_by_original"][0].as_f64() > Some(0.9), "{found}");
+    // The report names the original, and says how it was tried.
+    service.json(&format!("report open {} -o report", found["job"].as_str().unwrap()), 0);
+    let page = std::fs::read_to_string(environment.path("report/evidence.html")).unwrap();
+    assert!(
+        page.contains("Compared with the original") && page.contains("original, "),
+        "{found}"
+    );
+    // One that is no scene is told by its name.
+    let line = "verify shown.png --key site --message 0123456789abcdef --original shown.png";
+    let error = &service.json(line, 1)["error"];
+    assert!(error["message"].as_str().unwrap().contains("shown.png"), "{error}");
 }

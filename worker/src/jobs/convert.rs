@@ -1,7 +1,7 @@
 //! Between the API's messages and the engine's types.
 use std::time::Duration;
 
-use guardsplat_codeword::{Hypothesis, PhotometricCorrection, Tone, Verdict};
+use guardsplat_codeword::{Hypothesis, PhotometricCorrection, RegisteredTones, Tone, Verdict};
 use guardsplat_distortion::{DistortionKind, RobustTo};
 use guardsplat_engine::Error as EngineError;
 use guardsplat_engine::embed::{self, Outcome, Preset, Settings};
@@ -192,6 +192,11 @@ pub fn verify_result(found: VerificationReport) -> api::VerifyResult {
         ignored_rows: found.ignored_rows as u64,
         framings: found.hypotheses as u32,
         framing: found.hypothesis.unwrap_or_default(),
+        explained_by_original: found
+            .explained_by_original
+            .iter()
+            .map(|explained| explained.unwrap_or(0.0))
+            .collect(),
         ..api::VerifyResult::default()
     }
 }
@@ -225,6 +230,8 @@ fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
         }
         PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
         PhotometricCorrection::Estimated => (Kind::Estimated, 1.0),
+        PhotometricCorrection::Registered(RegisteredTones::AsGiven) => (Kind::Original, 1.0),
+        PhotometricCorrection::Registered(RegisteredTones::Fitted) => (Kind::OriginalFitted, 1.0),
         PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
         PhotometricCorrection::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
         PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),

@@ -12,9 +12,9 @@ use super::convert;
 use super::error::{Error, Result};
 use guardsplat_operations::comparison::read_and_compare;
 use guardsplat_operations::load;
+use guardsplat_operations::registered::{AllReadings, read_all};
 use guardsplat_operations::suspect::Suspect;
 use guardsplat_operations::thumbnails::Thumbnails;
-use guardsplat_operations::verification::read_hypotheses;
 use guardsplat_operations::verification_report::VerificationReport;
 
 /// A reading that was compared, or is for the server to decide on.
@@ -36,12 +36,18 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
             "suspects: {count} are outside 1 to {MAX_PICTURES}"
         )));
     }
-    let cameras_file = Some(spec.cameras.as_str()).filter(|name| !name.is_empty());
-    let suspects = spec.suspects.iter().map(String::as_str);
-    let names: Vec<&str> = suspects.chain(cameras_file).collect();
+    let others = [&spec.cameras, &spec.original];
+    let others_given = others.iter().filter(|name| !name.is_empty());
+    let names: Vec<&str> = spec
+        .suspects
+        .iter()
+        .chain(others_given.copied())
+        .map(String::as_str)
+        .collect();
     let inputs = attempt.download(&names).await?;
     let mut paths: Vec<_> = inputs.into_iter().map(|input| input.path).collect();
-    let cameras_file = cameras_file.and_then(|_| paths.pop());
+    let mut others_found = paths.split_off(spec.suspects.len()).into_iter();
+    let [cameras_file, original] = others.map(|name| (!name.is_empty()).then(|| others_found.next()).flatten());
     let key_file = attempt.download_key().await?;
     let (name, message) = (spec.key.clone(), spec.message.clone());
     let claim = !spec.asset.is_empty() || !spec.owner.is_empty() || spec.search;
@@ -60,19 +66,28 @@ pub async fn carry_out(attempt: &mut Attempt<'_>, spec: &VerifySpec) -> Result<O
         let progress = |done, total| reporter.tell(convert::stage(Stage::Reading, done, total));
         let mut shown = Thumbnails::default();
         let (findings, framed) = if claim {
-            let read = read_hypotheses(engine, &suspect, &views, &mut shown, progress)?;
+            let AllReadings {
+                of_hypotheses: read,
+                explained,
+            } = read_all(engine, &suspect, &views, original.as_deref(), &mut shown, progress)?;
             for (picture, estimate) in read.estimates.iter().enumerate() {
                 tracing::info!(picture, estimate, "estimated what was done to a picture");
             }
             // As given comes first.
             let reading = read.readings.first().map(|(_, reading)| reading);
             let reading = reading.ok_or_else(|| Error::BadJob("suspects: nothing was read".into()))?;
-            (
-                VerificationReport::new(&engine.message_code, reading, None, &read.ignored)?,
-                read.readings,
-            )
+            let mut findings = VerificationReport::new(&engine.message_code, reading, None, &read.ignored)?;
+            findings.explained_by_original = explained;
+            (findings, read.readings)
         } else {
-            let compared = read_and_compare(engine, &suspect, &views, None, message.as_ref(), progress)?;
+            let compared = read_and_compare(
+                engine,
+                &suspect,
+                &views,
+                original.as_deref(),
+                message.as_ref(),
+                progress,
+            )?;
             (VerificationReport::of(&engine.message_code, &compared)?, Vec::new())
         };
         Ok(Verified {

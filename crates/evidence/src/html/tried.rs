@@ -14,7 +14,7 @@ pub(super) fn section(decision: &Decision, verification: &Verification) -> Marku
         true => "All readings pay alike. ",
         false => {
             "What is likely beforehand pays less than what is a guess: files as given have half of the allowed rate of \
-             errors, what could be estimated half of the rest, and all guesses share what is left. "
+             errors, and each kind in the table half of what those before it leave; all guesses share what is left. "
         }
     };
     html! {
@@ -59,6 +59,7 @@ fn row(framing: &HypothesisGroup, readings: u64) -> Markup {
         HypothesisKind::Tone => "Changed tones undone",
         HypothesisKind::Estimated => "Tones and part estimated",
         HypothesisKind::Led => "One picture leads",
+        HypothesisKind::Registered => "Compared with the original",
     };
     html! {
         tr {

@@ -176,6 +176,13 @@ async fn every_reading_of_a_file_is_paid_for() {
     };
     let (result, _) = claimed_of(&bench, b"a scene", spec, read()).await;
     assert_eq!(paid(&result), (5, Some(15)));
+    // And where it is compared with the original, sent once or twice.
+    for name in ["original.ply", "again.ply"] {
+        let original = bench.server.upload(name, b"first").await.name;
+        let spec = VerifySpec { original, ..first() };
+        let (result, _) = claimed_of(&bench, b"a scene", spec, read()).await;
+        assert_eq!(paid(&result), (6, Some(18)));
+    }
     // A reading of several files pays for those of each.
     let mut suspects = Vec::new();
     for bytes in [&b"a scene"[..], b"another"] {
@@ -183,7 +190,7 @@ async fn every_reading_of_a_file_is_paid_for() {
     }
     let spec = VerifySpec { suspects, ..first() };
     let (result, _) = bench.claimed(spec, vec![framed(0, read())]).await;
-    assert_eq!(paid(&result), (7, Some(21)));
+    assert_eq!(paid(&result), (8, Some(24)));
 }
 
 /// A claim pays for all assets of the key, so whoever marks is held to as much.

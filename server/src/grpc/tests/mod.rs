@@ -23,6 +23,7 @@ mod limits;
 mod lists;
 mod nearness;
 mod operations;
+mod originals;
 mod parts;
 mod projects;
 mod queue;

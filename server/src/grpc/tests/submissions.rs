@@ -57,6 +57,7 @@ async fn every_wrong_field_is_named() {
         (embed(|s| s.preset = 17), "job.embed.preset"),
         (embed(|s| s.cameras = "cameras.json".into()), "job.embed.cameras"),
         (verify(|s| s.cameras = s.key.clone()), "job.verify.cameras"),
+        (verify(|s| s.original = "scene.ply".into()), "job.verify.original"),
         (embed(|s| s.scene_kind = 9), "job.embed.scene_kind"),
         (verify(|s| s.scene_kind = -1), "job.verify.scene_kind"),
         (
@@ -285,18 +286,27 @@ async fn a_request_with_the_same_bytes_is_the_same_request() {
         let again = submit(verify(wrong.map(String::as_str)), &pictures).await;
         refused(again, Code::AlreadyExists, "REQUEST_ID_REUSED");
     }
-    // Cameras are no suspect.
-    let seen = Spec::Verify(VerifySpec {
+    // Cameras are no suspect, and neither is the original.
+    let alone = VerifySpec {
         suspects: vec![first.clone()],
         key: key.clone(),
-        cameras: other.clone(),
         ..Default::default()
-    });
-    refused(
-        submit(of(seen), &pictures).await,
-        Code::AlreadyExists,
-        "REQUEST_ID_REUSED",
-    );
+    };
+    let seen = VerifySpec {
+        cameras: other.clone(),
+        ..alone.clone()
+    };
+    let compared = VerifySpec {
+        original: other.clone(),
+        ..alone
+    };
+    for spec in [seen, compared] {
+        refused(
+            submit(of(Spec::Verify(spec)), &pictures).await,
+            Code::AlreadyExists,
+            "REQUEST_ID_REUSED",
+        );
+    }
     // What is gone is known by its name, and nothing else is taken for it.
     server
         .jobs

@@ -52,7 +52,7 @@ pub(super) const OWNERS: &str = "SELECT * FROM owners WHERE project = $4 AND (cr
     ORDER BY create_time DESC, id DESC LIMIT $3";
 
 /// A page of what a search among a key's assets requirements.
-pub(super) const CANDIDATES: &str = "SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE key_id = $1 AND payload > $2 ORDER BY payload LIMIT $3";
+pub(super) const CANDIDATES: &str = "SELECT id, owner_id, sha256, payload, sealed_nonce FROM assets WHERE key_id = $1 AND payload > $2 ORDER BY payload LIMIT $3";
 
 /// The highest payload number of a key.
 pub(super) const LAST_PAYLOAD: &str = "SELECT payload FROM assets WHERE key_id = $1 ORDER BY payload DESC LIMIT 1";
@@ -265,7 +265,7 @@ pub(super) async fn candidates(db: &mut DbConnection, key: KeyId, after: i64, li
 }
 
 pub(super) async fn candidate(db: &mut DbConnection, asset: AssetId) -> Result<Option<Candidate>> {
-    let query = sqlx::query("SELECT id, owner_id, payload, sealed_nonce FROM assets WHERE id = $1");
+    let query = sqlx::query("SELECT id, owner_id, sha256, payload, sealed_nonce FROM assets WHERE id = $1");
     let found = query.bind(asset).fetch_optional(db).await?;
     found.as_ref().map(candidate_of).transpose()
 }
@@ -294,6 +294,7 @@ fn candidate_of(row: &DbRow) -> Result<Candidate> {
     Ok(Candidate {
         asset: row.try_get("id")?,
         owner: row.try_get("owner_id")?,
+        sha256: rows::bytes(row, "sha256")?,
         payload: row.try_get("payload")?,
         sealed_nonce: row.try_get("sealed_nonce")?,
     })

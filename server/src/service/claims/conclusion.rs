@@ -107,7 +107,8 @@ impl Service {
             return Err(Error::invalid("readings", reason));
         }
         let before = self.read_before(job, key).await?;
-        let decided = self.decide(claim, key, &readings, Some(before)).await?;
+        let original = self.original_of(job).await?;
+        let decided = self.decide(claim, key, &readings, Some(before), original).await?;
         *result = answered(std::mem::take(result), &decided, readings.len());
         let facts = Facts {
             job,
@@ -138,7 +139,7 @@ impl Service {
         result.message.clear();
         let decided = match readings.is_empty() {
             true => None,
-            false => Some(self.decide(claim, key, &readings, None).await?),
+            false => Some(self.decide(claim, key, &readings, None, None).await?),
         };
         let read = decided.as_ref().map(|decided| Read {
             decided,

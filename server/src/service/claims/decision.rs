@@ -36,16 +36,20 @@ fn of_equal_shares(read: &[HypothesisReading], readings: &[Reading]) -> Vec<Vec<
 impl Service {
     /// Decides a claim on `read`, whose logits are of the key's length. Of a suspect it is said what there was `before`; a
     /// scene that was just marked has nothing.
+    ///
+    /// Where pictures were compared with an `original`, of this SHA-256, only assets that were registered from it can be
+    /// claimed: it was fixed before their words were drawn. Any other file could have the word in it.
     pub(crate) async fn decide(
         &self,
         claim: &Claim,
         key: &KeyRow,
         read: &[HypothesisReading],
         before: Option<ReadBefore>,
+        original: Option<[u8; 32]>,
     ) -> Result<Decided> {
         let readings_paid = before.map_or(1, |before| before.readings.max(1));
         let mut words = match key.bits == marks::bits() {
-            true => self.words(claim, key).await?,
+            true => self.words(claim, key, original).await?,
             false => {
                 return Ok(unmarkable(
                     key,
@@ -85,8 +89,10 @@ impl Service {
         };
         let mut tested = claim.test().map_err(failed)?;
         if tested.answer.verdict == Verdict::UnknownKey {
-            let reason = "no asset is registered that the claim could be about, for this key".to_owned();
-            tested.answer.reason = Some(reason);
+            let of_original = original.map_or("", |_| " and from this original");
+            tested.answer.reason = Some(format!(
+                "no asset is registered that the claim could be about, for this key{of_original}"
+            ));
         }
         let found = tested.answer.best.as_ref();
         let read = found.and_then(|found| read.iter().find(|read| read.name == found.hypothesis));
@@ -108,7 +114,7 @@ impl Service {
         Ok(decided)
     }
 
-    async fn words(&self, claim: &Claim, key: &KeyRow) -> Result<Words> {
+    async fn words(&self, claim: &Claim, key: &KeyRow, original: Option<[u8; 32]>) -> Result<Words> {
         let mut words = Words {
             index: Index::new(MessageLength::CODED),
             assets: Vec::new(),
@@ -116,6 +122,9 @@ impl Service {
         };
         let mut owners = HashSet::new();
         let mut add = |asset: &Candidate| -> Result<()> {
+            if original.is_some_and(|original| original != asset.sha256) {
+                return Ok(());
+            }
             let mark = marks::mark(self.master(), key.id, asset)?;
             let failed = |error| Error::internal("searching marks", error);
             words.index.push(&mark.word).map_err(failed)?;

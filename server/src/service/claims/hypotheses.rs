@@ -2,7 +2,7 @@
 use std::collections::HashSet;
 
 use guardsplat_codeword::{
-    Hypothesis, HypothesisReading, PhotometricCorrection, Tone, WINDOW_STEPS as TWELFTHS, Window,
+    Hypothesis, HypothesisReading, PhotometricCorrection, RegisteredTones, Tone, WINDOW_STEPS as TWELFTHS, Window,
 };
 use guardsplat_evidence as evidence;
 use guardsplat_proto::v1::undone::Kind;
@@ -98,6 +98,8 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
             Some((Kind::Ground, _)) => PhotometricCorrection::WhiteBackground,
             Some((Kind::WhiteBalance, _)) => PhotometricCorrection::WhiteBalance(channels),
             Some((Kind::Estimated, _)) => PhotometricCorrection::Estimated,
+            Some((Kind::Original, _)) => PhotometricCorrection::Registered(RegisteredTones::AsGiven),
+            Some((Kind::OriginalFitted, _)) => PhotometricCorrection::Registered(RegisteredTones::Fitted),
             Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),
             Some((Kind::Gamma, exponent)) => PhotometricCorrection::Tone(Tone::Gamma(exponent)),
             Some((Kind::Contrast, factor)) => PhotometricCorrection::Tone(Tone::Contrast(factor)),
@@ -119,11 +121,14 @@ fn channels(undone: &Undone) -> [f32; 3] {
 
 /// Hypotheses by kinds, for the report, with what each pays: as much as was done counts under what changes most.
 pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evidence::HypothesisGroup> {
-    use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Led, Mirrored, QuarterTurn, Tone};
+    use evidence::HypothesisKind::{AsGiven, Crop, Estimated, Led, Mirrored, QuarterTurn, Registered, Tone};
     let kind = |reading: &FramedReading| match (reading.trimmed, reading.mirrored, reading.quarter_turns) {
         _ if reading.leading_picture > 0 => Led,
-        _ if reading.undone.is_some_and(|undone| undone.kind() == Kind::Estimated) => Estimated,
-        _ if reading.undone.is_some() => Tone,
+        _ if let Some(undone) = &reading.undone => match undone.kind() {
+            Kind::Estimated => Estimated,
+            Kind::Original | Kind::OriginalFitted => Registered,
+            _ => Tone,
+        },
         _ if reading.part.is_some() => Crop,
         (true, ..) => Crop,
         (_, true, _) => Mirrored,
@@ -131,7 +136,7 @@ pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evid
         _ => QuarterTurn,
     };
     let mut groups: Vec<evidence::HypothesisGroup> = Vec::new();
-    for wanted in [AsGiven, Estimated, Led, Tone, QuarterTurn, Mirrored, Crop] {
+    for wanted in [AsGiven, Registered, Estimated, Led, Tone, QuarterTurn, Mirrored, Crop] {
         for (_, read) in told.iter().zip(readings).filter(|(told, _)| kind(told) == wanted) {
             let tries = Some(read.tries);
             match groups
@@ -265,6 +270,33 @@ mod tests {
             .map(|framing| framing.variants)
             .collect();
         assert_eq!(counts, [1, 1]);
+    }
+
+    #[test]
+    fn what_differs_from_the_original_has_half_of_what_is_left() {
+        let undone = |kind: Kind| FramedReading {
+            undone: Some(Undone {
+                kind: kind.into(),
+                factor: 1.0,
+                ..Undone::default()
+            }),
+            ..reading(0, false, false)
+        };
+        let kinds_told = [Kind::Estimated, Kind::Original, Kind::OriginalFitted];
+        let readings: Vec<_> = std::iter::once(reading(0, false, false))
+            .chain(kinds_told.map(undone))
+            .chain([brightened(0.81)])
+            .collect();
+        let read = checked(&readings, 64).unwrap();
+        assert_eq!(read[2].name, "compared with the original, tones as given");
+        assert_eq!(read[3].name, "compared with the original, tones fitted to it");
+        let groups = kinds(&readings, &read);
+        use evidence::HypothesisKind::{AsGiven, Estimated, Registered, Tone};
+        let told: Vec<_> = groups.iter().map(|g| (g.kind, g.variants, g.tries.unwrap())).collect();
+        assert_eq!(
+            told,
+            [(AsGiven, 1, 2), (Registered, 2, 8), (Estimated, 1, 8), (Tone, 1, 8)]
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ mod readings;
 use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 
 use crate::error::{Error, Result};
-use crate::ledger::{AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
+use crate::ledger::{ArtifactId, AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
 use crate::marks;
 use crate::service::names::ResourceKind;
 use crate::service::submission::Submission;
@@ -107,33 +107,43 @@ impl Service {
             );
             return Err(Error::invalid(field, reason));
         }
-        if submission.spec.kind() != JobKind::Embed {
-            return Ok(());
+        if let JobSpec::Verify(spec) = &submission.spec {
+            let original = submission.inputs.last().filter(|_| !spec.original.is_empty());
+            return self
+                .check_original(project, "job.verify.original", original, &asset.sha256)
+                .await;
         }
         if key.bits != marks::bits() {
             let reason = format!("has {} bits, assets are marked with {}", key.bits, marks::bits());
             return Err(Error::invalid(key_field, reason));
         }
-        // One that is gone is told of by the ledger, which also knows whether the same was asked for before.
-        let Some(scene) = self.scene(project, submission).await? else {
-            return Ok(());
-        };
-        if upload::digest(&scene) != Some(asset.sha256) {
-            let reason = format!(
-                "has the SHA-256 {scene}, and the original that was registered has {}",
-                hex::encode(asset.sha256)
-            );
-            return Err(Error::invalid("job.embed.scene", reason));
-        }
-        Ok(())
+        self.check_original(project, "job.embed.scene", submission.inputs.first(), &asset.sha256)
+            .await
     }
 
-    /// SHA-256 of the first input, if it is there.
-    async fn scene(&self, project: &str, submission: &Submission) -> Result<Option<String>> {
-        let Some(&id) = submission.inputs.first() else {
-            return Ok(None);
+    /// Refuses an original that is not the one that was registered.
+    async fn check_original(
+        &self,
+        project: &str,
+        field: &str,
+        original: Option<&ArtifactId>,
+        registered: &[u8; 32],
+    ) -> Result<()> {
+        let Some(&id) = original else {
+            return Ok(());
         };
-        Ok(self.find_artifact(project, id).await?.map(|row| row.sha256))
+        // One that is gone is told of by the ledger, which also knows whether the same was asked for before.
+        let Some(original) = self.find_artifact(project, id).await?.map(|row| row.sha256) else {
+            return Ok(());
+        };
+        if upload::digest(&original).as_ref() != Some(registered) {
+            let reason = format!(
+                "has the SHA-256 {original}, and the original that was registered has {}",
+                hex::encode(registered)
+            );
+            return Err(Error::invalid(field, reason));
+        }
+        Ok(())
     }
 
     /// The word that an asset of a key is marked with, in hexadecimal, for the worker that marks it.

@@ -1,11 +1,12 @@
 //! Which reading of a suspect a job makes, and what there was before it: whoever has one suspect read again and again, with
-//! other views, cameras or keys, pays for each.
+//! other views, cameras, originals or keys, pays for each.
+use guardsplat_evidence::Role;
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactRow, JobRow, JobSpec, KeyRow, NewReading, ReadBefore};
 use crate::service::names::ResourceKind;
-use crate::service::{Service, clock};
+use crate::service::{Service, clock, other_files, upload};
 
 /// Views that a scene is read from where nothing is said.
 const VIEWS: u32 = 20;
@@ -34,12 +35,15 @@ impl Service {
         hash.update([spec.ignore_bad_rows.into()]);
         // Each has 64 digits, so no two lists give the same bytes.
         files.iter().for_each(|(sha256, _)| hash.update(sha256.as_bytes()));
-        if !spec.cameras.is_empty() {
-            let cameras = self.file("job.verify.cameras", &spec.cameras).await?;
-            hash.update(b"cameras\0");
-            hash.update(cameras.sha256.as_bytes());
+        // Left out where there is none, so that readings from before these were there stay the same.
+        for other in other_files::of_verify(spec) {
+            let file = self.file(other.field, other.name).await?;
+            hash.update(match other.role {
+                Role::Cameras => &b"cameras\0"[..],
+                _ => b"original\0",
+            });
+            hash.update(file.sha256.as_bytes());
         }
-        // Left out where there is none, so that readings from before kinds were there stay the same.
         if spec.scene_kind != 0 {
             hash.update(b"kind\0");
             hash.update(spec.scene_kind.to_be_bytes());
@@ -54,6 +58,18 @@ impl Service {
         self.ledger().note_reading(new, clock::now()).await?;
         let before = self.ledger().before(id).await?;
         before.ok_or_else(|| failed("the ledger has none of its files"))
+    }
+
+    /// SHA-256 of the original that a verification compares pictures with.
+    pub(super) async fn original_of(&self, job: &JobRow) -> Result<Option<[u8; 32]>> {
+        let name = match &job.spec {
+            JobSpec::Verify(spec) if !spec.original.is_empty() => &spec.original,
+            _ => return Ok(None),
+        };
+        let sha256 = self.file("job.verify.original", name).await?.sha256;
+        let digest = upload::digest(&sha256);
+        let digest = digest.ok_or_else(|| Error::internal("finding an original", "it has no SHA-256"))?;
+        Ok(Some(digest))
     }
 
     async fn file(&self, field: &str, name: &str) -> Result<ArtifactRow> {

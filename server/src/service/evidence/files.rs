@@ -9,6 +9,7 @@ use crate::artifacts::{Announced, ArtifactPath, CHUNK_BYTES};
 use crate::error::{Error, Result};
 use crate::ledger::{ArtifactId, JobId, JobRow, JobSpec, NewArtifact, Origin};
 use crate::service::names::ResourceKind;
+use crate::service::other_files::{self, OtherFile};
 use crate::service::{Service, clock};
 
 /// Files with what they are for.
@@ -27,7 +28,7 @@ impl Files {
         for name in &spec.suspects {
             inputs.push(input(api, "job.verify.suspects", name, Role::Suspect).await?);
         }
-        inputs.extend(cameras(api, "job.verify.cameras", &spec.cameras).await?);
+        inputs.extend(others(api, other_files::of_verify(spec)).await?);
         Ok(Self { inputs })
     }
 
@@ -38,19 +39,19 @@ impl Files {
         };
         let original = input(api, "job.embed.scene", &spec.scene, Role::Original).await?;
         let marked = input(api, "embed_result.scene", &result.scene, Role::Marked).await?;
-        let cameras = cameras(api, "job.embed.cameras", &spec.cameras).await?;
+        let others = others(api, other_files::of_embed(spec)).await?;
         Ok(Self {
-            inputs: [original, marked].into_iter().chain(cameras).collect(),
+            inputs: [original, marked].into_iter().chain(others).collect(),
         })
     }
 }
 
-/// Where a job was told that viewers are.
-async fn cameras(api: &Service, field: &str, name: &str) -> Result<Option<Input>> {
-    match name {
-        "" => Ok(None),
-        name => input(api, field, name, Role::Cameras).await.map(Some),
+async fn others(api: &Service, files: Vec<OtherFile<'_>>) -> Result<Vec<Input>> {
+    let mut inputs = Vec::with_capacity(files.len());
+    for OtherFile { field, name, role } in files {
+        inputs.push(input(api, field, name, role).await?);
     }
+    Ok(inputs)
 }
 
 async fn input(api: &Service, field: &str, name: &str, role: Role) -> Result<Input> {

@@ -35,7 +35,6 @@ use coarse::guesses;
 use fit::Fit;
 use observed::Observed;
 use pose::dollied;
-pub use reading::RegisteredTones;
 use refine::{Freedoms, refined};
 
 /// Share of a picture's variance, where the original is seen, that a registration explains at least. Wrong ones explained up

@@ -1,5 +1,5 @@
 //! A registered picture is read as it differs from the original.
-use std::fmt;
+use guardsplat_codeword::RegisteredTones;
 
 use super::drawn::Drawn;
 use super::tone::{Tone, quadratic};
@@ -15,31 +15,6 @@ const COVERED: f32 = 0.85;
 const BEHIND: f32 = 0.05;
 /// Differences beyond this are no mark: something was drawn over the scene.
 const LARGEST: f32 = 0.15;
-
-/// How the tones of a registered picture are taken. Both ways are read, and whoever takes the better one pays for both: a
-/// fit undoes any filter, and a part of the mark with it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RegisteredTones {
-    /// As they are: nobody changed them.
-    AsGiven,
-    /// Changed from those of the original by a filter, which is fitted.
-    Fitted,
-}
-
-impl RegisteredTones {
-    /// All ways.
-    pub const ALL: [Self; 2] = [Self::AsGiven, Self::Fitted];
-}
-
-/// In words.
-impl fmt::Display for RegisteredTones {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::AsGiven => "compared with the original, tones as given",
-            Self::Fitted => "compared with the original, tones fitted to it",
-        })
-    }
-}
 
 impl Original<'_> {
     /// Logits of a registered picture, its tones taken so: of the original on white, and what the picture shows otherwise

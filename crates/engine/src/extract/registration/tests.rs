@@ -1,5 +1,6 @@
 //! A sample before a photograph, seen by cameras that nobody tells.
 use burn::tensor::Tensor;
+use guardsplat_codeword::RegisteredTones;
 
 use super::*;
 use crate::device::{DeviceChoice, open};

@@ -75,6 +75,13 @@ fn foreign(path: &str, own: &Project, other: &Project) -> Foreign {
                 ),
                 (
                     verify(VerifySpec {
+                        original: other.artifact.clone(),
+                        ..VerifySpec::default()
+                    }),
+                    &other.artifact,
+                ),
+                (
+                    verify(VerifySpec {
                         asset: other.asset.clone(),
                         ..VerifySpec::default()
                     }),
