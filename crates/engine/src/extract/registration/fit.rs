@@ -11,6 +11,8 @@ const ROUNDS: usize = 2;
 /// Share of pixels that are taken to fit; twice what they leave, or this much, is where less weight begins (Huber).
 const FITTING: f32 = 0.7;
 const LEAST_LIMIT: f32 = 0.03;
+/// Weight of no filter at all, for each pixel: a scene of one colour says little of others.
+const NO_CHANGE: f64 = 1e-3;
 /// Coverage from which on a pixel says something where nobody knows what is behind the scene.
 const COVERED: f32 = 0.5;
 
@@ -127,6 +129,7 @@ fn fitted(observed: &Observed, drawn: &Drawn, weights: &[f32]) -> Tone<4> {
                 let change = std::array::from_fn(|k| f64::from(seen[k] - drawn_there[k]));
                 (f64::from(*weight), terms(drawn, i), change)
             }),
+        NO_CHANGE,
     )
 }
 

@@ -15,6 +15,8 @@ const COVERED: f32 = 0.85;
 const BEHIND: f32 = 0.05;
 /// Differences beyond this are no mark: something was drawn over the scene.
 const LARGEST: f32 = 0.15;
+/// Weight of no filter at all, for each pixel.
+const NO_FILTER: f64 = 1e-4;
 
 impl Original<'_> {
     /// Logits of a registered picture, its tones taken so: of the original on white, and what the picture shows otherwise
@@ -29,29 +31,30 @@ impl Original<'_> {
         let seen = without_behind(seen.pixels.as_chunks::<3>().0, &drawn.coverage);
         let shown = |i: usize| drawn.coverage[i] >= COVERED;
         let colour = |i: usize| drawn.colours[i].map(|v| v / drawn.coverage[i]);
-        let terms = |i: usize| quadratic(colour(i).map(f64::from));
-        let tone = match tones {
-            RegisteredTones::AsGiven => None,
-            RegisteredTones::Fitted => Some(Tone::fitted((0..seen.len()).filter(|i| shown(*i)).map(|i| {
-                let colour = colour(i);
-                (
-                    1.0,
-                    terms(i),
-                    std::array::from_fn(|k| f64::from(seen[i][k] - colour[k])),
-                )
-            }))),
+        let difference = |i: usize| {
+            let colour = colour(i);
+            std::array::from_fn(|k| f64::from(seen[i][k] - colour[k]))
         };
+        let terms = |i: usize| quadratic(colour(i).map(f64::from));
+        let filter = (tones == RegisteredTones::Fitted).then(|| {
+            let pixels = (0..seen.len()).filter(|i| shown(*i));
+            Tone::fitted(pixels.map(|i| (1.0, terms(i), difference(i))), NO_FILTER)
+        });
         let pixel = |i: usize| -> [f32; 3] {
             let coverage = drawn.coverage[i];
             let on_white = drawn.colours[i].map(|v| v + 1.0 - coverage);
             if !shown(i) {
                 return on_white;
             }
-            let change = tone.as_ref().map_or([0.0; 3], |tone| tone.change(&terms(i)));
-            let colour = colour(i);
+            let mut difference: [f64; 3] = difference(i);
+            if let Some(filter) = &filter {
+                let change = filter.change(&terms(i));
+                let left = std::array::from_fn(|k| difference[k] - change[k]);
+                difference = filter.undone(colour(i).map(f64::from), left);
+            }
             std::array::from_fn(|k| {
-                let difference = seen[i][k] - colour[k] - change[k] as f32;
-                (on_white[k] + coverage * difference.clamp(-LARGEST, LARGEST)).clamp(0.0, 1.0)
+                let difference = (difference[k] as f32).clamp(-LARGEST, LARGEST);
+                (on_white[k] + coverage * difference).clamp(0.0, 1.0)
             })
         };
         let compared = Picture {
