@@ -47,7 +47,7 @@ fn the_order_of_fields_is_fixed() {
     let json = samples::matching().to_json().unwrap();
     assert!(
         json.starts_with(
-            "{\"schema\":\"guardsplat.evidence\",\"version\":4,\"audience\":\"owner\",\"kind\":\"verify\""
+            "{\"schema\":\"guardsplat.evidence\",\"version\":5,\"audience\":\"owner\",\"kind\":\"verify\""
         )
     );
     let place = |field: &str| json.rfind(&format!("\"{field}\":")).unwrap();
@@ -114,14 +114,14 @@ proptest! {
 #[test]
 fn another_version_is_named_before_its_fields_are_looked_at() {
     let json = samples::matching().to_json().unwrap();
-    let newer = json.replace("\"version\":4,", "\"version\":5,\"something\":{\"new\":[1,2]},");
+    let newer = json.replace("\"version\":5,", "\"version\":6,\"something\":{\"new\":[1,2]},");
     let error = Evidence::from_json(newer.as_bytes()).unwrap_err();
-    assert!(matches!(error, Error::UnknownVersion { found: 5, known: 4 }), "{error}");
-    assert!(error.to_string().contains("version 5"), "{error}");
+    assert!(matches!(error, Error::UnknownVersion { found: 6, known: 5 }), "{error}");
+    assert!(error.to_string().contains("version 6"), "{error}");
     let signed = sign(&samples::matching(), &samples::key())
         .unwrap()
         .json
-        .replace("\"version\":4", "\"version\":7");
+        .replace("\"version\":5", "\"version\":7");
     let error = Evidence::from_json(signed.as_bytes()).unwrap_err();
     assert!(matches!(error, Error::UnknownVersion { found: 7, .. }), "{error}");
 }
