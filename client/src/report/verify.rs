@@ -143,7 +143,21 @@ impl VerifyReport {
             text.push('\n');
             text.push_str(&printable(reason));
         }
-        text + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
+        text + &self.beside_original() + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
+    }
+
+    /// How many pictures show the scene of the original, where they were compared with one.
+    fn beside_original(&self) -> String {
+        match self.explained_by_original.len() {
+            0 => String::new(),
+            all => {
+                let show = self.explained_by_original.iter().flatten().count();
+                format!(
+                    "\nthe original's scene was found in {show} of {}",
+                    counted(all as u64, "picture", "pictures")
+                )
+            }
+        }
     }
 
     fn credentials_lines(&self) -> String {
@@ -198,7 +212,7 @@ impl VerifyReport {
         if let Some(evidence) = &self.evidence_html {
             text += &format!("\nevidence: {evidence}");
         }
-        text + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
+        text + &self.beside_original() + &self.credentials_lines() + &rows_ignored(self.ignored_rows)
     }
 }
 
@@ -261,5 +275,19 @@ mod tests {
         result.ignored_rows = 3;
         let text = VerifyReport::from(&result).lines();
         assert!(text.ends_with("compare with\n3 rows ignored"), "{text}");
+    }
+
+    #[test]
+    fn pictures_that_show_the_originals_scene_are_counted() {
+        let told = |explained: Vec<f64>| {
+            let result = VerifyResult {
+                explained_by_original: explained,
+                ..VerifyResult::default()
+            };
+            VerifyReport::from(&result).lines()
+        };
+        assert!(told(vec![0.97, 0.0]).ends_with("\nthe original's scene was found in 1 of 2 pictures"));
+        assert!(told(vec![0.0]).ends_with("\nthe original's scene was found in 0 of 1 picture"));
+        assert!(!told(Vec::new()).contains("original"));
     }
 }
