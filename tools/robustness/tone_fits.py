@@ -18,7 +18,7 @@ import tempfile
 import numpy as np
 from backdrops import rendered
 from PIL import Image
-from with_the_original import filtered, photograph
+from with_the_original import as_jpeg, filtered, laid_over, photograph
 
 SIZE, COVERED, BEHIND, LARGEST = 800, 0.85, 0.05, 0.15
 
@@ -132,12 +132,8 @@ def main():
         read = {}
         for index in range(given.pictures):
             on_white, on_black = (views["marked", ground][index] for ground in ("white", "black"))
-            behind = photograph(given.photographs, given.seed + index, SIZE)
-            over = on_black + np.clip(on_white - on_black, 0, 1) * behind
-            buffer = io.BytesIO()
-            levels = (np.clip(apply(over), 0, 1) * 255 + 0.5).astype(np.uint8)
-            Image.fromarray(levels).save(buffer, "JPEG", quality=85)
-            seen = np.asarray(Image.open(buffer), float) / 255
+            over = laid_over(on_white, on_black, photograph(given.photographs, given.seed + index, SIZE))
+            seen = np.asarray(Image.open(io.BytesIO(as_jpeg(apply(over), 85))), float) / 255
             for fit_name, fit in {"the filter itself": None, **FITS}.items():
                 picture = compared(seen, views["original", "white"][index], views["original", "black"][index], fit, apply)
                 read.setdefault(fit_name, []).append(picture)

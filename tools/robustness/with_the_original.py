@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Single pictures of a marked scene over photographs, read without and with the unmarked original.
 
-with_the_original.py WORKER ORIGINAL MARKED KEY MESSAGE PHOTOGRAPHS [--pictures N] [--seed S] [--size PX]
+with_the_original.py WORKER ORIGINAL MARKED KEY MESSAGE PHOTOGRAPHS [--pictures N] [--seed S] [--size PX] [--only WORD]
 
 Held-out views of the marked scene are rendered over white and over black, and laid over photographs of the folder
 PHOTOGRAPHS. Each is changed in the ways of CHANGES, written, and given to `verify` by itself: once as it is, and once with
@@ -51,6 +51,19 @@ def photograph(folder, index, size):
     return np.asarray(square, np.float32) / 255
 
 
+def laid_over(on_white, on_black, behind):
+    """A view over a picture, of what it is over white and over black."""
+    return on_black + np.clip(on_white - on_black, 0, 1) * behind
+
+
+def as_jpeg(picture, quality):
+    """Its bytes."""
+    buffer = io.BytesIO()
+    levels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
+    Image.fromarray(levels).save(buffer, "JPEG", quality=quality)
+    return buffer.getvalue()
+
+
 def verified(worker, picture, key, message, *more):
     """What `verify` says; it exits with 2 where there is no match."""
     command = [worker, "verify", picture, "--key", key, "--message", message, "--device", "cpu", "--json", *more]
@@ -64,6 +77,7 @@ def main():
     parser.add_argument("--pictures", type=int, default=3)
     parser.add_argument("--seed", type=int, default=93)
     parser.add_argument("--size", type=int, default=800)
+    parser.add_argument("--only", default="", help="changes with this word")
     given = parser.parse_args()
     name = pathlib.Path(given.original).name.split(".")[0]
     print(
@@ -76,14 +90,12 @@ def main():
             for ground in ("white", "black")
         )
         for index, (on_white, on_black) in enumerate(zip(white, black)):
-            shows = np.clip(on_white - on_black, 0, 1)
-            over = on_black + shows * photograph(given.photographs, given.seed + index, given.size)
+            over = laid_over(on_white, on_black, photograph(given.photographs, given.seed + index, given.size))
             for change, (changed, quality) in CHANGES.items():
-                buffer = io.BytesIO()
-                levels = (np.clip(changed(over), 0, 1) * 255 + 0.5).astype(np.uint8)
-                Image.fromarray(levels).save(buffer, "JPEG", quality=quality)
+                if given.only not in change:
+                    continue
                 file = pathlib.Path(folder, "suspect.jpg")
-                file.write_bytes(buffer.getvalue())
+                file.write_bytes(as_jpeg(changed(over), quality))
                 blind = verified(given.worker, file, given.key, given.message)
                 found = verified(given.worker, file, given.key, given.message, "--original", given.original)
                 told = [blind["verdict"], blind["matched_bits"], round(blind["seconds"], 1)]

@@ -232,16 +232,22 @@ const COUNTED: [(&str, &[u8]); 2] = [
     ("no match", include_bytes!("reports_of_before/no-match-version-3.json")),
 ];
 
+/// What a report says that is genuine, and holds.
+#[track_caller]
+fn genuine(name: &str, document: &[u8]) -> Evidence {
+    let checked = check(document, &samples::key().verifying_key());
+    assert!(
+        matches!(checked.answer, Answer::Genuine) && checked.holds(),
+        "{name}: {:#?}",
+        checked.findings
+    );
+    checked.evidence.unwrap()
+}
+
 #[test]
 fn what_was_signed_when_bits_were_counted_is_genuine_still() {
     for (name, document) in COUNTED {
-        let checked = check(document, &samples::key().verifying_key());
-        assert!(
-            matches!(checked.answer, Answer::Genuine) && checked.holds(),
-            "{name}: {:#?}",
-            checked.findings
-        );
-        let mut evidence = checked.evidence.unwrap();
+        let mut evidence = genuine(name, document);
         assert_eq!(
             (evidence.version, decision(&mut evidence).rank_sum),
             (3, None),
@@ -297,12 +303,7 @@ fn of_version_2() -> Evidence {
 #[test]
 fn readings_of_version_2_pay_alike() {
     let signed = sign(&of_version_2(), &samples::key()).unwrap();
-    let checked = check(signed.json.as_bytes(), &samples::key().verifying_key());
-    assert!(
-        matches!(checked.answer, Answer::Genuine) && checked.holds(),
-        "{:#?}",
-        checked.findings
-    );
+    genuine("version 2", signed.json.as_bytes());
     let refused = |change: fn(&mut HypothesisGroup), evidence: &Evidence| {
         let mut evidence = evidence.clone();
         let framings = &mut evidence.verification.as_mut().unwrap().tried.framings;
@@ -339,14 +340,7 @@ fn ranks_and_leading_pictures_are_of_version_4() {
 /// Signed by version 4.
 #[test]
 fn originals_are_of_version_5() {
-    let document = include_bytes!("reports_of_before/match-version-4.json");
-    let checked = check(document, &samples::key().verifying_key());
-    assert!(
-        matches!(checked.answer, Answer::Genuine) && checked.holds(),
-        "{:#?}",
-        checked.findings
-    );
-    let mut evidence = checked.evidence.unwrap();
+    let mut evidence = genuine("match", include_bytes!("reports_of_before/match-version-4.json"));
     assert_eq!(evidence.version, 4);
     evidence.verification.as_mut().unwrap().tried.framings[1].kind = HypothesisKind::Registered;
     assert!(matches!(evidence.to_json(), Err(Error::BadField { field, .. }) if field == "verification.tried.framings"));
