@@ -15,9 +15,11 @@
 //! A camera has nine numbers: where it is, how it is turned, its focal length, and its principal point, since a picture may
 //! be cropped. No gradient to them exists in the rasteriser, so slopes are differences of small views.
 mod coarse;
+mod common_colours;
 mod drawn;
 mod fit;
 mod observed;
+mod overlay;
 mod pose;
 mod reading;
 mod refine;

@@ -70,6 +70,24 @@ fn apart(gaussians: &Gaussians, a: &Camera, b: &Camera) -> f32 {
 }
 
 #[test]
+fn the_right_view_is_among_the_first_guesses_as_it_is_and_with_other_tones() {
+    let engine = engine();
+    let gaussians = sample(4000, 1, 8).unwrap().into_gaussians();
+    let original = Original::new(&engine, &gaussians, ViewSampler::new(&gaussians, 0).unwrap());
+    let truth = original.sampler.camera(Split::Training, 17, SIDE);
+    let changes: [fn([f32; 3]) -> [f32; 3]; 2] = [|c| c, |c| c.map(|v| 0.2 + 0.6 * v)];
+    for changed in changes {
+        let picture = before_squares(&original, &truth, changed);
+        let found = guesses(&original, &picture, 2).unwrap();
+        assert_eq!(found.len(), 2);
+        assert!(
+            found.iter().any(|camera| camera.rotation == truth.rotation),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
 fn the_camera_is_found_whatever_is_behind_the_scene_and_read_is_what_differs() {
     let engine = engine();
     let gaussians = sample(4000, 1, 8).unwrap().into_gaussians();
