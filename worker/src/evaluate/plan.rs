@@ -44,8 +44,7 @@ pub struct WantedMark {
 impl WantedMark {
     /// Reads no view that an embedding is verified on, or looks at to know when to stop.
     pub(super) fn leave_out_views_looked_at(&mut self) {
-        let early = self.settings.early_stop.map_or(0, |stop| stop.views);
-        self.first_view = self.first_view.max(self.settings.verify.views + early);
+        self.first_view = self.first_view.max(self.settings.views_looked_at());
     }
 }
 

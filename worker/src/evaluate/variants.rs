@@ -33,11 +33,11 @@ const CHANGES: [(&str, &str); 19] = [
     ),
     (
         "rate-flat",
-        r#"{"optimizer": {"preconditioned_sgd": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 1, "momentum": 0.8}}}"#,
+        r#"{"optimizer": {"preconditioned_sgd": {"final_rate": 1}}}"#,
     ),
     (
         "rate-to-0",
-        r#"{"optimizer": {"preconditioned_sgd": {"length": 0.002, "dc": 1, "rest": 0.1, "final_rate": 0, "momentum": 0.8}}}"#,
+        r#"{"optimizer": {"preconditioned_sgd": {"final_rate": 0}}}"#,
     ),
     (
         "distorted",
