@@ -107,9 +107,9 @@ mod tests {
             let wanted = &plan.wanted[place];
             (wanted.variant.as_str(), wanted.bits, wanted.together, wanted.first_view)
         };
-        assert_eq!(of(0), ("standard", 32, 5, 28));
-        assert_eq!(of(1), ("robust", 16, 0, 28));
-        assert_eq!(of(2), ("standard", 64, 3, 28));
+        assert_eq!(of(0), ("standard", 32, 5, 44));
+        assert_eq!(of(1), ("robust", 16, 0, 44));
+        assert_eq!(of(2), ("standard", 64, 3, 44));
         assert_eq!(plan.wanted[1].settings, Preset::Robust.settings());
         let names =
             |place: usize| -> Vec<String> { plan.wanted[place].trials.iter().map(ToString::to_string).collect() };

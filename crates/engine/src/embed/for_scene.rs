@@ -70,6 +70,8 @@ impl Settings {
         settings.steps *= times as usize;
         if let Some(extension) = &mut settings.extension {
             extension.after *= times as usize;
+            // The second time doubles what is long already, and brings a third of a point.
+            extension.most = 1;
         }
         if let Some(stop) = &mut settings.early_stop {
             stop.every *= LOOKS_APART;

@@ -77,7 +77,7 @@ impl Preset {
             times_of_fine: 2,
             extension: Some(Extension {
                 after: 100,
-                below: 0.97,
+                below: 0.985,
                 times: 2,
                 most: 2,
                 temperature: 4.0,
