@@ -29,7 +29,7 @@ const POOL: usize = 40;
 const LOST: f64 = 0.05;
 /// Of the trial's wrong bits beyond [`LOST`], the share that is left at the end, and the same among cameras that were given.
 /// [`LOST`] and the latter were fitted by hand to the marks of docs/evaluation/forecast.csv that are `fitted` there, the
-/// former to those of docs/evaluation/momentum.csv.
+/// former to those of docs/evaluation/forecast-today.csv.
 const LEFT: f64 = 0.13;
 const LEFT_OF_GIVEN: f64 = 0.2;
 /// Wrong bits that hardly a mark goes below.
