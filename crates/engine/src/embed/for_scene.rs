@@ -71,7 +71,7 @@ impl Settings {
         if let Some(extension) = &mut settings.extension {
             extension.after *= times as usize;
             // The second time doubles what is long already, and brings a third of a point.
-            extension.most = 1;
+            extension.most = extension.most.min(1);
         }
         if let Some(stop) = &mut settings.early_stop {
             stop.every *= LOOKS_APART;

@@ -33,8 +33,8 @@ pub struct PreconditionedSgdOptions {
     pub rest: f32,
     /// The length falls along a half cosine to this share at the last step; 1 keeps it.
     pub final_rate: f32,
-    /// Decay of the mean of gradients. The length of steps is given, so with much of it offsets swing about where they
-    /// should be, and with more steps, too: of 0.8 and 0.2 the latter reads more after half as many (docs/evaluation.md).
+    /// Decay of the mean of gradients. Steps have a given length, so with a slow decay offsets swing about where they should
+    /// be: with 0.2 a room reads more than with 0.8 after twice the steps (docs/evaluation.md, "What was tried").
     pub momentum: f32,
 }
 

@@ -74,7 +74,7 @@ fn laid_over(seen: &ObservedColours, camera: &Camera, drawn: &Drawn, size: f32) 
     let mut best: [Option<(f32, [i32; 2])>; 2] = [None; 2];
     for place in places {
         for (best, score) in best.iter_mut().zip(view.scores(seen, place)) {
-            if let Some(score) = score.filter(|score| best.is_none_or(|(most, _)| *score >= most)) {
+            if let Some(score) = score.filter(|score| best.is_none_or(|(most, _)| score.total_cmp(&most).is_ge())) {
                 *best = Some((score, place));
             }
         }
