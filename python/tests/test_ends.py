@@ -13,8 +13,10 @@ from conftest import MESSAGE
 
 import guardsplat
 
+# Whoever starts the tests may ignore Ctrl-C, as shells do for what they put into the background.
 PROGRAM = """
-import sys, guardsplat
+import signal, sys, guardsplat
+signal.signal(signal.SIGINT, signal.default_int_handler)
 scene, out, key, what = sys.argv[1:]
 def told(event):
     if event.stage == "optimising" and event.done == 3:
