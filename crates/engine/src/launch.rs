@@ -84,7 +84,7 @@ pub(crate) fn a_cube_each(count: usize) -> (CubeCount, CubeDim) {
 }
 
 /// At least so many cubes, and one at least, as every device allows them.
-fn columns_and_rows(cubes: u32) -> (u32, u32) {
+pub(crate) fn columns_and_rows(cubes: u32) -> (u32, u32) {
     let columns = cubes.clamp(1, MAX_CUBES);
     (columns, cubes.div_ceil(columns).max(1))
 }

@@ -1,4 +1,5 @@
 //! The GuardSplat engine: marks a 3D Gaussian Splatting scene and reads the mark back from pictures of it.
+mod card;
 pub mod clip;
 pub mod device;
 pub mod embed;

@@ -5,8 +5,12 @@ use super::random_fourier::{Layout, RandomFourierEncoder};
 use super::resnet::ResNet;
 use super::text::TextTransformer;
 use super::vit::VisionTransformer;
+use crate::card::{on_card, unit_rows};
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
+
+/// Added to the squared length of a feature, so that none is divided by 0.
+const TINY: f32 = 1e-24;
 
 /// Which towers a model has: text features are only needed for keys, image features only for scenes and pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,6 +100,9 @@ impl ImageTower {
 
 /// Rows divided by their Euclidean length, `[n, d]`. A zero row stays zero, with a finite gradient.
 pub fn normalize(features: Tensor<2>) -> Tensor<2> {
+    if on_card(&features) {
+        return unit_rows(features, TINY);
+    }
     let squares = features.clone().square().sum_dim(1);
-    features / squares.add_scalar(1e-24).sqrt()
+    features / squares.add_scalar(TINY).sqrt()
 }

@@ -2,6 +2,7 @@
 use burn::tensor::Tensor;
 
 use super::config::Normalization;
+use crate::card::{on_card, standardize};
 use crate::resize::resize;
 
 /// Resizes `[b, 3, h, w]` to `[b, 3, size, size]` (the aspect is squashed) and normalises the channels.
@@ -11,6 +12,9 @@ pub fn preprocess(pictures: Tensor<4>, size: usize, normalization: &Normalizatio
 
 /// Pictures `[b, 3, h, w]` with mean and deviation of their channels removed.
 pub fn normalized(pictures: Tensor<4>, normalization: &Normalization) -> Tensor<4> {
+    if on_card(&pictures) {
+        return standardize(pictures, normalization.mean, normalization.std);
+    }
     let device = pictures.device();
     let channels = |values: [f32; 3]| Tensor::<1>::from_floats(values, &device).reshape([1, 3, 1, 1]);
     (pictures - channels(normalization.mean)) / channels(normalization.std)

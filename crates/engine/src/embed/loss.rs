@@ -11,6 +11,7 @@ use super::image_augmentation::ImageAugmentation;
 use super::loss_weight_controller::LossWeightFactors;
 use super::progress::LossTerms;
 use super::settings::Settings;
+use crate::card::{cross_entropy, on_card};
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::{Message, bce_from_logits};
@@ -46,12 +47,11 @@ struct Graph {
 }
 
 impl Graph {
-    /// All numbers but `total`, for one transfer, the logits last.
-    fn numbers(&self) -> Tensor<1> {
-        let terms = self.lpips.iter().chain([&self.message]);
-        let mut numbers: Vec<Tensor<1>> = terms.cloned().collect();
-        numbers.push(self.logits.clone().flatten(0, 1));
-        Tensor::cat(numbers, 0).inner()
+    /// All numbers but `total`, the logits last.
+    fn numbers(&self) -> Vec<Tensor<1>> {
+        let logits = self.logits.clone().flatten(0, 1);
+        let terms = self.lpips.iter().chain([&self.message, &logits]);
+        terms.map(|numbers| numbers.clone().inner()).collect()
     }
 }
 
@@ -90,8 +90,8 @@ impl<'a> Loss<'a> {
         let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
         let (likeness, likeness_gradients) = likeness_with_gradient(&pairs, self.likeness_weights(factors));
         let original = || batch(references, device);
-        let graph = self.graph(step, leaf.clone(), original, factors, rng)?;
-        let numbers = self.engine.to_host(graph.numbers())?;
+        let graph = self.graph(step, leaf.clone().clamp(0.0, 1.0), original, factors, rng)?;
+        let numbers = self.engine.to_host(Tensor::cat(graph.numbers(), 0))?;
         let evaluated = self.evaluated(step, &numbers, mean_terms(&likeness), mean_psnr(references, pictures))?;
 
         let gradient = self.gradient(&graph.total, &leaf)?;
@@ -109,8 +109,8 @@ impl<'a> Loss<'a> {
         Ok((evaluated, gradients))
     }
 
-    /// [`Loss::evaluate`] of `[views, 3, height, width]` that stay on the device: the gradient to the pictures, and numbers for
-    /// [`Loss::evaluated_on_device`]. Nothing is waited for.
+    /// [`Loss::evaluate`] of `[views, 3, height, width]` that stay on the device: the gradient to the pictures, and numbers that
+    /// [`Loss::evaluated_on_device`] takes one after the other. Nothing is waited for.
     ///
     /// # Errors
     /// A failing device.
@@ -121,13 +121,14 @@ impl<'a> Loss<'a> {
         originals: Tensor<4>,
         factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
-    ) -> Result<(Tensor<4>, Tensor<1>)> {
+    ) -> Result<(Tensor<4>, Vec<Tensor<1>>)> {
         let weights = self.likeness_weights(factors);
-        let likeness = LikenessOnDevice::new(originals.clone(), pictures.clone(), weights)?;
-        let leaf = Tensor::from_inner(pictures).require_grad();
+        let likeness = LikenessOnDevice::new(originals.clone(), pictures, weights)?;
+        let leaf = Tensor::from_inner(likeness.clamped.clone()).require_grad();
         let graph = self.graph(step, leaf.clone(), || Ok(originals), factors, rng)?;
-        let gradient = self.gradient(&graph.total, &leaf)? + likeness.gradient;
-        let numbers = Tensor::cat(vec![likeness.means.flatten(0, 1), graph.numbers()], 0);
+        let mut numbers = vec![likeness.means.clone().flatten(0, 1)];
+        numbers.extend(graph.numbers());
+        let gradient = likeness.gradient_with(self.gradient(&graph.total, &leaf)?)?;
         Ok((gradient, numbers))
     }
 
@@ -154,20 +155,19 @@ impl<'a> Loss<'a> {
         }
     }
 
-    /// The loss of `pictures` as a graph, without what is computed by hand. `original` is asked for where LPIPS is.
+    /// The loss of marked pictures as a graph, without what is computed by hand: of what a file can hold of them, since beyond
+    /// it nothing is seen. `original` is asked for where LPIPS is.
     fn graph(
         &self,
         step: usize,
-        pictures: Tensor<4>,
+        marked: Tensor<4>,
         original: impl FnOnce() -> Result<Tensor<4>>,
         factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
     ) -> Result<Graph> {
         let lambda = &self.settings.lambda;
         let weight = lambda.reconstruction * factors.reconstruction;
-        let views = pictures.dims()[0];
-        // What a file can hold; beyond it nothing is seen, so there is no gradient either.
-        let marked = pictures.clamp(0.0, 1.0);
+        let views = marked.dims()[0];
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
         let lpips = match lpips {
             Some(lpips) => {
@@ -181,8 +181,11 @@ impl<'a> Loss<'a> {
         let bits = self.targets.len();
         let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
         let targets = Tensor::<2>::from_data(targets, &self.engine.compute.device);
-        let softened = logits.clone() / lambda.temperature;
-        let message = bce_from_logits(softened, Tensor::from_inner(targets)) * lambda.temperature;
+        let (targets, temperature) = (Tensor::from_inner(targets), lambda.temperature);
+        let message = match on_card(&logits) {
+            true => cross_entropy(logits.clone(), targets, temperature),
+            false => bce_from_logits(logits.clone() / temperature, targets) * temperature,
+        };
         let mut total = message.clone() * lambda.message;
         if let Some(distance) = &lpips {
             total = total + distance.clone() * (lambda.lpips * weight);

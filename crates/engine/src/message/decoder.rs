@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha20Rng;
 
+use crate::card::linear;
 use crate::error::{Error, Result};
 
 /// Width of the two hidden layers.
@@ -107,7 +108,7 @@ impl Decoder {
     pub fn forward(&self, features: Tensor<2>) -> Tensor<2> {
         let mut x = features;
         for (i, layer) in self.layers.iter().enumerate() {
-            x = layer.forward(if i == 0 { x } else { gelu(x) });
+            x = linear(layer, if i == 0 { x } else { gelu(x) });
         }
         x
     }

@@ -1,6 +1,8 @@
 //! What the decoder does to CLIP features before its MLP: centre them and turn them into a space both towers share.
 use burn::tensor::{Device, Tensor, TensorData};
 
+use crate::card::{affine, on_card};
+
 /// Widest CLIP feature that is accepted; published models reach 1024.
 pub const MAX_WIDTH: usize = 4096;
 
@@ -132,6 +134,14 @@ impl AffineMap {
 
     /// Maps `[b, width]` to `[b, rank]`.
     pub fn apply(&self, features: Tensor<2>) -> Tensor<2> {
+        if on_card(&features) {
+            return affine(
+                features,
+                Some(self.mean.clone().flatten(0, 1)),
+                self.matrix.clone(),
+                None,
+            );
+        }
         (features - self.mean.clone()).matmul(self.matrix.clone())
     }
 }

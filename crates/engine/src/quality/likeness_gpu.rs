@@ -3,7 +3,7 @@
 //! A unit a pixel of a plane. The window is separable, so what is averaged is averaged along rows first.
 // The launch functions that the macro makes carry no documentation.
 #![allow(missing_docs)]
-use burn::backend::Cube;
+use burn::backend::{Cube, TensorMetadata};
 use burn::tensor::{DType, Shape, Tensor};
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
@@ -14,7 +14,7 @@ use super::likeness::LikenessWeights;
 use super::ssim::{C1, C2};
 use super::window::{RADIUS, weight};
 use crate::error::{Error, Result};
-use crate::launch::{Buffer, CUBE, a_cube_each, cube_of_layer, grid, sum_of_cube};
+use crate::launch::{Buffer, CUBE, a_cube_each, cube_of_layer, empty_tensor, grid, sum_of_cube};
 
 const UNITS: usize = CUBE as usize;
 
@@ -111,8 +111,8 @@ fn slopes_along_rows(slopes: &[f32], taps: &[f32], across: &mut [f32], width: u3
     }
 }
 
-/// The gradient to each value of y, 0 where it is beyond what a file can hold; absolute and squared differences to the second
-/// and third part of `values`.
+/// The gradient to each value of y, 0 where it is beyond what a file can hold; what that can hold of it to `clamped`; absolute
+/// and squared differences to the second and third part of `values`.
 #[cube(launch)]
 fn to_marked(
     x: &[f32],
@@ -121,6 +121,7 @@ fn to_marked(
     taps: &[f32],
     values: &mut [f32],
     gradient: &mut [f32],
+    clamped: &mut [f32],
     width: u32,
     height: u32,
     of_l1: f32,
@@ -161,8 +162,22 @@ fn to_marked(
             slope = 0.0f32;
         }
         gradient[at] = slope;
+        clamped[at] = b;
         values[count + at] = f32::abs(difference);
         values[2 * count + at] = difference * difference;
+    }
+}
+
+/// Adds a gradient to clamped values to that of values.
+#[cube(launch)]
+fn add_to_marked(y: &[f32], of_clamped: &[f32], likeness: &[f32], gradient: &mut [f32]) {
+    let at = ABSOLUTE_POS;
+    if at < y.len() {
+        let mut more = of_clamped[at];
+        if y[at] < 0.0f32 || y[at] > 1.0f32 {
+            more = 0.0f32;
+        }
+        gradient[at] = likeness[at] + more;
     }
 }
 
@@ -188,8 +203,11 @@ fn means_of_rows(values: &[f32], means: &mut [f32], len: u32, scale: f32) {
 pub(crate) struct LikenessOnDevice {
     /// Means over pixels and colours of SSIM, of absolute and of squared differences, `[3, views]`.
     pub means: Tensor<2>,
-    /// Of the weighted terms' mean over views to the marked pictures, `[views, 3, height, width]`.
-    pub gradient: Tensor<4>,
+    /// The marked pictures, `[views, 3, height, width]`, as files hold them.
+    pub clamped: Tensor<4>,
+    marked: CubeTensor,
+    /// Of the weighted terms' mean over views to the marked pictures.
+    gradient: CubeTensor,
 }
 
 impl LikenessOnDevice {
@@ -206,7 +224,8 @@ impl LikenessOnDevice {
             .map(|tap| weight(tap.abs_diff(RADIUS)) as f32)
             .collect();
         let taps = Buffer::of(&client, &taps);
-        let [across, values, slopes, gradient] = [5, 3, 3, 1].map(|parts| Buffer::empty(&client, parts * count));
+        let parts = [5, 3, 3, 1, 1];
+        let [across, values, slopes, gradient, clamped] = parts.map(|parts| Buffer::empty(&client, parts * count));
         let (w, h) = (width as u32, height as u32);
         let scale = 1.0 / count as f32;
         let pictures = || [&x, &y].map(|tensor| tensor.clone().into_buffer_arg());
@@ -245,6 +264,7 @@ impl LikenessOnDevice {
             taps.argument(),
             values.argument(),
             gradient.argument(),
+            clamped.argument(),
             w,
             h,
             scale * weights.l1,
@@ -263,10 +283,28 @@ impl LikenessOnDevice {
             len as u32,
             1.0 / len as f32,
         );
+        let shape = [views, channels, height, width];
         Ok(Self {
-            means: tensor(&y, means.handle, [3, views]),
-            gradient: tensor(&y, gradient.handle, [views, channels, height, width]),
+            means: Tensor::from_primitive::<Cube>(tensor(&y, means.handle, [3, views])),
+            clamped: Tensor::from_primitive::<Cube>(tensor(&y, clamped.handle, shape)),
+            gradient: tensor(&y, gradient.handle, shape),
+            marked: y,
         })
+    }
+
+    /// The gradient to the marked pictures of the weighted terms, and of what has the gradient `more` to
+    /// [`LikenessOnDevice::clamped`].
+    ///
+    /// # Errors
+    /// One that is not on a card.
+    pub fn gradient_with(&self, more: Tensor<4>) -> Result<Tensor<4>> {
+        let more = primitive(more)?;
+        let out = empty_tensor(&self.marked, self.marked.shape());
+        let (cubes, dim) = grid(out.shape().num_elements(), 1);
+        let [y, more, likeness, gradient] =
+            [&self.marked, &more, &self.gradient, &out].map(|tensor| tensor.clone().into_buffer_arg());
+        add_to_marked::launch(&self.marked.client, cubes, dim, y, more, likeness, gradient);
+        Ok(Tensor::from_primitive::<Cube>(out))
     }
 }
 
@@ -279,10 +317,9 @@ fn primitive(tensor: Tensor<4>) -> Result<CubeTensor> {
 }
 
 /// A tensor of `handle`, where `like` is.
-fn tensor<const D: usize>(like: &CubeTensor, handle: Handle, shape: [usize; D]) -> Tensor<D> {
+fn tensor<const D: usize>(like: &CubeTensor, handle: Handle, shape: [usize; D]) -> CubeTensor {
     let shape = Shape::from(shape.to_vec());
-    let (client, device) = (like.client.clone(), like.device.clone());
-    Tensor::from_primitive::<Cube>(CubeTensor::new_contiguous(client, device, shape, handle, DType::F32))
+    CubeTensor::new_contiguous(like.client.clone(), like.device.clone(), shape, handle, DType::F32)
 }
 
 #[cfg(test)]
@@ -313,13 +350,31 @@ mod tests {
         let pairs = [(x[0], y[0]), (x[1], y[1])];
         let (want, gradients) = likeness_with_gradient(&pairs, weights);
         let found = LikenessOnDevice::new(batch(&x, &device).unwrap(), batch(&y, &device).unwrap(), weights).unwrap();
-        let means = found.means.try_into_vec_as::<f32>().unwrap();
+        let clamped = unbatch(found.clamped.clone()).unwrap();
+        for (found, want) in clamped.iter().zip(y) {
+            let same = found
+                .pixels
+                .iter()
+                .zip(&want.pixels)
+                .all(|(a, b)| *a == b.clamp(0.0, 1.0));
+            assert!(same);
+        }
+        let ones = found.clamped.ones_like();
+        let means = found.means.clone().try_into_vec_as::<f32>().unwrap();
         for (view, want) in want.iter().enumerate() {
             assert!((f64::from(means[view]) - want.ssim).abs() < 1e-5);
             assert!((f64::from(means[2 + view]) - want.l1).abs() < 1e-5);
             assert!(means[4 + view] > 0.0);
         }
-        let found = unbatch(found.gradient).unwrap();
+        let found = [ones.clone() * 0.0, ones].map(|more| unbatch(found.gradient_with(more).unwrap()).unwrap());
+        let beyond = |value: f32| !(0.0..=1.0).contains(&value);
+        for ((without, with), picture) in found[0].iter().zip(&found[1]).zip(y) {
+            for ((without, with), value) in without.pixels.iter().zip(&with.pixels).zip(&picture.pixels) {
+                let more = if beyond(*value) { 0.0 } else { 1.0 };
+                assert!((with - without - more).abs() < 1e-5);
+            }
+        }
+        let [found, _] = found;
         let largest = gradients.iter().flatten().fold(0.0_f32, |m, v| m.max(v.abs()));
         for (found, want) in found.iter().zip(&gradients) {
             let off = found.pixels.iter().zip(want).map(|(a, b)| (a - b).abs());

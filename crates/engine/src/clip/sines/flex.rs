@@ -8,6 +8,17 @@ use super::pool::Squares;
 use super::{FloatTensor, MeanSines, WeightedSines};
 use crate::simd::Instructions;
 
+/// What the backward pass needs.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    pictures: FloatTensor<Flex>,
+    filters: FloatTensor<Flex>,
+    phases: FloatTensor<Flex>,
+    /// Weights `[b][pixels]` of squares; none where all weigh alike.
+    weights: Option<Vec<f32>>,
+    side: usize,
+}
+
 impl MeanSines for Flex {
     fn mean_sines(
         pictures: FloatTensor<Self>,
@@ -16,68 +27,50 @@ impl MeanSines for Flex {
         side: usize,
         equalization: f32,
     ) -> FloatTensor<Self> {
-        let weights = Self::weights(pictures.clone(), side, equalization);
-        Self::sums(pictures, filters, phases, weights, side)
+        Self::means(pictures, filters, phases, side, equalization).0
     }
 }
 
 impl WeightedSines for Flex {
-    fn weights(pictures: FloatTensor<Self>, side: usize, equalization: f32) -> Option<FloatTensor<Self>> {
-        if equalization == 0.0 {
-            return None;
-        }
-        let (squares, views) = (squares(&pictures, side), pictures.shape()[0]);
-        let pictures = pictures.to_contiguous();
-        let weights = density::weights(
-            Instructions::widest(),
-            &squares.means(pictures.storage()),
-            views,
-            equalization,
-        );
-        let shape = Shape::new([views, squares.count()]);
-        Some(FloatTensor::<Self>::from_data(TensorData::new(weights, shape)))
-    }
+    type Kept = Kept;
 
-    fn sums(
+    fn means(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
         side: usize,
-    ) -> FloatTensor<Self> {
+        equalization: f32,
+    ) -> (FloatTensor<Self>, Kept) {
         let (squares, views) = (squares(&pictures, side), pictures.shape()[0]);
         let shape = Shape::new([views, phases.shape()[0]]);
         let [pictures, filters, phases] = [pictures, filters, phases].map(|t| t.to_contiguous());
-        let weights = weights.map(|t| t.to_contiguous());
+        let of_squares = squares.means(pictures.storage());
+        let weighted = equalization != 0.0;
+        let weights = weighted.then(|| density::weights(Instructions::widest(), &of_squares, views, equalization));
         let waves = waves(filters.storage(), phases.storage(), 0.0);
-        let pictures = squares.means(pictures.storage());
-        let weights = weights.as_ref().map(|t| t.storage());
-        let means = means(Instructions::widest(), &pictures, views, &waves, weights);
-        FloatTensor::<Self>::from_data(TensorData::new(means, shape))
+        let means = means(Instructions::widest(), &of_squares, views, &waves, weights.as_deref());
+        let kept = Kept {
+            pictures,
+            filters,
+            phases,
+            weights,
+            side,
+        };
+        (FloatTensor::<Self>::from_data(TensorData::new(means, shape)), kept)
     }
 
-    fn sums_backward(
-        pictures: FloatTensor<Self>,
-        filters: FloatTensor<Self>,
-        phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
-        gradient: FloatTensor<Self>,
-        side: usize,
-    ) -> FloatTensor<Self> {
-        let (squares, shape) = (squares(&pictures, side), pictures.shape());
-        let tensors = [pictures, filters, phases, gradient];
-        let [pictures, filters, phases, gradient] = tensors.map(|t| t.to_contiguous());
-        let weights = weights.map(|t| t.to_contiguous());
-        let filters: &[f32] = filters.storage();
-        let waves = waves(filters, phases.storage(), QUARTER);
-        let pictures = squares.means(pictures.storage());
+    fn means_backward(kept: Kept, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+        let (squares, shape) = (squares(&kept.pictures, kept.side), kept.pictures.shape());
+        let gradient = gradient.to_contiguous();
+        let filters: &[f32] = kept.filters.storage();
+        let waves = waves(filters, kept.phases.storage(), QUARTER);
         let found = gradients(
             Instructions::widest(),
-            &pictures,
+            &squares.means(kept.pictures.storage()),
             shape[0],
             &waves,
             filters,
-            weights.as_ref().map(|t| t.storage()),
+            kept.weights.as_deref(),
             gradient.storage(),
         );
         FloatTensor::<Self>::from_data(TensorData::new(squares.spread(found), shape))

@@ -58,27 +58,20 @@ trait MeanSines: Backend {
 
 /// Its parts on a device.
 trait WeightedSines: Backend {
-    /// Weights `[b, pixels]` of squares; none where all weigh alike.
-    fn weights(pictures: FloatTensor<Self>, side: usize, equalization: f32) -> Option<FloatTensor<Self>>;
+    /// What the backward pass needs of the forward pass.
+    type Kept: Clone + Send + std::fmt::Debug + 'static;
 
-    /// Sums `[b, n]` with these weights, means without.
-    fn sums(
+    /// The means.
+    fn means(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
         side: usize,
-    ) -> FloatTensor<Self>;
+        equalization: f32,
+    ) -> (FloatTensor<Self>, Self::Kept);
 
     /// Their gradient to the pictures, `[b, 3, h, w]`, for a gradient `[b, n]`.
-    fn sums_backward(
-        pictures: FloatTensor<Self>,
-        filters: FloatTensor<Self>,
-        phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
-        gradient: FloatTensor<Self>,
-        side: usize,
-    ) -> FloatTensor<Self>;
+    fn means_backward(kept: Self::Kept, gradient: FloatTensor<Self>) -> FloatTensor<Self>;
 }
 
 /// The backward step of the graph.
@@ -86,15 +79,13 @@ trait WeightedSines: Backend {
 struct ToPictures;
 
 impl<B: WeightedSines> Backward<B, 1> for ToPictures {
-    /// Pictures, filters and phases; weights; the side of squares.
-    type State = ([FloatTensor<B>; 3], Option<FloatTensor<B>>, usize);
+    type State = B::Kept;
 
     fn backward(self, ops: Ops<Self::State, 1>, gradients: &mut Gradients, _: &mut Checkpointer) {
         let gradient = gradients.consume::<B>(&ops.node);
-        let ([pictures, filters, phases], weights, side) = ops.state;
         let [parent] = ops.parents;
         if let Some(parent) = parent {
-            let found = B::sums_backward(pictures, filters, phases, weights, gradient, side);
+            let found = B::means_backward(ops.state, gradient);
             gradients.register::<B>(parent.id, found);
         }
     }
@@ -111,12 +102,9 @@ impl<B: WeightedSines + MeanSines, C: CheckpointStrategy> MeanSines for Autodiff
         let (pictures, node) = pictures.into_parts();
         let (filters, _) = filters.into_parts();
         let (phases, _) = phases.into_parts();
-        let weights = B::weights(pictures.clone(), side, equalization);
-        let tensors = [pictures, filters, phases];
-        let [pictures, filters, phases] = tensors.clone();
-        let out = B::sums(pictures, filters, phases, weights.clone(), side);
+        let (out, kept) = B::means(pictures, filters, phases, side, equalization);
         match ToPictures.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(graph) => graph.finish((tensors, weights, side), out),
+            OpsKind::Tracked(graph) => graph.finish(kept, out),
             OpsKind::UnTracked(graph) => graph.finish(out),
         }
     }

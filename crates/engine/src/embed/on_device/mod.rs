@@ -38,8 +38,10 @@ pub(super) struct StepOptions {
 
 /// A step that a device computes.
 pub(super) struct Launched {
-    /// What of it is read: numbers of the loss, and sums where offsets are moved.
-    told: Vec<Buffer>,
+    /// Numbers of the loss that are read.
+    numbers: Vec<Buffer>,
+    /// Sums over what is learned, where it is moved.
+    sums: Option<Buffer>,
     views: usize,
     options: StepOptions,
 }
@@ -79,20 +81,22 @@ impl OnDevice {
         let noise: Vec<&[f32]> = views.iter().map(|view| view.noise()).collect();
         let batch = rasterizer.batch(&shown)?;
         // To draw what is unmarked anew costs less than to keep it, or to bring it here.
-        let colours = self.scene.colours(rasterizer, &batch, &noise, false);
-        let originals = rasterizer.composite(&batch, &colours)?;
-        let colours = self.scene.colours(rasterizer, &batch, &noise, true);
-        let pictures = rasterizer.composite(&batch, &colours)?;
+        let [colours, originals] = self.scene.colours(rasterizer, &batch, &noise);
+        let drawn = rasterizer.composite_both(&batch, &colours, &originals)?;
+        let (pictures, originals) = (drawn.pictures, drawn.originals);
         let (gradient, numbers) = loss.evaluate_on_device(options.step, pictures, originals, options.factors, rng)?;
-        let slots = rasterizer.slot_gradients(&batch, gradient)?;
+        let slots = rasterizer.slot_gradients(&batch, &drawn.lights, gradient)?;
         self.scene.differentiate(rasterizer, &batch, &colours, &slots);
-        let mut told = vec![rasterizer.buffer_of(numbers)?];
-        if let Some(optimizer) = &mut self.optimizer {
-            let pixels = (3 * batch.width * batch.height) as f32;
-            told.push(optimizer.step(rasterizer, &self.scene, options.rate, pixels, options.penalty));
-        }
+        let numbers = numbers.into_iter().map(|numbers| rasterizer.buffer_of(numbers));
+        let numbers = numbers.collect::<Result<_>>()?;
+        let pixels = (3 * batch.width * batch.height) as f32;
+        let sums = self
+            .optimizer
+            .as_mut()
+            .map(|optimizer| optimizer.step(rasterizer, &self.scene, options.rate, pixels, options.penalty));
         Ok(Launched {
-            told,
+            numbers,
+            sums,
             views: views.len(),
             options,
         })
@@ -104,9 +108,11 @@ impl OnDevice {
     /// [`Error::NotFinite`](crate::Error::NotFinite) with the term; a failing device.
     pub fn wait(&self, rasterizer: &GpuRasterizer, loss: &Loss<'_>, launched: Launched) -> Result<Evaluated> {
         let StepOptions { step, penalty, .. } = launched.options;
-        let told = rasterizer.read(&launched.told)?;
-        let mut evaluated = loss.evaluated_on_device(step, &told[0], launched.views)?;
-        if let Some(sums) = told.get(1) {
+        let buffers: Vec<Buffer> = launched.numbers.iter().chain(&launched.sums).cloned().collect();
+        let told = rasterizer.read(&buffers)?;
+        let (numbers, sums) = told.split_at(launched.numbers.len());
+        let mut evaluated = loss.evaluated_on_device(step, &numbers.concat(), launched.views)?;
+        if let Some(sums) = sums.first() {
             let [offset, gradient] = totals(sums, penalty, self.gaussians, self.scene.columns());
             finite(step, "gradient", gradient)?;
             finite(step, "offset", offset)?;

@@ -5,7 +5,7 @@
 //! slots `[visible + 1]`, slots `[pairs]`, rows `[visible]`. A table says where they begin.
 use std::ops::Range;
 
-use super::kernels::append;
+use super::kernels::{PARTS, PIXELS, append, chunks_of_view};
 use crate::error::Result;
 use crate::launch::{Buffer, grid};
 use crate::memory::Limits;
@@ -41,6 +41,8 @@ pub(super) const CENTRE: usize = 14;
 pub(super) const CENTRE_REST: usize = 17;
 /// The camera's axis: the direction to what is at its centre.
 pub(super) const AXIS: usize = 20;
+/// Chunks of tile lists of the group's views before it.
+pub(super) const FIRST_CHUNK: usize = 23;
 
 /// A view's numbers as kernels read them.
 pub(crate) struct PackedView(pub(super) Vec<u32>);
@@ -97,6 +99,10 @@ pub(crate) struct Group {
     pub pairs: usize,
     pub tile_columns: u32,
     pub tile_rows: u32,
+    /// Chunks of the tile lists of all views.
+    pub chunks: usize,
+    /// Of the view that has most.
+    pub most_chunks: usize,
 }
 
 impl Group {
@@ -111,16 +117,19 @@ impl Group {
     }
 }
 
+/// What there is a buffer of for the views of a group.
+const BUFFERS: [&str; 4] = ["splats", "gradient slots", "colours", "light before chunks"];
+
 /// The groups that `views` fall into, so that none of their buffers takes more than `limit` bytes.
 ///
 /// # Errors
 /// [`Error::DoesNotFit`](crate::Error::DoesNotFit): a view whose buffers are larger.
 pub(super) fn groups(views: &[Shown<'_>], limit: u64) -> Result<Vec<Range<usize>>> {
     let mut groups: Vec<Range<usize>> = Vec::new();
-    let mut bytes = [0u64; 3];
+    let mut bytes = [0u64; BUFFERS.len()];
     for (index, shown) in views.iter().enumerate() {
         let own = bytes_of(shown.view);
-        for (what, bytes) in ["splats", "gradient slots", "colours"].iter().zip(own) {
+        for (what, bytes) in BUFFERS.iter().zip(own) {
             Limits::of_buffers(limit).admit_buffer(&format!("the buffer of a view's {what}"), bytes)?;
         }
         let fits = bytes.iter().zip(own).all(|(all, own)| all + own <= limit);
@@ -128,7 +137,7 @@ pub(super) fn groups(views: &[Shown<'_>], limit: u64) -> Result<Vec<Range<usize>
             Some(group) => group.end = index + 1,
             None => {
                 groups.push(index..index + 1);
-                bytes = [0; 3];
+                bytes = [0; BUFFERS.len()];
             }
         }
         bytes.iter_mut().zip(own).for_each(|(all, own)| *all += own);
@@ -136,18 +145,32 @@ pub(super) fn groups(views: &[Shown<'_>], limit: u64) -> Result<Vec<Range<usize>
     Ok(groups)
 }
 
-/// Of a view's packed words, its gradient slots and its colours.
-fn bytes_of(view: &PreparedView) -> [u64; 3] {
-    [4 * len(view), 12 * view.tiles.pairs(), 12 * view.visible.len()].map(|bytes| bytes as u64)
+/// Bytes of a view's [`BUFFERS`].
+fn bytes_of(view: &PreparedView) -> [u64; BUFFERS.len()] {
+    [
+        4 * len(view),
+        12 * view.tiles.pairs(),
+        12 * view.visible.len(),
+        4 * PIXELS * chunks(view),
+    ]
+    .map(|bytes| bytes as u64)
+}
+
+/// Chunks of a view's tile lists.
+fn chunks(view: &PreparedView) -> usize {
+    let tiles = &view.tiles;
+    chunks_of_view((tiles.columns * tiles.rows) as usize, tiles.pairs())
 }
 
 /// Puts views whose packed words are `uploaded` beside one another.
 pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], uploaded: &[Buffer]) -> Group {
     let of_group = &all[views.clone()];
     let mut table = Vec::with_capacity(FIELDS * of_group.len());
-    let (mut base, mut colours, mut pairs) = (0, 0, 0);
+    let (mut base, mut colours, mut pairs, mut of_all, mut most_chunks) = (0, 0, 0, 0, 0);
     for (shown, picture) in of_group.iter().zip(views.clone()) {
-        table.extend(row(shown, [base, colours, pairs, picture]));
+        table.extend(row(shown, [base, colours, pairs, picture, of_all]));
+        of_all += chunks(shown.view);
+        most_chunks = most_chunks.max(chunks(shown.view));
         base += len(shown.view);
         colours += shown.view.visible.len();
         pairs += shown.view.tiles.pairs();
@@ -157,10 +180,29 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
         _ => {
             let words = Buffer::empty(client, base);
             let mut at = 0;
-            for part in uploaded {
-                let (count, dim) = grid(part.len, 1);
-                append::launch(client, count, dim, part.argument(), words.argument(), at as u32);
-                at += part.len;
+            for parts in uploaded.chunks(PARTS) {
+                let longest = parts.iter().map(|part| part.len).max().unwrap_or(0);
+                let places: Vec<u32> = parts
+                    .iter()
+                    .map(|part| {
+                        at += part.len;
+                        (at - part.len) as u32
+                    })
+                    .collect();
+                let (count, dim) = grid(longest, parts.len());
+                let part = |k: usize| parts[k.min(parts.len() - 1)].argument();
+                let places = Buffer::of(client, &places);
+                append::launch(
+                    client,
+                    count,
+                    dim,
+                    part(0),
+                    part(1),
+                    part(2),
+                    part(3),
+                    places.argument(),
+                    words.argument(),
+                );
             }
             words
         }
@@ -170,6 +212,8 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
         words,
         table: Buffer::of(client, &table),
         visible: of_group.iter().map(|shown| shown.view.visible.len()).collect(),
+        chunks: of_all,
+        most_chunks,
         views,
         pairs,
         tile_columns: tiles.columns,
@@ -178,7 +222,7 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
 }
 
 /// A view's row in the table.
-fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture]: [usize; 4]) -> [u32; FIELDS] {
+fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture, first_chunk]: [usize; 5]) -> [u32; FIELDS] {
     let (visible, tiles) = (shown.view.visible.len(), &shown.view.tiles);
     let mut row = [0; FIELDS];
     let mut at = base;
@@ -199,6 +243,7 @@ fn row(shown: &Shown<'_>, [base, first_colour, first_slot, picture]: [usize; 4])
         (FIRST_COLOUR, first_colour),
         (FIRST_SLOT, first_slot),
         (PICTURE, picture),
+        (FIRST_CHUNK, first_chunk),
         (TERMS, terms),
     ] {
         row[field] = value as u32;

@@ -90,10 +90,17 @@ fn direction_to(positions: &[f32], table: &[u32], view: usize, row: usize) -> (f
     (x, y, z)
 }
 
-/// Colours of the visible Gaussians of a group that are of a chunk of rows: the group's `colours` (`[colours][3]`).
+/// A colour as it is drawn: not below 0, before and after the noise.
+#[cube]
+fn shown(colour: f32, noise: f32) -> f32 {
+    max(max(colour, 0.0f32) + noise, 0.0f32)
+}
+
+/// Colours of the visible Gaussians of a group that are of a chunk of rows: the group's `colours` (`[colours][3]`), and
+/// `originals` without what is learned.
 ///
 /// `positions` (`[rows][3]`) and `coefficients` (`[rows][columns of the degree]`) are the chunk's. `offsets` (`[slots][learned]`) are added where a row has a
-/// slot, unless `learned` is 0; `noise` is added to the colours if `noisy`.
+/// slot, `noise` to all colours if `noisy`.
 #[cube(launch)]
 pub fn colours_of_rows(
     words: &[u32],
@@ -104,6 +111,7 @@ pub fn colours_of_rows(
     offsets: &[f32],
     noise: &[f32],
     colours: &mut [f32],
+    originals: &mut [f32],
     first_row: u32,
     #[comptime] degree: usize,
     #[comptime] learned: usize,
@@ -124,12 +132,18 @@ pub fn colours_of_rows(
             let mut r = 0.5f32;
             let mut g = 0.5f32;
             let mut b = 0.5f32;
+            let mut r_before = 0.5f32;
+            let mut g_before = 0.5f32;
+            let mut b_before = 0.5f32;
             #[unroll]
             for k in 0..comptime!((degree + 1) * (degree + 1)) {
                 if k < terms {
                     let mut red = coefficients[at + 3 * k];
                     let mut green = coefficients[at + 3 * k + 1];
                     let mut blue = coefficients[at + 3 * k + 2];
+                    r_before += values[k] * red;
+                    g_before += values[k] * green;
+                    b_before += values[k] * blue;
                     if comptime!(3 * k < learned) {
                         let from = slot as usize * learned + 3 * k;
                         if slot != NO_SLOT {
@@ -144,17 +158,20 @@ pub fn colours_of_rows(
                 }
             }
             let out = (field(table, view, FIRST_COLOUR) + gaussian) * 3;
-            r = max(r, 0.0f32);
-            g = max(g, 0.0f32);
-            b = max(b, 0.0f32);
+            let mut noise_r = 0.0f32;
+            let mut noise_g = 0.0f32;
+            let mut noise_b = 0.0f32;
             if noisy {
-                r = max(r + noise[out], 0.0f32);
-                g = max(g + noise[out + 1], 0.0f32);
-                b = max(b + noise[out + 2], 0.0f32);
+                noise_r = noise[out];
+                noise_g = noise[out + 1];
+                noise_b = noise[out + 2];
             }
-            colours[out] = r;
-            colours[out + 1] = g;
-            colours[out + 2] = b;
+            colours[out] = shown(r, noise_r);
+            colours[out + 1] = shown(g, noise_g);
+            colours[out + 2] = shown(b, noise_b);
+            originals[out] = shown(r_before, noise_r);
+            originals[out + 1] = shown(g_before, noise_g);
+            originals[out + 2] = shown(b_before, noise_b);
         }
     }
 }

@@ -31,7 +31,8 @@ impl GpuRasterizer {
         let background = [0.0; 3];
         let shown: Vec<Shown<'_>> = views.iter().map(|&view| Shown { view, background }).collect();
         let batch = self.batch(&shown)?;
-        let slots = self.slot_gradients(&batch, gradient)?;
+        let lights = self.lights(&batch)?;
+        let slots = self.slot_gradients(&batch, &lights, gradient)?;
         let sums = batch.groups.iter().zip(&slots).map(|(group, slots)| {
             let out = Buffer::empty(&self.client, 3 * group.colours());
             let (count, dim) = grid(group.most_visible(), group.views.len());

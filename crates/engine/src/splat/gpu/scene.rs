@@ -81,11 +81,11 @@ impl SceneOnDevice {
         3 * (self.learned_degree + 1) * (self.learned_degree + 1)
     }
 
-    /// Colours of the visible Gaussians of each group, `[colours][3]`, with offsets if `changed`. `noise` is added to those of
+    /// Colours of the visible Gaussians of each group, `[colours][3]`, with offsets and without. `noise` is added to those of
     /// each view of the batch that has any.
-    pub fn colours(&self, rasterizer: &GpuRasterizer, batch: &Batch, noise: &[&[f32]], changed: bool) -> Vec<Buffer> {
+    pub fn colours(&self, rasterizer: &GpuRasterizer, batch: &Batch, noise: &[&[f32]]) -> [Vec<Buffer>; 2] {
         let of_group = |group: &Group| {
-            let out = Buffer::empty(rasterizer.client(), 3 * group.colours());
+            let [out, originals] = [0; 2].map(|_| Buffer::empty(rasterizer.client(), 3 * group.colours()));
             let noise = noise_of(group, noise);
             let (noisy, noise) = (!noise.is_empty(), Buffer::of(rasterizer.client(), &noise));
             for chunk in &self.chunks {
@@ -102,15 +102,17 @@ impl SceneOnDevice {
                     chunk.offsets.argument(),
                     noise.argument(),
                     out.argument(),
+                    originals.argument(),
                     chunk.first_row,
                     self.degree,
-                    if changed { self.columns() } else { 0 },
+                    self.columns(),
                     noisy,
                 );
             }
-            out
+            (out, originals)
         };
-        batch.groups.iter().map(of_group).collect()
+        let (colours, originals) = batch.groups.iter().map(of_group).unzip();
+        [colours, originals]
     }
 
     /// What gradients to the slots of views ([`GpuRasterizer::slot_gradients`]) mean for what is learned: to the chunks'

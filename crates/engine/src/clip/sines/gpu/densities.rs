@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 
 use super::CHUNK;
 use crate::clip::sines::density::{CORNERS, GRID, LEAST};
+use crate::launch::{cube_of_layer, sum_of_cube};
 
 /// A channel's place on the grid of colours.
 #[cube]
@@ -54,13 +55,25 @@ pub fn chunk_counts(pictures: &[f32], counts: &mut [f32], pixels: u32, chunks: u
     }
 }
 
-/// A unit for each picture and pixel: its density to the power of minus `equalization`.
+/// A cube for each picture and chunk, a unit a pixel: its density to the power of minus `equalization`, and the chunk's sum of
+/// that.
 #[cube(launch)]
-pub fn rarities(pictures: &[f32], grid: &[f32], out: &mut [f32], pixels: u32, equalization: f32) {
-    let unit = ABSOLUTE_POS;
-    if unit < out.len() {
-        let view = unit / pixels as usize;
-        let at = view * 3 * pixels as usize + unit % pixels as usize;
+pub fn rarities(
+    pictures: &[f32],
+    grid: &[f32],
+    rarity: &mut [f32],
+    totals: &mut [f32],
+    pixels: u32,
+    chunks: u32,
+    equalization: f32,
+) {
+    let cube = cube_of_layer();
+    let view = cube / chunks as usize;
+    let pixel = cube % chunks as usize * CHUNK + UNIT_POS as usize;
+    let mut shared = Shared::<[f32]>::new_slice(CHUNK);
+    let mut found = 0.0f32;
+    if pixel < pixels as usize && cube < totals.len() {
+        let at = view * 3 * pixels as usize + pixel;
         let red = place(pictures[at]);
         let green = place(pictures[at + pixels as usize]);
         let blue = place(pictures[at + 2 * pixels as usize]);
@@ -73,37 +86,26 @@ pub fn rarities(pictures: &[f32], grid: &[f32], out: &mut [f32], pixels: u32, eq
             density +=
                 grid[view * GRID + (r * CORNERS + g) * CORNERS + b] * share(red, r) * share(green, g) * share(blue, b);
         }
-        out[unit] = f32::powf(max(density, 0.125f32), -equalization);
+        found = f32::powf(max(density, 0.125f32), -equalization);
+        rarity[view * pixels as usize + pixel] = found;
+    }
+    let sum = sum_of_cube(found, &mut shared);
+    if UNIT_POS == 0 && cube < totals.len() {
+        totals[cube] = sum;
     }
 }
 
-/// A unit for each picture and chunk: the sum of its pixels.
+/// A unit for each number of each picture: its sum over chunks, in order.
 #[cube(launch)]
-pub fn chunk_totals(values: &[f32], totals: &mut [f32], pixels: u32, chunks: u32) {
+pub fn sums_of_chunks(counts: &[f32], sums: &mut [f32], numbers: u32, chunks: u32) {
     let unit = ABSOLUTE_POS;
-    if unit < totals.len() {
-        let view = unit / chunks as usize;
-        let mut pixel = unit % chunks as usize * CHUNK;
-        let end = min(pixel + CHUNK, pixels as usize);
-        let mut sum = 0.0f32;
-        while pixel < end {
-            sum += values[view * pixels as usize + pixel];
-            pixel += 1;
-        }
-        totals[unit] = sum;
-    }
-}
-
-/// A unit for each picture and pixel: its share of the sum of all.
-#[cube(launch)]
-pub fn shares_of_all(values: &[f32], totals: &[f32], out: &mut [f32], pixels: u32, chunks: u32) {
-    let unit = ABSOLUTE_POS;
-    if unit < out.len() {
-        let view = unit / pixels as usize;
+    if unit < sums.len() {
+        let view = unit / numbers as usize;
+        let number = unit % numbers as usize;
         let mut sum = 0.0f32;
         for chunk in 0..chunks as usize {
-            sum += totals[view * chunks as usize + chunk];
+            sum += counts[(view * chunks as usize + chunk) * numbers as usize + number];
         }
-        out[unit] = values[unit] / sum;
+        sums[unit] = sum;
     }
 }

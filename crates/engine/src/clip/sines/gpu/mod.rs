@@ -2,22 +2,37 @@
 mod densities;
 mod waves;
 
-use burn::backend::ops::ModuleOps;
 use burn::backend::{Cube, TensorMetadata};
 use burn::tensor::Shape;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 
-use self::densities::{chunk_counts, chunk_totals, rarities, shares_of_all};
-use self::waves::{chunk_sums, mean_of_chunks, to_pixels};
+use self::densities::{chunk_counts, rarities, sums_of_chunks};
+use self::waves::{chunk_sums, means_of_chunks, means_of_squares, to_pixels};
 use super::density::{CORNERS, GRID};
 use super::{FloatTensor, MeanSines, WeightedSines};
-use crate::launch::{empty_tensor, grid_of};
+use crate::launch::{a_cube_each, empty_tensor, grid_of};
 
 /// Units of a cube.
 const CUBE: u32 = 64;
-/// Pixels that one unit adds up.
-const CHUNK: usize = 256;
+/// Pixels that one unit adds up, or one cube has a unit for.
+const CHUNK: usize = crate::launch::CUBE as usize;
+
+/// What the backward pass needs.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    squares: CubeTensor,
+    filters: CubeTensor,
+    phases: CubeTensor,
+    /// How rare the colour of each square is, `[views, squares]`; none where all weigh alike.
+    rarity: Option<CubeTensor>,
+    /// One over the sum of a view's weights, `[views]`.
+    shares: CubeTensor,
+    /// Of the pictures.
+    height: usize,
+    width: usize,
+    side: usize,
+}
 
 impl MeanSines for Cube {
     fn mean_sines(
@@ -27,151 +42,173 @@ impl MeanSines for Cube {
         side: usize,
         equalization: f32,
     ) -> FloatTensor<Self> {
-        let weights = Self::weights(pictures.clone(), side, equalization);
-        Self::sums(pictures, filters, phases, weights, side)
+        Self::means(pictures, filters, phases, side, equalization).0
     }
 }
 
 impl WeightedSines for Cube {
-    fn weights(pictures: FloatTensor<Self>, side: usize, equalization: f32) -> Option<FloatTensor<Self>> {
-        if equalization == 0.0 {
-            return None;
-        }
-        let pictures = into_contiguous(averaged(pictures, side));
-        let shape = pictures.shape();
-        let (views, pixels) = (shape[0], shape[2] * shape[3]);
-        let chunks = pixels.div_ceil(CHUNK);
-        let client = pictures.client.clone();
-        let new = |shape: &[usize]| empty_tensor(&pictures, Shape::from(shape.to_vec()));
-        let counts = new(&[views, chunks, GRID]);
-        let grid_of_colours = new(&[views, GRID]);
-        let rarity = new(&[views, pixels]);
-        let totals = new(&[views, chunks]);
-        let weights = new(&[views, pixels]);
-        let (pixels, chunks) = (pixels as u32, chunks as u32);
-        let arg = |tensor: &CubeTensor| tensor.clone().into_buffer_arg();
-        let (count, dim) = grid_of(counts.shape().num_elements() / CORNERS, 1, CUBE);
-        chunk_counts::launch(&client, count, dim, arg(&pictures), arg(&counts), pixels, chunks);
-        let (count, dim) = grid_of(views * GRID, 1, CUBE);
-        mean_of_chunks::launch(
-            &client,
-            count,
-            dim,
-            arg(&counts),
-            arg(&grid_of_colours),
-            GRID as u32,
-            chunks,
-            1.0,
-        );
-        let (count, dim) = grid_of(views * pixels as usize, 1, CUBE);
-        rarities::launch(
-            &client,
-            count,
-            dim,
-            arg(&pictures),
-            arg(&grid_of_colours),
-            arg(&rarity),
-            pixels,
-            equalization,
-        );
-        let (count, dim) = grid_of(views * chunks as usize, 1, CUBE);
-        chunk_totals::launch(&client, count, dim, arg(&rarity), arg(&totals), pixels, chunks);
-        let (count, dim) = grid_of(views * pixels as usize, 1, CUBE);
-        shares_of_all::launch(
-            &client,
-            count,
-            dim,
-            arg(&rarity),
-            arg(&totals),
-            arg(&weights),
-            pixels,
-            chunks,
-        );
-        Some(weights)
-    }
+    type Kept = Kept;
 
-    fn sums(
+    fn means(
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
         side: usize,
-    ) -> FloatTensor<Self> {
-        let [pictures, filters, phases] = [averaged(pictures, side), filters, phases].map(into_contiguous);
-        let weighted = weights.is_some();
-        // Without weights nothing of the buffer is read.
-        let weights = weights.map_or_else(|| phases.clone(), into_contiguous);
+        equalization: f32,
+    ) -> (FloatTensor<Self>, Kept) {
+        let [pictures, filters, phases] = [pictures, filters, phases].map(into_contiguous);
         let shape = pictures.shape();
-        let (views, waves) = (shape[0], phases.shape()[0]);
-        let pixels = shape[2] * shape[3];
+        let (views, height, width) = (shape[0], shape[2], shape[3]);
+        let squares = averaged(pictures, side);
+        let (pixels, waves) = ((height / side) * (width / side), phases.shape()[0]);
         let chunks = pixels.div_ceil(CHUNK);
-        let client = pictures.client.clone();
-        let sums = empty_tensor(&pictures, Shape::new([views, chunks, waves]));
-        let means = empty_tensor(&pictures, Shape::new([views, waves]));
+        let rare = (equalization != 0.0).then(|| rarity(&squares, equalization));
+        let client = squares.client.clone();
+        let new = |shape: &[usize]| empty_tensor(&squares, Shape::from(shape.to_vec()));
+        let (sums, means, shares) = (new(&[views, chunks, waves]), new(&[views, waves]), new(&[views]));
+        // Without weights nothing of these buffers is read.
+        let [rarity, totals] = match &rare {
+            Some([rarity, totals]) => [rarity, totals],
+            None => [&phases; 2],
+        };
         let (count, dim) = grid_of(views * chunks * waves, 1, CUBE);
         chunk_sums::launch(
             &client,
             count,
             dim,
-            pictures.into_buffer_arg(),
-            filters.into_buffer_arg(),
-            phases.into_buffer_arg(),
-            weights.into_buffer_arg(),
-            sums.clone().into_buffer_arg(),
+            argument(&squares),
+            argument(&filters),
+            argument(&phases),
+            argument(rarity),
+            argument(&sums),
             pixels as u32,
             chunks as u32,
-            weighted,
+            rare.is_some(),
         );
         let (count, dim) = grid_of(views * waves, 1, CUBE);
-        let scale = if weighted { 1.0 } else { 1.0 / pixels as f32 };
-        let (sums, out) = (sums.into_buffer_arg(), means.clone().into_buffer_arg());
-        mean_of_chunks::launch(&client, count, dim, sums, out, waves as u32, chunks as u32, scale);
-        means
-    }
-
-    fn sums_backward(
-        pictures: FloatTensor<Self>,
-        filters: FloatTensor<Self>,
-        phases: FloatTensor<Self>,
-        weights: Option<FloatTensor<Self>>,
-        gradient: FloatTensor<Self>,
-        side: usize,
-    ) -> FloatTensor<Self> {
-        let all = pictures.clone();
-        let tensors = [averaged(pictures, side), filters, phases, gradient];
-        let [pictures, filters, phases, gradient] = tensors.map(into_contiguous);
-        let weighted = weights.is_some();
-        let weights = weights.map_or_else(|| phases.clone(), into_contiguous);
-        let shape = pictures.shape();
-        let pixels = shape[2] * shape[3];
-        let client = pictures.client.clone();
-        let out = empty_tensor(&pictures, shape.clone());
-        let (count, dim) = grid_of(shape[0] * pixels, 1, CUBE);
-        to_pixels::launch(
+        means_of_chunks::launch(
             &client,
             count,
             dim,
-            pictures.into_buffer_arg(),
-            filters.into_buffer_arg(),
-            phases.into_buffer_arg(),
-            weights.into_buffer_arg(),
-            gradient.into_buffer_arg(),
-            out.clone().into_buffer_arg(),
+            argument(&sums),
+            argument(totals),
+            argument(&means),
+            argument(&shares),
+            waves as u32,
             pixels as u32,
-            1.0 / pixels as f32,
-            weighted,
+            chunks as u32,
+            rare.is_some(),
         );
-        match side {
-            1 => out,
-            n => Self::avg_pool2d_backward(all, out, [n; 2], [n; 2], [0; 2], true, false),
-        }
+        let kept = Kept {
+            squares,
+            filters,
+            phases,
+            rarity: rare.map(|[rarity, _]| rarity),
+            shares,
+            height,
+            width,
+            side,
+        };
+        (means, kept)
     }
+
+    fn means_backward(kept: Kept, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+        let gradient = into_contiguous(gradient);
+        let (views, pixels) = (
+            kept.squares.shape()[0],
+            (kept.height / kept.side) * (kept.width / kept.side),
+        );
+        let out = empty_tensor(&kept.squares, Shape::new([views, 3, kept.height, kept.width]));
+        let (count, dim) = grid_of(views * pixels, 1, CUBE);
+        to_pixels::launch(
+            &kept.squares.client,
+            count,
+            dim,
+            argument(&kept.squares),
+            argument(&kept.filters),
+            argument(&kept.phases),
+            argument(kept.rarity.as_ref().unwrap_or(&kept.phases)),
+            argument(&kept.shares),
+            argument(&gradient),
+            argument(&out),
+            kept.width as u32,
+            kept.height as u32,
+            kept.side as u32,
+            kept.rarity.is_some(),
+        );
+        out
+    }
+}
+
+/// How rare the colours of pixels are, `[views, pixels]`, and the sum of that over chunks, `[views, chunks]`.
+fn rarity(pictures: &CubeTensor, equalization: f32) -> [CubeTensor; 2] {
+    let shape = pictures.shape();
+    let (views, pixels) = (shape[0], shape[2] * shape[3]);
+    let chunks = pixels.div_ceil(CHUNK);
+    let client = &pictures.client;
+    let new = |shape: &[usize]| empty_tensor(pictures, Shape::from(shape.to_vec()));
+    let counts = new(&[views, chunks, GRID]);
+    let grid_of_colours = new(&[views, GRID]);
+    let (rarity, totals) = (new(&[views, pixels]), new(&[views, chunks]));
+    let (count, dim) = grid_of(views * chunks * GRID / CORNERS, 1, CUBE);
+    let (pixels, in_chunks) = (pixels as u32, chunks as u32);
+    chunk_counts::launch(
+        client,
+        count,
+        dim,
+        argument(pictures),
+        argument(&counts),
+        pixels,
+        in_chunks,
+    );
+    let (count, dim) = grid_of(views * GRID, 1, CUBE);
+    sums_of_chunks::launch(
+        client,
+        count,
+        dim,
+        argument(&counts),
+        argument(&grid_of_colours),
+        GRID as u32,
+        in_chunks,
+    );
+    let (count, dim) = a_cube_each(views * chunks);
+    rarities::launch(
+        client,
+        count,
+        dim,
+        argument(pictures),
+        argument(&grid_of_colours),
+        argument(&rarity),
+        argument(&totals),
+        pixels,
+        in_chunks,
+        equalization,
+    );
+    [rarity, totals]
 }
 
 /// Means of squares of pictures.
 fn averaged(pictures: CubeTensor, side: usize) -> CubeTensor {
-    match side {
-        1 => pictures,
-        n => Cube::avg_pool2d(pictures, [n; 2], [n; 2], [0; 2], true, false),
+    if side == 1 {
+        return pictures;
     }
+    let shape = pictures.shape();
+    let (height, width) = (shape[2], shape[3]);
+    let out = empty_tensor(&pictures, Shape::new([shape[0], shape[1], height / side, width / side]));
+    let (count, dim) = grid_of(out.shape().num_elements(), 1, CUBE);
+    means_of_squares::launch(
+        &pictures.client,
+        count,
+        dim,
+        argument(&pictures),
+        argument(&out),
+        width as u32,
+        height as u32,
+        side as u32,
+    );
+    out
+}
+
+fn argument(tensor: &CubeTensor) -> cubecl::prelude::BufferArg {
+    tensor.clone().into_buffer_arg()
 }

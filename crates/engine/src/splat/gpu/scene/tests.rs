@@ -67,18 +67,22 @@ fn a_scene_on_a_card_is_drawn_and_differentiated_as_on_the_cpu() {
         learnable: &learnable,
         values: &offsets,
     };
-    let mut colours = sh::colours_of_views(&g.sh, Some(changes), &prepared);
-    for (colour, noise) in colours[2].iter_mut().zip(&noise) {
-        *colour = (*colour + noise).max(0.0);
-    }
-    let drawings: Vec<Drawing<'_>> = (0..3)
-        .map(|i| Drawing {
+    let [colours, before] = [Some(changes), None].map(|changes| {
+        let mut colours = sh::colours_of_views(&g.sh, changes, &prepared);
+        for (colour, noise) in colours[2].iter_mut().zip(&noise) {
+            *colour = (*colour + noise).max(0.0);
+        }
+        colours
+    });
+    let [drawings, unmarked] = [&colours, &before].map(|colours| {
+        let drawing = |i: usize| Drawing {
             view: &views[i],
             colours: &colours[i],
             background: BACKGROUNDS[i],
-        })
-        .collect();
-    let pictures = CpuRasterizer.render_all(&drawings).unwrap();
+        };
+        (0..3).map(drawing).collect::<Vec<Drawing<'_>>>()
+    });
+    let [pictures, unmarked] = [&drawings, &unmarked].map(|drawings| CpuRasterizer.render_all(drawings).unwrap());
     // Some gradient: the pictures themselves.
     let gradients = CpuRasterizer.backward_all(&prepared, &pictures).unwrap();
     let of_views: Vec<sh::ColourGradient<'_>> = (0..3)
@@ -104,26 +108,21 @@ fn a_scene_on_a_card_is_drawn_and_differentiated_as_on_the_cpu() {
             (if split { 3 } else { 1 }, split)
         );
         let of_noise: [&[f32]; 3] = [&[], &[], &noise];
-        let colours = on_device.colours(&rasterizer, &all, &of_noise, true);
-        let drawn = unbatch(rasterizer.composite(&all, &colours).unwrap()).unwrap();
-        for (found, want) in drawn.iter().zip(&pictures) {
+        let [colours, originals] = on_device.colours(&rasterizer, &all, &of_noise);
+        let drawn = rasterizer.composite_both(&all, &colours, &originals).unwrap();
+        for (found, want) in unbatch(drawn.pictures).unwrap().iter().zip(&pictures) {
             close(&found.pixels, &want.pixels, "pictures");
         }
+        for (found, want) in unbatch(drawn.originals).unwrap().iter().zip(&unmarked) {
+            close(&found.pixels, &want.pixels, "unmarked pictures");
+        }
         let of_pictures = batch(&pictures.iter().collect::<Vec<&Picture>>(), &device).unwrap();
-        let slots = rasterizer.slot_gradients(&all, of_pictures).unwrap();
+        let slots = rasterizer.slot_gradients(&all, &drawn.lights, of_pictures).unwrap();
         on_device.differentiate(&rasterizer, &all, &colours, &slots);
         let mut found = Vec::new();
         on_device
             .read(&rasterizer, |chunk| &chunk.gradient, &mut found)
             .unwrap();
         close(&found, &gradient, "gradient");
-        // Without the changes.
-        let plain = on_device.colours(&rasterizer, &all, &[], false);
-        let plain: Vec<f32> = rasterizer.read(&plain).unwrap().concat();
-        close(
-            &plain,
-            &sh::colours_of_views(&g.sh, None, &prepared).concat(),
-            "colours",
-        );
     }
 }

@@ -1,0 +1,133 @@
+use super::*;
+use crate::testing::wgpu;
+use burn::tensor::{Device, TensorData};
+
+/// Numbers between -1 and 1.
+fn numbers(count: usize, seed: usize) -> Vec<f32> {
+    (0..count)
+        .map(|i| ((i * 37 + seed * 11) % 83) as f32 / 41.0 - 1.0)
+        .collect()
+}
+
+fn tensor<const D: usize>(values: &[f32], shape: [usize; D], device: &Device) -> Tensor<D> {
+    Tensor::from_data(TensorData::new(values.to_vec(), shape), device)
+}
+
+/// What `operation` makes of `x`, and the gradient to it for some gradient to that, on a card and by burn's tensors on the CPU.
+fn agree<const D: usize, const E: usize>(
+    x: &[f32],
+    shape: [usize; D],
+    card: impl Fn(Tensor<D>, &Device) -> Tensor<E>,
+    plain: impl Fn(Tensor<D>, &Device) -> Tensor<E>,
+) {
+    let Some(compute) = wgpu() else { return };
+    let run = |device: Device, operation: &dyn Fn(Tensor<D>, &Device) -> Tensor<E>| {
+        let device = device.autodiff();
+        let input = tensor(x, shape, &device).require_grad();
+        let out = operation(input.clone(), &device);
+        let weights = numbers(out.shape().num_elements(), 5);
+        let weights = tensor::<E>(&weights, out.dims(), &device);
+        let gradients = (out.clone() * weights).sum().backward();
+        [
+            out.into_data().iter::<f32>().collect::<Vec<f32>>(),
+            input
+                .grad(&gradients)
+                .unwrap()
+                .into_data()
+                .iter::<f32>()
+                .collect::<Vec<f32>>(),
+        ]
+    };
+    let found = run(compute.device, &card);
+    let want = run(Device::flex(), &plain);
+    for (found, want) in found.iter().zip(&want) {
+        assert_eq!(found.len(), want.len());
+        let largest = want.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
+        let off = found.iter().zip(want).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(largest > 0.0 && off < 1e-5 * largest, "{off} of {largest}");
+    }
+}
+
+#[test]
+fn it_is_known_which_device_is_a_card() {
+    assert!(!on_card(&tensor(&[1.0], [1], &Device::flex())));
+    assert!(!on_card(&tensor(&[1.0], [1], &Device::flex().autodiff())));
+    if let Some(compute) = wgpu() {
+        assert!(on_card(&tensor(&[1.0], [1], &compute.device)));
+        assert!(on_card(&tensor(&[1.0], [1], &compute.device.autodiff())));
+    }
+}
+
+#[test]
+fn affine_maps_are_those_of_tensors() {
+    for (rows, width, columns) in [(1, 3, 2), (8, 768, 40), (5, 33, 300)] {
+        let weights = numbers(width * columns, 1);
+        let (means, biases) = (numbers(width, 2), numbers(columns, 3));
+        for centred in [false, true] {
+            let parts = |device: &Device| {
+                let mean = centred.then(|| tensor(&means, [width], device));
+                let bias = (!centred).then(|| tensor(&biases, [columns], device));
+                (mean, tensor(&weights, [width, columns], device), bias)
+            };
+            agree(
+                &numbers(rows * width, 4),
+                [rows, width],
+                |x, device| {
+                    let (mean, weight, bias) = parts(device);
+                    affine(x, mean, weight, bias)
+                },
+                |x, device| match parts(device) {
+                    (Some(mean), weight, _) => (x - mean.unsqueeze()).matmul(weight),
+                    (_, weight, bias) => x.matmul(weight) + bias.unwrap().unsqueeze(),
+                },
+            );
+        }
+    }
+}
+
+#[test]
+fn unit_rows_are_those_of_tensors() {
+    for (rows, width) in [(1, 3), (8, 512), (300, 7)] {
+        agree(
+            &numbers(rows * width, 4),
+            [rows, width],
+            |x, _| unit_rows(x, 1e-24),
+            |x, _| {
+                let squares = x.clone().square().sum_dim(1);
+                x / squares.add_scalar(1e-24).sqrt()
+            },
+        );
+    }
+}
+
+#[test]
+fn standard_pictures_are_those_of_tensors() {
+    let (mean, deviation) = ([0.5, 0.4, 0.3], [0.25, 0.3, 0.2]);
+    agree(
+        &numbers(2 * 3 * 5 * 7, 4),
+        [2, 3, 5, 7],
+        |x, _| standardize(x, mean, deviation),
+        |x, device| {
+            let channels = |values: [f32; 3]| Tensor::<1>::from_floats(values, device).reshape([1, 3, 1, 1]);
+            (x - channels(mean)) / channels(deviation)
+        },
+    );
+}
+
+#[test]
+fn cross_entropy_is_that_of_tensors_also_for_logits_beyond_measure() {
+    let mut logits = numbers(8 * 64, 4);
+    logits.iter_mut().for_each(|logit| *logit *= 30.0);
+    (logits[0], logits[1], logits[2], logits[3]) = (400.0, -400.0, 0.0, 1e6);
+    let targets: Vec<f32> = (0..8 * 64).map(|i| (i / 2 % 2) as f32).collect();
+    for temperature in [1.0, 4.0] {
+        agree(
+            &logits,
+            [8, 64],
+            |x, device| cross_entropy(x, tensor(&targets, [8, 64], device), temperature),
+            |x, device| {
+                crate::message::bce_from_logits(x / temperature, tensor(&targets, [8, 64], device)) * temperature
+            },
+        );
+    }
+}
