@@ -95,7 +95,7 @@ impl Views {
         }
         let mut logits = Vec::with_capacity(self.images.len());
         for picture in pictures {
-            logits.push(read_rendered(engine, &picture)?);
+            logits.extend(read_rendered(engine, &[picture])?);
         }
         Ok(ViewReadings::Decided(PooledLogits::new(logits)?))
     }

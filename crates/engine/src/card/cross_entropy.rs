@@ -11,7 +11,7 @@ use crate::launch::{CUBE, empty_tensor, grid, sum_of_cube};
 
 const UNITS: usize = CUBE as usize;
 
-/// `temperature` times the mean of `softplus(z)` with `z` the softened logit, its sign turned where the target is 1, to `out`
+/// For logits `[rows][bits]` and targets `[bits]`: `temperature` times the mean of `softplus(z)` with `z` the softened logit, its sign turned where the target is 1, to `out`
 /// (`[1]`); its derivative by each logit to `slopes`.
 #[cube(launch)]
 fn mean_of_all(logits: &[f32], targets: &[f32], out: &mut [f32], slopes: &mut [f32], temperature: f32) {
@@ -21,7 +21,7 @@ fn mean_of_all(logits: &[f32], targets: &[f32], out: &mut [f32], slopes: &mut [f
     let mut sum = 0.0f32;
     let mut k = UNIT_POS as usize;
     while k < count {
-        let sign = 1.0f32 - 2.0f32 * targets[k];
+        let sign = 1.0f32 - 2.0f32 * targets[k % targets.len()];
         let z = sign * logits[k] / temperature;
         // Neither overflows nor cancels.
         let small = f32::exp(-f32::abs(z));

@@ -57,8 +57,8 @@ pub(crate) fn standardize(pictures: Tensor<4>, mean: [f32; 3], deviation: [f32; 
     Tensor::from_dispatch(Dispatch::standardized(pictures.into_dispatch(), mean, deviation))
 }
 
-/// `temperature` times the mean binary cross-entropy of `logits / temperature` (`[b, n]`) for targets of 0 and 1 that are
-/// constants: `[1]`.
+/// `temperature` times the mean binary cross-entropy of `logits / temperature` (`[b, n]`) for targets of 0 and 1, `[1, n]`,
+/// that are constants: `[1]`.
 pub(crate) fn cross_entropy(logits: Tensor<2>, targets: Tensor<2>, temperature: f32) -> Tensor<1> {
     let (logits, targets) = (logits.into_dispatch(), targets.into_dispatch());
     Tensor::from_dispatch(Dispatch::mean_cross_entropy(logits, targets, temperature))

@@ -119,14 +119,14 @@ fn cross_entropy_is_that_of_tensors_also_for_logits_beyond_measure() {
     let mut logits = numbers(8 * 64, 4);
     logits.iter_mut().for_each(|logit| *logit *= 30.0);
     (logits[0], logits[1], logits[2], logits[3]) = (400.0, -400.0, 0.0, 1e6);
-    let targets: Vec<f32> = (0..8 * 64).map(|i| (i / 2 % 2) as f32).collect();
+    let targets: Vec<f32> = (0..64).map(|i| (i / 2 % 2) as f32).collect();
     for temperature in [1.0, 4.0] {
         agree(
             &logits,
             [8, 64],
-            |x, device| cross_entropy(x, tensor(&targets, [8, 64], device), temperature),
+            |x, device| cross_entropy(x, tensor(&targets, [1, 64], device), temperature),
             |x, device| {
-                crate::message::bce_from_logits(x / temperature, tensor(&targets, [8, 64], device)) * temperature
+                crate::message::bce_from_logits(x / temperature, tensor(&targets, [1, 64], device)) * temperature
             },
         );
     }

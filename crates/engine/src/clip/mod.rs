@@ -70,7 +70,7 @@ impl Clip {
         Ok(Self {
             config,
             hash: file.sha256()?,
-            model: model.freeze(),
+            model: model.settled(),
         })
     }
 
@@ -88,7 +88,7 @@ impl Clip {
         Self {
             config,
             hash,
-            model: model.freeze(),
+            model: model.settled(),
         }
     }
 

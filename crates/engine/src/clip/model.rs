@@ -59,6 +59,18 @@ impl ClipModel {
     }
 }
 
+impl ClipModel {
+    /// Frozen, and made ready for use with the weights that it has.
+    pub fn settled(self) -> Self {
+        let mut model = self.freeze();
+        model.visual = model.visual.map(|tower| match tower {
+            ImageTower::RandomFourier(tower) => ImageTower::RandomFourier(tower.settled()),
+            other => other,
+        });
+        model
+    }
+}
+
 impl ImageTower {
     fn new(config: &ClipConfig, device: &Device) -> Self {
         let (vision, embed_dim) = (&config.vision, config.embed_dim);

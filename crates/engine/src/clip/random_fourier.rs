@@ -25,6 +25,16 @@ use std::ops::Range;
 pub struct RandomFourierEncoder {
     scales: Vec<Scale>,
     proj: Linear,
+    /// Of a tower whose weights stay as they are, so that they need not be put together at every use.
+    #[module(skip)]
+    waves: Option<Waves>,
+}
+
+/// Filters `[scales * filters, 3]` and phases `[scales * filters]` of all scales.
+#[derive(Clone, Debug)]
+struct Waves {
+    filters: Tensor<2>,
+    phases: Tensor<1>,
 }
 
 /// The filters of one scale.
@@ -69,13 +79,35 @@ impl RandomFourierEncoder {
         Self {
             scales: layout.scales.iter().map(scale).collect(),
             proj: LinearConfig::new(filters * layout.scales.len(), embed_dim).init(device),
+            waves: None,
+        }
+    }
+
+    /// Makes it ready for use with the weights that it has, which stay.
+    pub fn settled(mut self) -> Self {
+        self.waves = Some(self.gathered());
+        self
+    }
+
+    fn gathered(&self) -> Waves {
+        let filters = self.scales.iter().map(|scale| scale.weight.val().reshape([-1, 3])); // the kernel is one pixel
+        let phases = self.scales.iter().map(|scale| scale.bias.val());
+        Waves {
+            filters: Tensor::cat(filters.collect(), 0),
+            phases: Tensor::cat(phases.collect(), 0),
         }
     }
 
     /// Average responses `[batch, scales * filters]` of normalised pictures `[batch, 3, h, w]`.
     pub fn statistics(&self, pictures: &Tensor<4>) -> Tensor<2> {
-        let of_scale = |scale: &Scale| scale.statistics(pictures.clone());
-        Tensor::cat(self.scales.iter().map(of_scale).collect(), 1)
+        let alike = |scale: &Scale| scale.surround == 1 && scale.equalization == self.scales[0].equalization;
+        if !self.scales.iter().all(alike) {
+            let of_scale = |scale: &Scale| scale.statistics(pictures.clone());
+            return Tensor::cat(self.scales.iter().map(of_scale).collect(), 1);
+        }
+        let Waves { filters, phases } = self.waves.clone().unwrap_or_else(|| self.gathered());
+        let sides = self.scales.iter().map(|scale| scale.size).collect();
+        mean_sines(pictures.clone(), filters, phases, sides, self.scales[0].equalization)
     }
 
     /// Average responses `[batch, filters.len()]` of some filters of one scale.
@@ -109,6 +141,7 @@ impl RandomFourierEncoder {
             equalization: scale.equalization,
         };
         self.scales = self.scales.into_iter().zip(weights.zip(phases)).map(fill).collect();
+        self.waves = None;
         self
     }
 
@@ -129,7 +162,7 @@ impl Scale {
         let filters = weight.reshape([-1, 3]); // the kernel is one pixel
         let n = self.surround;
         if n == 1 {
-            return mean_sines(pictures, filters, phases, self.size, self.equalization);
+            return mean_sines(pictures, filters, phases, vec![self.size], self.equalization);
         }
         let x = match self.size {
             1 => pictures,
@@ -139,6 +172,7 @@ impl Scale {
             .with_stride([1; 2])
             .with_padding([n / 2; 2])
             .with_count_include_pad(false);
-        mean_sines(x.clone() - avg_pool2d(x, inside), filters, phases, 1, self.equalization)
+        let apart = x.clone() - avg_pool2d(x, inside);
+        mean_sines(apart, filters, phases, vec![1], self.equalization)
     }
 }

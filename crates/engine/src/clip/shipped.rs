@@ -1,7 +1,6 @@
 //! The CLIPs that are part of the program: the one that new keys read with, and those of before, whose marks are read for ever. `docs/clip.md` tells how they came about.
 use super::{Clip, ClipConfig, ClipModel, Parts, TensorFile, weights_path};
 use crate::error::{Error, Result};
-use burn::module::Module;
 use burn::tensor::Device;
 use std::path::Path;
 
@@ -82,7 +81,7 @@ impl ShippedClip {
         Ok(Clip {
             config,
             hash: self.hash()?,
-            model: model.freeze(),
+            model: model.settled(),
         })
     }
 

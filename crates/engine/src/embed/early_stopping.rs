@@ -9,8 +9,7 @@ use crate::extract::{Engine, PooledLogits, default_size, read_rendered, stands_f
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::quality::{Psnr, mean_psnr, psnr};
-use crate::scene::Gaussians;
-use crate::splat::{Changes, Geometry};
+use crate::splat::Geometry;
 use crate::view::{Camera, Split, ViewSampler};
 
 /// Held-out views, prepared once, and how many checks in a row were passed. A clone has the same views.
@@ -51,17 +50,19 @@ impl EarlyStopping {
         step.is_multiple_of(self.stop.every)
     }
 
-    /// Reads the views as they are with `changes`; the second value says whether to stop.
+    /// The views that are looked at.
+    pub fn views(&self) -> Arc<Vec<PooledView>> {
+        self.views.clone()
+    }
+
+    /// Reads pictures of the views as they are now; the second value says whether to stop.
     pub fn check(
         &mut self,
         engine: &Engine,
-        gaussians: &Gaussians,
-        changes: Changes<'_>,
+        pictures: &[Picture],
         message: &Message,
         step: usize,
     ) -> Result<(Check, bool)> {
-        let colours = PooledView::colours(&self.views, &gaussians.sh, Some(changes));
-        let pictures = PooledView::draw_all(engine, &self.views, &colours)?;
         let pictures: Vec<Picture> = pictures.iter().map(Picture::to_8_bit).collect();
         let psnrs = self
             .views
@@ -69,8 +70,7 @@ impl EarlyStopping {
             .zip(&pictures)
             .map(|(view, picture)| psnr(&view.reference, picture))
             .collect::<Result<Vec<Psnr>>>()?;
-        let logits = pictures.iter().map(|picture| read_rendered(engine, picture));
-        let reading = PooledLogits::new(logits.collect::<Result<_>>()?)?;
+        let reading = PooledLogits::new(read_rendered(engine, &pictures)?)?;
         let code = &engine.message_code;
         let check = Check {
             step,

@@ -24,8 +24,8 @@ pub(super) struct Loss<'a> {
     settings: Settings,
     image_augmentation: ImageAugmentation,
     message: Message,
-    /// The bits of its word.
-    targets: Vec<f32>,
+    /// The bits of its word, `[1, bits]`.
+    targets: Tensor<2>,
 }
 
 /// The loss of a batch of views.
@@ -40,14 +40,13 @@ pub(super) struct Evaluated {
 
 /// What is computed of a batch as a graph.
 struct Graph {
-    total: Tensor<1>,
     lpips: Option<Tensor<1>>,
     message: Tensor<1>,
     logits: Tensor<2>,
 }
 
 impl Graph {
-    /// All numbers but `total`, the logits last.
+    /// All numbers, the logits last.
     fn numbers(&self) -> Vec<Tensor<1>> {
         let logits = self.logits.clone().flatten(0, 1);
         let terms = self.lpips.iter().chain([&self.message, &logits]);
@@ -59,11 +58,13 @@ impl<'a> Loss<'a> {
     /// # Errors
     /// A message that is not of the key's length.
     pub fn new(engine: &'a Engine, settings: &Settings, message: &Message) -> Result<Self> {
+        let targets: Vec<f32> = engine.message_code.word(message)?.targets().collect();
+        let shape = [1, targets.len()];
         Ok(Self {
             engine,
             settings: *settings,
             image_augmentation: ImageAugmentation::new(settings, engine),
-            targets: engine.message_code.word(message)?.targets().collect(),
+            targets: Tensor::from_data(TensorData::new(targets, shape), &engine.compute.device),
             message: *message,
         })
     }
@@ -90,11 +91,11 @@ impl<'a> Loss<'a> {
         let pairs: Vec<(&Picture, &Picture)> = references.iter().copied().zip(pictures.iter().copied()).collect();
         let (likeness, likeness_gradients) = likeness_with_gradient(&pairs, self.likeness_weights(factors));
         let original = || batch(references, device);
-        let graph = self.graph(step, leaf.clone().clamp(0.0, 1.0), original, factors, rng)?;
+        let graph = self.graph(step, leaf.clone().clamp(0.0, 1.0), original, rng)?;
         let numbers = self.engine.to_host(Tensor::cat(graph.numbers(), 0))?;
         let evaluated = self.evaluated(step, &numbers, mean_terms(&likeness), mean_psnr(references, pictures))?;
 
-        let gradient = self.gradient(&graph.total, &leaf)?;
+        let gradient = self.gradient(&self.total(&graph, factors), &leaf)?;
         let mut gradients = unbatch(gradient)?;
         gradients
             .par_iter_mut()
@@ -125,10 +126,15 @@ impl<'a> Loss<'a> {
         let weights = self.likeness_weights(factors);
         let likeness = LikenessOnDevice::new(originals.clone(), pictures, weights)?;
         let leaf = Tensor::from_inner(likeness.clamped.clone()).require_grad();
-        let graph = self.graph(step, leaf.clone(), || Ok(originals), factors, rng)?;
+        let graph = self.graph(step, leaf.clone(), || Ok(originals), rng)?;
         let mut numbers = vec![likeness.means.clone().flatten(0, 1)];
         numbers.extend(graph.numbers());
-        let gradient = likeness.gradient_with(self.gradient(&graph.total, &leaf)?)?;
+        // Where it is the only term its weight takes no launch.
+        let (total, times) = match graph.lpips {
+            Some(_) => (self.total(&graph, factors), 1.0),
+            None => (graph.message, self.settings.lambda.message),
+        };
+        let gradient = likeness.gradient_with(self.gradient(&total, &leaf)?, times)?;
         Ok((gradient, numbers))
     }
 
@@ -162,12 +168,9 @@ impl<'a> Loss<'a> {
         step: usize,
         marked: Tensor<4>,
         original: impl FnOnce() -> Result<Tensor<4>>,
-        factors: LossWeightFactors,
         rng: &mut ChaCha8Rng,
     ) -> Result<Graph> {
         let lambda = &self.settings.lambda;
-        let weight = lambda.reconstruction * factors.reconstruction;
-        let views = marked.dims()[0];
         let lpips = if lambda.lpips > 0.0 { self.engine.lpips()? } else { None };
         let lpips = match lpips {
             Some(lpips) => {
@@ -178,24 +181,23 @@ impl<'a> Loss<'a> {
         };
         let seen = self.settings.augmentation.apply(marked, rng);
         let logits = self.image_augmentation.logits(self.engine, seen, rng)?;
-        let bits = self.targets.len();
-        let targets = TensorData::new(self.targets.repeat(views), [views, bits]);
-        let targets = Tensor::<2>::from_data(targets, &self.engine.compute.device);
-        let (targets, temperature) = (Tensor::from_inner(targets), lambda.temperature);
+        let (targets, temperature) = (Tensor::from_inner(self.targets.clone()), lambda.temperature);
         let message = match on_card(&logits) {
             true => cross_entropy(logits.clone(), targets, temperature),
             false => bce_from_logits(logits.clone() / temperature, targets) * temperature,
         };
-        let mut total = message.clone() * lambda.message;
-        if let Some(distance) = &lpips {
-            total = total + distance.clone() * (lambda.lpips * weight);
+        Ok(Graph { lpips, message, logits })
+    }
+
+    /// The weighted sum of a graph's terms.
+    fn total(&self, graph: &Graph, factors: LossWeightFactors) -> Tensor<1> {
+        let lambda = &self.settings.lambda;
+        let weight = lambda.reconstruction * factors.reconstruction;
+        let total = graph.message.clone() * lambda.message;
+        match &graph.lpips {
+            Some(distance) => total + distance.clone() * (lambda.lpips * weight),
+            None => total,
         }
-        Ok(Graph {
-            total,
-            lpips,
-            message,
-            logits,
-        })
     }
 
     /// The gradient to the pictures, which are the graph's leaf.
@@ -223,7 +225,7 @@ impl<'a> Loss<'a> {
         };
         check_finite(step, &terms)?;
         let logits: Vec<f32> = numbers.collect();
-        let views: Vec<&[f32]> = logits.chunks_exact(self.targets.len()).collect();
+        let views: Vec<&[f32]> = logits.chunks_exact(self.engine.bits).collect();
         let code = &self.engine.message_code;
         let wrong = views.par_iter().map(|view| code.wrong_bits(view, &self.message));
         let wrong: u32 = wrong.collect::<guardsplat_codeword::Result<Vec<u32>>>()?.iter().sum();

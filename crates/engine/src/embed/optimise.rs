@@ -14,7 +14,7 @@ use super::view_pool::ViewPool;
 use crate::error::{Error, Result};
 use crate::extract::Engine;
 use crate::message::Message;
-use crate::scene::{Gaussians, Scene};
+use crate::scene::Scene;
 use crate::splat::Geometry;
 use crate::view::{Camera, ViewSampler};
 
@@ -132,7 +132,7 @@ pub fn optimise_together(
                     false => Ok(()),
                 };
                 let progress = &mut |event| progress(place, event);
-                one.step(engine, gaussians, &views, meanwhile, progress)?;
+                one.step(engine, &views, meanwhile, progress)?;
             }
         }
         Ok::<_, Error>(())
@@ -171,7 +171,6 @@ impl Watched<'_> {
     fn step(
         &mut self,
         engine: &Engine,
-        gaussians: &Gaussians,
         views: &[Arc<PooledView>],
         meanwhile: impl FnOnce() -> Result<()>,
         progress: &mut dyn FnMut(Progress),
@@ -184,9 +183,8 @@ impl Watched<'_> {
             meanwhile,
         )?));
         if let Some(held_out) = self.held_out.as_mut().filter(|held_out| held_out.due(self.steps)) {
-            self.run.fetch()?;
-            let changes = self.run.changes();
-            let (check, enough) = held_out.check(engine, gaussians, changes, self.message, self.steps)?;
+            let pictures = self.run.pictures(&held_out.views())?;
+            let (check, enough) = held_out.check(engine, &pictures, self.message, self.steps)?;
             self.run.heed(&check);
             self.enough = enough;
             progress(Progress::Check(check));

@@ -12,6 +12,8 @@ use crate::splat::Geometry;
 /// Steps that are prepared at a time. One is not enough where there are many cores: parts of a view's preparation follow
 /// one another.
 const STEPS: usize = 2;
+/// The same where a card computes the steps: it needs views faster, and the cores have nothing else to do.
+const STEPS_FOR_A_CARD: usize = 4;
 
 /// Threads that prepare views, of the nearest step first.
 pub(super) struct Preparing<'scope, 'env> {
@@ -36,7 +38,8 @@ impl<'scope, 'env: 'scope> Preparing<'scope, 'env> {
         steps: usize,
         upcoming: impl Fn(usize) -> Upcoming,
     ) {
-        while self.running.len() < steps.min(STEPS) {
+        let at_once = if engine.on_cpu() { STEPS } else { STEPS_FOR_A_CARD };
+        while self.running.len() < steps.min(at_once) {
             let (upcoming, geometry) = (upcoming(self.running.len()), geometry.clone());
             let running = self.scope.spawn(move || upcoming.prepare(engine, &geometry));
             self.running.push_back(running);

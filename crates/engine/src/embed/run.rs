@@ -1,4 +1,5 @@
 //! The run of one message: one step after the other, on the host or on a card, with views that it is given.
+use std::borrow::Borrow;
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -21,7 +22,7 @@ use crate::extract::Engine;
 use crate::message::Message;
 use crate::picture::Picture;
 use crate::scene::Scene;
-use crate::splat::{Changes, Learnable, PreparedView, sh};
+use crate::splat::{Learnable, PreparedView, sh};
 
 /// dB that held-out views may lack of the target without more steps: to hold them takes bits.
 const SHORT_DB: f64 = 1.5;
@@ -124,9 +125,17 @@ impl<'a> Run<'a> {
         self.steps
     }
 
-    /// The changes that pictures of the written file will show, as [`Run::fetch`] brought them.
-    pub fn changes(&self) -> Changes<'_> {
-        self.learned.changes()
+    /// Pictures of views of one size as the written file will show them.
+    ///
+    /// # Errors
+    /// Those of the renderer; [`Error::Stopped`](crate::Error::Stopped).
+    pub fn pictures<V: Borrow<PooledView>>(&self, views: &[V]) -> Result<Vec<Picture>> {
+        if let (Some(on_device), Some(rasterizer)) = (&self.on_device, self.engine.rasterizer()?.on_device()) {
+            self.engine.stop.check()?;
+            return on_device.pictures(rasterizer, views);
+        }
+        let colours = PooledView::colours(views, &self.scene.gaussians.sh, Some(self.learned.changes()));
+        PooledView::draw_all(self.engine, views, &colours)
     }
 
     /// What was learned.

@@ -69,17 +69,25 @@ impl HeldOutView {
         })
     }
 
-    fn look(&self, engine: &Engine, original: &Geometry<'_>, marked: &Geometry<'_>) -> Result<Seen> {
-        let [before, on_black] =
-            [[1.0; 3], [0.0; 3]].map(|background| engine.drawn(original, &self.original, background));
-        let before = before?;
-        let read = engine.drawn(marked, &self.averaged, [1.0; 3])?;
-        Ok(Seen {
-            covered: covered(&before, &on_black?)?,
-            after: engine.drawn(marked, &self.marked, [1.0; 3])?,
-            read: read_rendered(engine, &read)?,
-            before,
-        })
+    fn look(views: &[Self], engine: &Engine, original: &Geometry<'_>, marked: &Geometry<'_>) -> Result<Vec<Seen>> {
+        let [white, black] = [[1.0; 3], [0.0; 3]];
+        let of = |part: fn(&Self) -> &PreparedView| views.iter().map(part).collect::<Vec<_>>();
+        let originals = of(|view| &view.original);
+        let before = engine.drawn(original, &originals, white)?;
+        let on_black = engine.drawn(original, &originals, black)?;
+        let after = engine.drawn(marked, &of(|view| &view.marked), white)?;
+        let averaged = engine.drawn(marked, &of(|view| &view.averaged), white)?;
+        let read = read_rendered(engine, &averaged)?;
+        let pictures = before.into_iter().zip(on_black).zip(after.into_iter().zip(read));
+        let seen = |((before, on_black), (after, read)): ((Picture, Picture), (Picture, Vec<f32>))| {
+            Ok(Seen {
+                covered: covered(&before, &on_black)?,
+                after,
+                read,
+                before,
+            })
+        };
+        pictures.map(seen).collect()
     }
 }
 
@@ -111,7 +119,7 @@ pub fn verify(
             let camera = sampler.camera(Split::HeldOut, index as u64, size);
             HeldOutView::prepare(&original, &marked, &camera)
         },
-        |view| view.look(engine, &original, &marked),
+        |views| HeldOutView::look(views, engine, &original, &marked),
         |index, seen| {
             logits.push(seen.read);
             of_covered.extend(psnr_covered(&seen.before, &seen.after, &seen.covered)?);

@@ -1,4 +1,5 @@
 //! The parts that embedding and extraction share: device, what reads messages from pictures, and the renderer.
+use std::borrow::Borrow;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -218,25 +219,33 @@ impl Engine {
     ///
     /// # Errors
     /// Those of [`Engine::read_logits`].
-    pub(super) fn read_logits_at(&self, side: usize, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
+    pub(super) fn read_logits_at<P: Borrow<Picture> + Sync>(
+        &self,
+        side: usize,
+        pictures: &[P],
+    ) -> Result<Vec<Vec<f32>>> {
         self.read_with(pictures, Some(side), |pictures| self.logits_at(side, pictures))
     }
 
     /// Logits of pictures, which are made `side` pixels wide and high first if that is given.
-    fn read_with(
+    fn read_with<P: Borrow<Picture> + Sync>(
         &self,
-        pictures: &[Picture],
+        pictures: &[P],
         side: Option<usize>,
         read: impl Fn(Tensor<4>) -> Result<Tensor<2>> + Send + Sync,
     ) -> Result<Vec<Vec<f32>>> {
+        let pictures: Vec<&Picture> = pictures.iter().map(Borrow::borrow).collect();
         let alike = pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height));
-        let chunks: Vec<&[Picture]> = alike.flat_map(|alike| alike.chunks(READ_BATCH)).collect();
-        let rows = |chunk: &&[Picture]| {
+        let chunks: Vec<&[&Picture]> = alike.flat_map(|alike| alike.chunks(READ_BATCH)).collect();
+        let rows = |chunk: &&[&Picture]| {
             let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
                 Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
                 None => Vec::new(),
             };
-            let chunk: Vec<&Picture> = if made.is_empty() { *chunk } else { &made }.iter().collect();
+            let chunk: Vec<&Picture> = match made.is_empty() {
+                true => chunk.to_vec(),
+                false => made.iter().collect(),
+            };
             let logits = self.to_host(read(batch(&chunk, &self.compute.device)?)?)?;
             Ok(logits.chunks_exact(self.bits).map(<[f32]>::to_vec).collect::<Vec<_>>())
         };
@@ -318,7 +327,7 @@ impl Engine {
     ) -> Result<Picture> {
         self.stop.check()?;
         let view = geometry.prepare_averaged(camera, times, WeightCache::None)?;
-        self.drawn(geometry, &view, background)
+        Ok(self.drawn(geometry, &[&view], background)?.swap_remove(0))
     }
 
     /// [`Engine::picture`] of one view over each of some backgrounds.

@@ -90,9 +90,10 @@ pub fn read_scene(
             let camera = sampler.camera(Split::HeldOut, index as u64, size);
             geometry.prepare_averaged(&camera, stands_for(size), WeightCache::None)
         },
-        |view| {
-            let picture = engine.drawn(&geometry, &view, background)?;
-            Ok((read_rendered(engine, &picture)?, picture))
+        |views| {
+            let pictures = engine.drawn(&geometry, &views.iter().collect::<Vec<_>>(), background)?;
+            let read = read_rendered(engine, &pictures)?;
+            Ok(read.into_iter().zip(pictures).collect())
         },
         |index, (read, picture)| {
             logits.push(read);

@@ -3,6 +3,8 @@
 //! A tower that averages sines of colours over pixels sees a surface through the grid that its picture was made small with.
 //! Another grid mixes other neighbours into a pixel. What the mixtures add to a reading differs from grid to grid, and the
 //! mark is the same in all of them.
+use std::borrow::Cow;
+
 use super::{Engine, Extractor};
 use crate::error::Result;
 use crate::picture::Picture;
@@ -33,6 +35,26 @@ pub(super) fn read_at_sizes(engine: &Engine, picture: &Picture) -> Result<Vec<f3
     };
     let sides = engine.sides(shorter_side(picture));
     Ok(mean(&sides.into_iter().map(read).collect::<Result<Vec<_>>>()?))
+}
+
+/// [`read_at_sizes`] of each of some pictures. A card is given those of one size together.
+///
+/// # Errors
+/// Those of [`read_at_sizes`].
+pub(super) fn read_all_at_sizes(engine: &Engine, pictures: &[Cow<'_, Picture>]) -> Result<Vec<Vec<f32>>> {
+    if engine.on_cpu() {
+        return engine.each(pictures, |picture| read_at_sizes(engine, picture));
+    }
+    let mut logits = Vec::with_capacity(pictures.len());
+    for alike in pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
+        let alike: Vec<&Picture> = alike.iter().map(AsRef::as_ref).collect();
+        let sides = engine.sides(shorter_side(alike[0]));
+        let at_sides = sides.into_iter().map(|side| engine.read_logits_at(side, &alike));
+        let at_sides: Vec<Vec<Vec<f32>>> = at_sides.collect::<Result<_>>()?;
+        let of_picture = |index: usize| at_sides.iter().map(|read| read[index].clone()).collect::<Vec<_>>();
+        logits.extend((0..alike.len()).map(|index| mean(&of_picture(index))));
+    }
+    Ok(logits)
 }
 
 /// Pixels along the shorter side of a picture.

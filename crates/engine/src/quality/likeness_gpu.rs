@@ -18,9 +18,14 @@ use crate::launch::{Buffer, CUBE, a_cube_each, cube_of_layer, empty_tensor, grid
 
 const UNITS: usize = CUBE as usize;
 
+/// The weight of a tap of the window.
+fn tap_weight(tap: usize) -> f32 {
+    weight(tap.abs_diff(RADIUS)) as f32
+}
+
 /// Averages along rows of x, y, x squared, y squared and x y: `across` is `[5][planes][height][width]`.
 #[cube(launch)]
-fn moments_along_rows(x: &[f32], y: &[f32], taps: &[f32], across: &mut [f32], width: u32) {
+fn moments_along_rows(x: &[f32], y: &[f32], across: &mut [f32], width: u32) {
     let at = ABSOLUTE_POS;
     let count = x.len();
     if at < count {
@@ -31,13 +36,14 @@ fn moments_along_rows(x: &[f32], y: &[f32], taps: &[f32], across: &mut [f32], wi
         let mut xx = 0.0f32;
         let mut yy = 0.0f32;
         let mut xy = 0.0f32;
-        for tap in 0..2 * RADIUS + 1 {
+        #[unroll]
+        for tap in 0..comptime!(2 * RADIUS + 1) {
             // The window's part beyond the border counts as zeros.
             if column + tap >= RADIUS && column + tap < width + RADIUS {
                 let near = at + tap - RADIUS;
                 let a = f32::clamp(x[near], 0.0f32, 1.0f32);
                 let b = f32::clamp(y[near], 0.0f32, 1.0f32);
-                let share = taps[tap];
+                let share = comptime!(tap_weight(tap));
                 mx += share * a;
                 my += share * b;
                 xx += share * a * a;
@@ -56,7 +62,7 @@ fn moments_along_rows(x: &[f32], y: &[f32], taps: &[f32], across: &mut [f32], wi
 /// SSIM of each pixel to the first part of `values` (`[3][planes][height][width]`), and its derivatives by the window's means
 /// of y, of y squared and of x y: `slopes`, of the same shape.
 #[cube(launch)]
-fn similarity(across: &[f32], taps: &[f32], values: &mut [f32], slopes: &mut [f32], width: u32, height: u32) {
+fn similarity(across: &[f32], values: &mut [f32], slopes: &mut [f32], width: u32, height: u32) {
     let at = ABSOLUTE_POS;
     let count = values.len() / 3;
     if at < count {
@@ -68,10 +74,11 @@ fn similarity(across: &[f32], taps: &[f32], values: &mut [f32], slopes: &mut [f3
         let mut xx = 0.0f32;
         let mut yy = 0.0f32;
         let mut xy = 0.0f32;
-        for tap in 0..2 * RADIUS + 1 {
+        #[unroll]
+        for tap in 0..comptime!(2 * RADIUS + 1) {
             if row + tap >= RADIUS && row + tap < height + RADIUS {
                 let near = at + tap * width - RADIUS * width;
-                let share = taps[tap];
+                let share = comptime!(tap_weight(tap));
                 x += share * across[near];
                 y += share * across[count + near];
                 xx += share * across[2 * count + near];
@@ -96,15 +103,16 @@ fn similarity(across: &[f32], taps: &[f32], values: &mut [f32], slopes: &mut [f3
 
 /// Averages along rows of three planes for each of `slopes`.
 #[cube(launch)]
-fn slopes_along_rows(slopes: &[f32], taps: &[f32], across: &mut [f32], width: u32) {
+fn slopes_along_rows(slopes: &[f32], across: &mut [f32], width: u32) {
     let at = ABSOLUTE_POS;
     if at < slopes.len() {
         let width = width as usize;
         let column = at % width;
         let mut sum = 0.0f32;
-        for tap in 0..2 * RADIUS + 1 {
+        #[unroll]
+        for tap in 0..comptime!(2 * RADIUS + 1) {
             if column + tap >= RADIUS && column + tap < width + RADIUS {
-                sum += taps[tap] * slopes[at + tap - RADIUS];
+                sum += comptime!(tap_weight(tap)) * slopes[at + tap - RADIUS];
             }
         }
         across[at] = sum;
@@ -118,7 +126,6 @@ fn to_marked(
     x: &[f32],
     y: &[f32],
     across: &[f32],
-    taps: &[f32],
     values: &mut [f32],
     gradient: &mut [f32],
     clamped: &mut [f32],
@@ -137,10 +144,11 @@ fn to_marked(
         let mut by_mean = 0.0f32;
         let mut by_square = 0.0f32;
         let mut by_product = 0.0f32;
-        for tap in 0..2 * RADIUS + 1 {
+        #[unroll]
+        for tap in 0..comptime!(2 * RADIUS + 1) {
             if row + tap >= RADIUS && row + tap < height + RADIUS {
                 let near = at + tap * width - RADIUS * width;
-                let share = taps[tap];
+                let share = comptime!(tap_weight(tap));
                 by_mean += share * across[near];
                 by_square += share * across[count + near];
                 by_product += share * across[2 * count + near];
@@ -168,12 +176,12 @@ fn to_marked(
     }
 }
 
-/// Adds a gradient to clamped values to that of values.
+/// Adds `times` a gradient to clamped values to that of values.
 #[cube(launch)]
-fn add_to_marked(y: &[f32], of_clamped: &[f32], likeness: &[f32], gradient: &mut [f32]) {
+fn add_to_marked(y: &[f32], of_clamped: &[f32], likeness: &[f32], gradient: &mut [f32], times: f32) {
     let at = ABSOLUTE_POS;
     if at < y.len() {
-        let mut more = of_clamped[at];
+        let mut more = times * of_clamped[at];
         if y[at] < 0.0f32 || y[at] > 1.0f32 {
             more = 0.0f32;
         }
@@ -220,10 +228,6 @@ impl LikenessOnDevice {
         let count = views * channels * height * width;
         let [x, y] = [primitive(original)?, primitive(marked)?];
         let client = y.client.clone();
-        let taps: Vec<f32> = (0..2 * RADIUS + 1)
-            .map(|tap| weight(tap.abs_diff(RADIUS)) as f32)
-            .collect();
-        let taps = Buffer::of(&client, &taps);
         let parts = [5, 3, 3, 1, 1];
         let [across, values, slopes, gradient, clamped] = parts.map(|parts| Buffer::empty(&client, parts * count));
         let (w, h) = (width as u32, height as u32);
@@ -232,26 +236,15 @@ impl LikenessOnDevice {
 
         let [of_x, of_y] = pictures();
         let (cubes, dim) = grid(count, 1);
-        let [taps_of, moments] = [&taps, &across].map(Buffer::argument);
-        moments_along_rows::launch(&client, cubes, dim, of_x, of_y, taps_of, moments, w);
+        moments_along_rows::launch(&client, cubes, dim, of_x, of_y, across.argument(), w);
         let (cubes, dim) = grid(count, 1);
         let [of_across, of_values, of_slopes] = [&across, &values, &slopes].map(Buffer::argument);
-        similarity::launch(
-            &client,
-            cubes,
-            dim,
-            of_across,
-            taps.argument(),
-            of_values,
-            of_slopes,
-            w,
-            h,
-        );
+        similarity::launch(&client, cubes, dim, of_across, of_values, of_slopes, w, h);
         // Averages of slopes take the place of those of pictures.
         let across = across.first(3 * count);
         let (cubes, dim) = grid(3 * count, 1);
         let [of_slopes, of_across] = [&slopes, &across].map(Buffer::argument);
-        slopes_along_rows::launch(&client, cubes, dim, of_slopes, taps.argument(), of_across, w);
+        slopes_along_rows::launch(&client, cubes, dim, of_slopes, of_across, w);
         let [of_x, of_y] = pictures();
         let (cubes, dim) = grid(count, 1);
         to_marked::launch(
@@ -261,7 +254,6 @@ impl LikenessOnDevice {
             of_x,
             of_y,
             across.argument(),
-            taps.argument(),
             values.argument(),
             gradient.argument(),
             clamped.argument(),
@@ -292,18 +284,18 @@ impl LikenessOnDevice {
         })
     }
 
-    /// The gradient to the marked pictures of the weighted terms, and of what has the gradient `more` to
+    /// The gradient to the marked pictures of the weighted terms, and of `times` what has the gradient `more` to
     /// [`LikenessOnDevice::clamped`].
     ///
     /// # Errors
     /// One that is not on a card.
-    pub fn gradient_with(&self, more: Tensor<4>) -> Result<Tensor<4>> {
+    pub fn gradient_with(&self, more: Tensor<4>, times: f32) -> Result<Tensor<4>> {
         let more = primitive(more)?;
         let out = empty_tensor(&self.marked, self.marked.shape());
         let (cubes, dim) = grid(out.shape().num_elements(), 1);
         let [y, more, likeness, gradient] =
             [&self.marked, &more, &self.gradient, &out].map(|tensor| tensor.clone().into_buffer_arg());
-        add_to_marked::launch(&self.marked.client, cubes, dim, y, more, likeness, gradient);
+        add_to_marked::launch(&self.marked.client, cubes, dim, y, more, likeness, gradient, times);
         Ok(Tensor::from_primitive::<Cube>(out))
     }
 }
@@ -366,7 +358,7 @@ mod tests {
             assert!((f64::from(means[2 + view]) - want.l1).abs() < 1e-5);
             assert!(means[4 + view] > 0.0);
         }
-        let found = [ones.clone() * 0.0, ones].map(|more| unbatch(found.gradient_with(more).unwrap()).unwrap());
+        let found = [0.0, 1.0].map(|times| unbatch(found.gradient_with(ones.clone(), times).unwrap()).unwrap());
         let beyond = |value: f32| !(0.0..=1.0).contains(&value);
         for ((without, with), picture) in found[0].iter().zip(&found[1]).zip(y) {
             for ((without, with), value) in without.pixels.iter().zip(&with.pixels).zip(&picture.pixels) {

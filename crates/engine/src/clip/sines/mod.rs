@@ -28,19 +28,19 @@ use burn::tensor::Tensor;
 /// 2 pi in two parts, for the GPU: multiples of the first by less than 2^15 are exact.
 const TURN: [f32; 2] = [6.281_25, 1.935_307_2e-3];
 
-/// Mean sines `[b, n]` of pictures `[b, 3, h, w]`, averaged over squares of `side` pixels first, for filters `[n, 3]` and
-/// phases `[n]`. A pixel weighs its colour's density to the power of minus `equalization`, from 0 to 1, and at 0 all weigh
+/// Mean sines `[b, n]` of pictures `[b, 3, h, w]`, for filters `[n, 3]` and phases `[n]`: as many of each scale, of which each
+/// averages over squares of so many pixels first. A pixel weighs its colour's density to the power of minus `equalization`, from 0 to 1, and at 0 all weigh
 /// alike. Differentiable in the pictures; filters, phases and weights are constants. Good to 1e-5 for arguments of some
 /// hundreds of radians.
 pub(super) fn mean_sines(
     pictures: Tensor<4>,
     filters: Tensor<2>,
     phases: Tensor<1>,
-    side: usize,
+    sides: Vec<usize>,
     equalization: f32,
 ) -> Tensor<2> {
     let (filters, phases) = (filters.into_dispatch(), phases.into_dispatch());
-    let means = Dispatch::mean_sines(pictures.into_dispatch(), filters, phases, side, equalization);
+    let means = Dispatch::mean_sines(pictures.into_dispatch(), filters, phases, sides, equalization);
     Tensor::from_dispatch(means)
 }
 
@@ -51,7 +51,7 @@ trait MeanSines: Backend {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        side: usize,
+        sides: Vec<usize>,
         equalization: f32,
     ) -> FloatTensor<Self>;
 }
@@ -66,7 +66,7 @@ trait WeightedSines: Backend {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        side: usize,
+        sides: Vec<usize>,
         equalization: f32,
     ) -> (FloatTensor<Self>, Self::Kept);
 
@@ -96,13 +96,13 @@ impl<B: WeightedSines + MeanSines, C: CheckpointStrategy> MeanSines for Autodiff
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        side: usize,
+        sides: Vec<usize>,
         equalization: f32,
     ) -> FloatTensor<Self> {
         let (pictures, node) = pictures.into_parts();
         let (filters, _) = filters.into_parts();
         let (phases, _) = phases.into_parts();
-        let (out, kept) = B::means(pictures, filters, phases, side, equalization);
+        let (out, kept) = B::means(pictures, filters, phases, sides, equalization);
         match ToPictures.prepare::<C>([node]).compute_bound().stateful() {
             OpsKind::Tracked(graph) => graph.finish(kept, out),
             OpsKind::UnTracked(graph) => graph.finish(out),

@@ -44,7 +44,7 @@ fn computed(case: &Case, device: &Device) -> [Vec<f32>; 2] {
     let filters = Tensor::<2>::from_data(tensor(&case.filters, vec![waves, 3]), &device);
     let phases = Tensor::<1>::from_data(tensor(&case.phases, vec![waves]), &device);
     let gradient = Tensor::<2>::from_data(tensor(&case.gradient, vec![views, waves]), &device);
-    let means = mean_sines(pictures.clone(), filters, phases, case.side, case.equalization);
+    let means = mean_sines(pictures.clone(), filters, phases, vec![case.side], case.equalization);
     let found = (means.clone() * gradient).sum().backward();
     let numbers = |data: TensorData| data.iter::<f32>().collect();
     [
@@ -154,6 +154,59 @@ fn the_cpu_agrees_with_the_formula() {
 fn wgpu_agrees_with_the_formula() {
     if let Some(compute) = wgpu() {
         agrees(&compute.device);
+    }
+}
+
+/// Several scales at once are those of each by itself; the gradient is the sum of theirs.
+fn scales_are_put_together(device: &Device, exactly: bool) {
+    let all = case([2, 47, 53, 12], 23.0, 1);
+    let sides = [1, 4, 2];
+    let one = |scale: usize| Case {
+        side: sides[scale],
+        equalization: 0.2,
+        sizes: [2, 47, 53, 4],
+        pictures: all.pictures.clone(),
+        filters: all.filters[12 * scale..12 * (scale + 1)].to_vec(),
+        phases: all.phases[4 * scale..4 * (scale + 1)].to_vec(),
+        gradient: [0, 1].map(|view| &all.gradient[12 * view + 4 * scale..][..4]).concat(),
+    };
+    let alone = [0, 1, 2].map(|scale| computed(&one(scale), device));
+    let autodiff = device.clone().autodiff();
+    let tensor = |values: &[f32], shape: Vec<usize>| TensorData::new(values.to_vec(), shape);
+    let pictures = Tensor::<4>::from_data(tensor(&all.pictures, vec![2, 3, 47, 53]), &autodiff).require_grad();
+    let filters = Tensor::<2>::from_data(tensor(&all.filters, vec![12, 3]), &autodiff);
+    let phases = Tensor::<1>::from_data(tensor(&all.phases, vec![12]), &autodiff);
+    let gradient = Tensor::<2>::from_data(tensor(&all.gradient, vec![2, 12]), &autodiff);
+    let means = mean_sines(pictures.clone(), filters, phases, sides.to_vec(), 0.2);
+    let found = (means.clone() * gradient).sum().backward();
+    let means: Vec<f32> = means.into_data().iter::<f32>().collect();
+    for (at, mean) in means.iter().enumerate() {
+        let (view, wave) = (at / 12, at % 12);
+        assert_eq!(*mean, alone[wave / 4][0][4 * view + wave % 4]);
+    }
+    let to_pictures: Vec<f32> = pictures.grad(&found).unwrap().into_data().iter::<f32>().collect();
+    for (at, found) in to_pictures.iter().enumerate() {
+        let sum = alone[2][1][at] + alone[1][1][at] + alone[0][1][at];
+        assert!(
+            if exactly {
+                *found == sum
+            } else {
+                (found - sum).abs() < 1e-6
+            },
+            "{at}: {found} {sum}"
+        );
+    }
+}
+
+#[test]
+fn scales_are_put_together_on_the_cpu() {
+    scales_are_put_together(&Device::flex(), true);
+}
+
+#[test]
+fn scales_are_put_together_on_wgpu() {
+    if let Some(compute) = wgpu() {
+        scales_are_put_together(&compute.device, false);
     }
 }
 

@@ -3,6 +3,7 @@
 mod kernels;
 mod optimizer;
 
+use std::borrow::Borrow;
 use std::sync::Arc;
 
 use rand_chacha::ChaCha8Rng;
@@ -15,6 +16,8 @@ use super::pooled_view::PooledView;
 use super::run::OptimizerState;
 use crate::error::Result;
 use crate::launch::Buffer;
+use crate::picture::Picture;
+use crate::quality::unbatch;
 use crate::scene::Scene;
 use crate::splat::{GpuRasterizer, Learnable, SceneOnDevice, Shown};
 
@@ -100,6 +103,18 @@ impl OnDevice {
             views: views.len(),
             options,
         })
+    }
+
+    /// Pictures of views of one size with the offsets as they are. Waits for them.
+    ///
+    /// # Errors
+    /// Those of [`OnDevice::launch`].
+    pub fn pictures<V: Borrow<PooledView>>(&self, rasterizer: &GpuRasterizer, views: &[V]) -> Result<Vec<Picture>> {
+        let shown: Vec<Shown<'_>> = views.iter().map(|view| view.borrow().shown()).collect();
+        let noise: Vec<&[f32]> = views.iter().map(|view| view.borrow().noise()).collect();
+        let batch = rasterizer.batch(&shown)?;
+        let [colours, _] = self.scene.colours(rasterizer, &batch, &noise);
+        unbatch(rasterizer.composite(&batch, &colours)?)
     }
 
     /// Waits for a step: its loss, with the offset penalty where offsets are moved here.

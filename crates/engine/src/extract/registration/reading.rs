@@ -62,7 +62,7 @@ impl Original<'_> {
             height: camera.height,
             pixels: (0..seen.len()).flat_map(pixel).collect(),
         };
-        read_rendered(self.engine, &compared)
+        Ok(read_rendered(self.engine, &[compared])?.swap_remove(0))
     }
 }
 

@@ -26,7 +26,7 @@ use std::borrow::Cow;
 
 use super::Engine;
 use super::photometric::ground;
-use super::sizes::read_at_sizes;
+use super::sizes::{read_all_at_sizes, read_at_sizes};
 use crate::error::Result;
 use crate::picture::Picture;
 use smooth_ground::SmoothGround;
@@ -60,17 +60,20 @@ pub(super) fn read_restored(engine: &Engine, restored: &Picture) -> Result<Vec<f
     read_at_sizes(engine, picture)
 }
 
-/// Logits of a view that the engine rendered: as [`read_given`], but for noise. A render has none, and what is taken for it
-/// would be the texture of the scene.
+/// Logits of each of some views that the engine rendered: as [`read_given`], but for noise. A render has none, and what is taken
+/// for it would be the texture of the scene.
 ///
 /// # Errors
 /// Those of [`read_given`].
-pub fn read_rendered(engine: &Engine, picture: &Picture) -> Result<Vec<f32>> {
-    let restored = match engine.extractor.reads_exact_colours() {
-        true => without_plain_areas(Cow::Borrowed(picture)),
-        false => Cow::Borrowed(picture),
-    };
-    read_at_sizes(engine, &restored)
+pub fn read_rendered(engine: &Engine, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
+    let pictures: Vec<Cow<'_, Picture>> = pictures.iter().map(Cow::Borrowed).collect();
+    let restored = engine.each(&pictures, |picture| {
+        Ok(match engine.extractor.reads_exact_colours() {
+            true => without_plain_areas(picture.clone()),
+            false => picture.clone(),
+        })
+    })?;
+    read_all_at_sizes(engine, &restored)
 }
 
 /// A picture as it is read.

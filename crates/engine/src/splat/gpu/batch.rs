@@ -182,27 +182,15 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
             let mut at = 0;
             for parts in uploaded.chunks(PARTS) {
                 let longest = parts.iter().map(|part| part.len).max().unwrap_or(0);
-                let places: Vec<u32> = parts
-                    .iter()
-                    .map(|part| {
-                        at += part.len;
-                        (at - part.len) as u32
-                    })
-                    .collect();
+                let mut places = [0; PARTS];
+                for (place, part) in places.iter_mut().zip(parts) {
+                    *place = at as u32;
+                    at += part.len;
+                }
                 let (count, dim) = grid(longest, parts.len());
                 let part = |k: usize| parts[k.min(parts.len() - 1)].argument();
-                let places = Buffer::of(client, &places);
-                append::launch(
-                    client,
-                    count,
-                    dim,
-                    part(0),
-                    part(1),
-                    part(2),
-                    part(3),
-                    places.argument(),
-                    words.argument(),
-                );
+                let all = [0, 1, 2, 3].map(part);
+                append_parts(client, count, dim, all, &words, places);
             }
             words
         }
@@ -219,6 +207,31 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
         tile_columns: tiles.columns,
         tile_rows: tiles.rows,
     }
+}
+
+/// Launches the copying of some parts.
+fn append_parts(
+    client: &Client,
+    count: CubeCount,
+    dim: CubeDim,
+    [first, second, third, fourth]: [BufferArg; PARTS],
+    words: &Buffer,
+    [at_first, at_second, at_third, at_fourth]: [u32; PARTS],
+) {
+    append::launch(
+        client,
+        count,
+        dim,
+        first,
+        second,
+        third,
+        fourth,
+        words.argument(),
+        at_first,
+        at_second,
+        at_third,
+        at_fourth,
+    );
 }
 
 /// A view's row in the table.

@@ -29,25 +29,34 @@ pub(super) fn float_field(table: &[u32], view: usize, #[comptime] which: usize) 
     f32::reinterpret(table[view * FIELDS + which])
 }
 
-/// Copies up to [`PARTS`] parts to `words`, each from its place in `places` on: a part a layer of cubes.
+/// Copies up to [`PARTS`] parts to `words`, each from its place on: a part a layer of cubes.
 #[cube(launch)]
-pub fn append(first: &[u32], second: &[u32], third: &[u32], fourth: &[u32], places: &[u32], words: &mut [u32]) {
+pub fn append(
+    first: &[u32],
+    second: &[u32],
+    third: &[u32],
+    fourth: &[u32],
+    words: &mut [u32],
+    at_first: u32,
+    at_second: u32,
+    at_third: u32,
+    at_fourth: u32,
+) {
     let unit = unit_of_layer();
-    let at = places[CUBE_POS_Z as usize] as usize + unit;
     if CUBE_POS_Z == 0 {
         if unit < first.len() {
-            words[at] = first[unit];
+            words[at_first as usize + unit] = first[unit];
         }
     } else if CUBE_POS_Z == 1 {
         if unit < second.len() {
-            words[at] = second[unit];
+            words[at_second as usize + unit] = second[unit];
         }
     } else if CUBE_POS_Z == 2 {
         if unit < third.len() {
-            words[at] = third[unit];
+            words[at_third as usize + unit] = third[unit];
         }
     } else if unit < fourth.len() {
-        words[at] = fourth[unit];
+        words[at_fourth as usize + unit] = fourth[unit];
     }
 }
 

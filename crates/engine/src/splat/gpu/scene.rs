@@ -87,7 +87,12 @@ impl SceneOnDevice {
         let of_group = |group: &Group| {
             let [out, originals] = [0; 2].map(|_| Buffer::empty(rasterizer.client(), 3 * group.colours()));
             let noise = noise_of(group, noise);
-            let (noisy, noise) = (!noise.is_empty(), Buffer::of(rasterizer.client(), &noise));
+            let noisy = !noise.is_empty();
+            // What is not there is not read.
+            let noise = match noisy {
+                true => Buffer::of(rasterizer.client(), &noise),
+                false => group.table.clone(),
+            };
             for chunk in &self.chunks {
                 let (count, dim) = grid(group.most_visible(), group.views.len());
                 colours_of_rows::launch(

@@ -4,6 +4,7 @@
 use cubecl::prelude::*;
 
 use super::CHUNK;
+use super::layout::{Sides, chunks_of, place_of};
 use crate::clip::sines::density::{CORNERS, GRID, LEAST};
 use crate::launch::{cube_of_layer, sum_of_cube};
 
@@ -25,28 +26,34 @@ fn share(place: f32, corner: usize) -> f32 {
     max(1.0f32 - f32::abs(place - corner as f32), 0.0f32)
 }
 
-/// A unit for each picture, chunk of pixels and corner of red and green: what its corners of blue have of the chunk's pixels,
-/// `[views][chunks][GRID]`.
+/// A unit for each chunk of squares and corner of red and green: what its corners of blue have of the chunk, `[chunks][GRID]`.
 #[cube(launch)]
-pub fn chunk_counts(pictures: &[f32], counts: &mut [f32], pixels: u32, chunks: u32) {
+pub fn chunk_counts(
+    squares: &[f32],
+    counts: &mut [f32],
+    views: u32,
+    width: u32,
+    height: u32,
+    #[comptime] sides: Sides,
+) {
     let unit = ABSOLUTE_POS;
     if unit * CORNERS < counts.len() {
         let red = unit / CORNERS % CORNERS;
         let green = unit % CORNERS;
-        let chunk = unit / (CORNERS * CORNERS) % chunks as usize;
-        let picture = unit / (CORNERS * CORNERS) / chunks as usize * 3 * pixels as usize;
-        let mut pixel = chunk * CHUNK;
-        let end = min(pixel + CHUNK, pixels as usize);
+        let chunk = unit / (CORNERS * CORNERS);
+        let at = place_of(chunk, views as usize, width as usize, height as usize, sides, true);
+        let mut square = at.within * CHUNK;
+        let end = min(square + CHUNK, at.squares);
         let mut sums = Array::<f32>::new(CORNERS);
-        while pixel < end {
-            let at = picture + pixel;
-            let both = share(place(pictures[at]), red) * share(place(pictures[at + pixels as usize]), green);
-            let blue = place(pictures[at + 2 * pixels as usize]);
+        while square < end {
+            let first = 3 * at.first + square;
+            let both = share(place(squares[first]), red) * share(place(squares[first + at.squares]), green);
+            let blue = place(squares[first + 2 * at.squares]);
             #[unroll]
             for corner in 0..CORNERS {
                 sums[corner] += both * share(blue, corner);
             }
-            pixel += 1;
+            square += 1;
         }
         #[unroll]
         for corner in 0..CORNERS {
@@ -55,57 +62,76 @@ pub fn chunk_counts(pictures: &[f32], counts: &mut [f32], pixels: u32, chunks: u
     }
 }
 
-/// A cube for each picture and chunk, a unit a pixel: its density to the power of minus `equalization`, and the chunk's sum of
-/// that.
+/// A unit for each corner of each view and scale: the sum of its chunks, in order, `[scales][views][GRID]`.
 #[cube(launch)]
-pub fn rarities(
-    pictures: &[f32],
-    grid: &[f32],
-    rarity: &mut [f32],
-    totals: &mut [f32],
-    pixels: u32,
-    chunks: u32,
-    equalization: f32,
+pub fn sums_of_chunks(
+    counts: &[f32],
+    grids: &mut [f32],
+    views: u32,
+    width: u32,
+    height: u32,
+    #[comptime] sides: Sides,
 ) {
-    let cube = cube_of_layer();
-    let view = cube / chunks as usize;
-    let pixel = cube % chunks as usize * CHUNK + UNIT_POS as usize;
-    let mut shared = Shared::<[f32]>::new_slice(CHUNK);
-    let mut found = 0.0f32;
-    if pixel < pixels as usize && cube < totals.len() {
-        let at = view * 3 * pixels as usize + pixel;
-        let red = place(pictures[at]);
-        let green = place(pictures[at + pixels as usize]);
-        let blue = place(pictures[at + 2 * pixels as usize]);
-        let mut density = 0.0f32;
-        // All other corners have no share of it.
-        for corner in 0..8usize {
-            let r = below(red) + corner / 4;
-            let g = below(green) + corner / 2 % 2;
-            let b = below(blue) + corner % 2;
-            density +=
-                grid[view * GRID + (r * CORNERS + g) * CORNERS + b] * share(red, r) * share(green, g) * share(blue, b);
+    let unit = ABSOLUTE_POS;
+    if unit < grids.len() {
+        let views = views as usize;
+        let of_view = unit / GRID;
+        let (first, count, _) = chunks_of(
+            of_view / views,
+            of_view % views,
+            views,
+            width as usize,
+            height as usize,
+            sides,
+        );
+        let mut sum = 0.0f32;
+        for chunk in first..first + count {
+            sum += counts[chunk * GRID + unit % GRID];
         }
-        found = f32::powf(max(density, 0.125f32), -equalization);
-        rarity[view * pixels as usize + pixel] = found;
-    }
-    let sum = sum_of_cube(found, &mut shared);
-    if UNIT_POS == 0 && cube < totals.len() {
-        totals[cube] = sum;
+        grids[unit] = sum;
     }
 }
 
-/// A unit for each number of each picture: its sum over chunks, in order.
+/// A cube for each chunk, a unit a square: its density to the power of minus `equalization`, and the chunk's sum of that.
 #[cube(launch)]
-pub fn sums_of_chunks(counts: &[f32], sums: &mut [f32], numbers: u32, chunks: u32) {
-    let unit = ABSOLUTE_POS;
-    if unit < sums.len() {
-        let view = unit / numbers as usize;
-        let number = unit % numbers as usize;
-        let mut sum = 0.0f32;
-        for chunk in 0..chunks as usize {
-            sum += counts[(view * chunks as usize + chunk) * numbers as usize + number];
+pub fn rarities(
+    squares: &[f32],
+    grids: &[f32],
+    rarity: &mut [f32],
+    totals: &mut [f32],
+    views: u32,
+    width: u32,
+    height: u32,
+    equalization: f32,
+    #[comptime] sides: Sides,
+) {
+    let chunk = cube_of_layer();
+    let mut shared = Shared::<[f32]>::new_slice(CHUNK);
+    let mut found = 0.0f32;
+    if chunk < totals.len() {
+        let at = place_of(chunk, views as usize, width as usize, height as usize, sides, true);
+        let square = at.within * CHUNK + UNIT_POS as usize;
+        if square < at.squares {
+            let first = 3 * at.first + square;
+            let red = place(squares[first]);
+            let green = place(squares[first + at.squares]);
+            let blue = place(squares[first + 2 * at.squares]);
+            let grid = (at.scale * views as usize + at.view) * GRID;
+            let mut density = 0.0f32;
+            // All other corners have no share of it.
+            for corner in 0..8usize {
+                let r = below(red) + corner / 4;
+                let g = below(green) + corner / 2 % 2;
+                let b = below(blue) + corner % 2;
+                let has = grids[grid + (r * CORNERS + g) * CORNERS + b];
+                density += has * share(red, r) * share(green, g) * share(blue, b);
+            }
+            found = f32::powf(max(density, 0.125f32), -equalization);
+            rarity[at.first + square] = found;
         }
-        sums[unit] = sum;
+    }
+    let sum = sum_of_cube(found, &mut shared);
+    if UNIT_POS == 0 && chunk < totals.len() {
+        totals[chunk] = sum;
     }
 }

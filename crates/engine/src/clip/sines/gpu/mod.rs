@@ -1,5 +1,6 @@
 //! Mean sines on the GPU: CubeCL kernels on burn's buffers.
 mod densities;
+mod layout;
 mod waves;
 
 use burn::backend::{Cube, TensorMetadata};
@@ -8,30 +9,38 @@ use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 
 use self::densities::{chunk_counts, rarities, sums_of_chunks};
-use self::waves::{chunk_sums, means_of_chunks, means_of_squares, to_pixels};
+use self::layout::Sides;
+use self::waves::{chunk_sums, means_of_chunks, means_of_squares, to_pixels, to_squares};
 use super::density::{CORNERS, GRID};
 use super::{FloatTensor, MeanSines, WeightedSines};
 use crate::launch::{a_cube_each, empty_tensor, grid_of};
 
 /// Units of a cube.
 const CUBE: u32 = 64;
-/// Pixels that one unit adds up, or one cube has a unit for.
+/// Squares that one unit adds up, or one cube has a unit for.
 const CHUNK: usize = crate::launch::CUBE as usize;
+
+/// Pictures as squares at all scales.
+#[derive(Clone, Debug)]
+struct Squares {
+    /// As [`layout`] has them.
+    numbers: CubeTensor,
+    sides: Sides,
+    views: usize,
+    height: usize,
+    width: usize,
+}
 
 /// What the backward pass needs.
 #[derive(Clone, Debug)]
 pub(super) struct Kept {
-    squares: CubeTensor,
+    squares: Squares,
     filters: CubeTensor,
     phases: CubeTensor,
-    /// How rare the colour of each square is, `[views, squares]`; none where all weigh alike.
+    /// How rare the colour of each square is; none where all weigh alike.
     rarity: Option<CubeTensor>,
-    /// One over the sum of a view's weights, `[views]`.
+    /// One over the sum of weights, `[scales, views]`.
     shares: CubeTensor,
-    /// Of the pictures.
-    height: usize,
-    width: usize,
-    side: usize,
 }
 
 impl MeanSines for Cube {
@@ -39,10 +48,10 @@ impl MeanSines for Cube {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        side: usize,
+        sides: Vec<usize>,
         equalization: f32,
     ) -> FloatTensor<Self> {
-        Self::means(pictures, filters, phases, side, equalization).0
+        Self::means(pictures, filters, phases, sides, equalization).0
     }
 }
 
@@ -53,160 +62,210 @@ impl WeightedSines for Cube {
         pictures: FloatTensor<Self>,
         filters: FloatTensor<Self>,
         phases: FloatTensor<Self>,
-        side: usize,
+        sides: Vec<usize>,
         equalization: f32,
     ) -> (FloatTensor<Self>, Kept) {
-        let [pictures, filters, phases] = [pictures, filters, phases].map(into_contiguous);
-        let shape = pictures.shape();
-        let (views, height, width) = (shape[0], shape[2], shape[3]);
-        let squares = averaged(pictures, side);
-        let (pixels, waves) = ((height / side) * (width / side), phases.shape()[0]);
-        let chunks = pixels.div_ceil(CHUNK);
-        let rare = (equalization != 0.0).then(|| rarity(&squares, equalization));
-        let client = squares.client.clone();
-        let new = |shape: &[usize]| empty_tensor(&squares, Shape::from(shape.to_vec()));
-        let (sums, means, shares) = (new(&[views, chunks, waves]), new(&[views, waves]), new(&[views]));
+        let [filters, phases] = [filters, phases].map(into_contiguous);
+        let squares = Squares::of(into_contiguous(pictures), Sides::new(&sides));
+        let rare = (equalization != 0.0).then(|| squares.rarity(equalization));
+        let (waves, scales) = (phases.shape()[0], squares.sides.count);
+        let sums = squares.new(&[squares.chunks() * waves / scales]);
+        let (means, shares) = (
+            squares.new(&[squares.views, waves]),
+            squares.new(&[scales, squares.views]),
+        );
         // Without weights nothing of these buffers is read.
         let [rarity, totals] = match &rare {
             Some([rarity, totals]) => [rarity, totals],
             None => [&phases; 2],
         };
-        let (count, dim) = grid_of(views * chunks * waves, 1, CUBE);
+        let [views, height, width] = squares.sizes();
+        let client = &squares.numbers.client;
+        let (count, dim) = grid_of(sums.shape()[0], 1, CUBE);
         chunk_sums::launch(
-            &client,
+            client,
             count,
             dim,
-            argument(&squares),
+            argument(&squares.numbers),
             argument(&filters),
             argument(&phases),
             argument(rarity),
             argument(&sums),
-            pixels as u32,
-            chunks as u32,
+            views,
+            width,
+            height,
+            squares.sides,
             rare.is_some(),
         );
-        let (count, dim) = grid_of(views * waves, 1, CUBE);
+        let (count, dim) = grid_of(squares.views * waves, 1, CUBE);
         means_of_chunks::launch(
-            &client,
+            client,
             count,
             dim,
             argument(&sums),
             argument(totals),
             argument(&means),
             argument(&shares),
-            waves as u32,
-            pixels as u32,
-            chunks as u32,
+            views,
+            width,
+            height,
+            squares.sides,
             rare.is_some(),
         );
         let kept = Kept {
-            squares,
             filters,
             phases,
             rarity: rare.map(|[rarity, _]| rarity),
             shares,
-            height,
-            width,
-            side,
+            squares,
         };
         (means, kept)
     }
 
     fn means_backward(kept: Kept, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-        let gradient = into_contiguous(gradient);
-        let (views, pixels) = (
-            kept.squares.shape()[0],
-            (kept.height / kept.side) * (kept.width / kept.side),
-        );
-        let out = empty_tensor(&kept.squares, Shape::new([views, 3, kept.height, kept.width]));
-        let (count, dim) = grid_of(views * pixels, 1, CUBE);
-        to_pixels::launch(
-            &kept.squares.client,
+        let (squares, gradient) = (&kept.squares, into_contiguous(gradient));
+        let [views, height, width] = squares.sizes();
+        let client = &squares.numbers.client;
+        let of_squares = squares.new(&[squares.numbers.shape()[0]]);
+        let (count, dim) = grid_of(of_squares.shape()[0] / 3, 1, CUBE);
+        to_squares::launch(
+            client,
             count,
             dim,
-            argument(&kept.squares),
+            argument(&squares.numbers),
             argument(&kept.filters),
             argument(&kept.phases),
             argument(kept.rarity.as_ref().unwrap_or(&kept.phases)),
             argument(&kept.shares),
             argument(&gradient),
-            argument(&out),
-            kept.width as u32,
-            kept.height as u32,
-            kept.side as u32,
+            argument(&of_squares),
+            views,
+            width,
+            height,
+            squares.sides,
             kept.rarity.is_some(),
+        );
+        let out = squares.new(&[squares.views, 3, squares.height, squares.width]);
+        let (count, dim) = grid_of(out.shape().num_elements(), 1, CUBE);
+        to_pixels::launch(
+            client,
+            count,
+            dim,
+            argument(&of_squares),
+            argument(&out),
+            views,
+            width,
+            height,
+            squares.sides,
         );
         out
     }
 }
 
-/// How rare the colours of pixels are, `[views, pixels]`, and the sum of that over chunks, `[views, chunks]`.
-fn rarity(pictures: &CubeTensor, equalization: f32) -> [CubeTensor; 2] {
-    let shape = pictures.shape();
-    let (views, pixels) = (shape[0], shape[2] * shape[3]);
-    let chunks = pixels.div_ceil(CHUNK);
-    let client = &pictures.client;
-    let new = |shape: &[usize]| empty_tensor(pictures, Shape::from(shape.to_vec()));
-    let counts = new(&[views, chunks, GRID]);
-    let grid_of_colours = new(&[views, GRID]);
-    let (rarity, totals) = (new(&[views, pixels]), new(&[views, chunks]));
-    let (count, dim) = grid_of(views * chunks * GRID / CORNERS, 1, CUBE);
-    let (pixels, in_chunks) = (pixels as u32, chunks as u32);
-    chunk_counts::launch(
-        client,
-        count,
-        dim,
-        argument(pictures),
-        argument(&counts),
-        pixels,
-        in_chunks,
-    );
-    let (count, dim) = grid_of(views * GRID, 1, CUBE);
-    sums_of_chunks::launch(
-        client,
-        count,
-        dim,
-        argument(&counts),
-        argument(&grid_of_colours),
-        GRID as u32,
-        in_chunks,
-    );
-    let (count, dim) = a_cube_each(views * chunks);
-    rarities::launch(
-        client,
-        count,
-        dim,
-        argument(pictures),
-        argument(&grid_of_colours),
-        argument(&rarity),
-        argument(&totals),
-        pixels,
-        in_chunks,
-        equalization,
-    );
-    [rarity, totals]
-}
-
-/// Means of squares of pictures.
-fn averaged(pictures: CubeTensor, side: usize) -> CubeTensor {
-    if side == 1 {
-        return pictures;
+impl Squares {
+    fn of(pictures: CubeTensor, sides: Sides) -> Self {
+        let shape = pictures.shape();
+        let (views, height, width) = (shape[0], shape[2], shape[3]);
+        let len = 3 * views * sides.squares(height, width).sum::<usize>();
+        let of = |numbers| Self {
+            numbers,
+            sides,
+            views,
+            height,
+            width,
+        };
+        if sides == Sides::new(&[1]) {
+            let client = pictures.client.clone();
+            let (device, handle, dtype) = (pictures.device.clone(), pictures.handle.clone(), pictures.dtype);
+            return of(CubeTensor::new_contiguous(
+                client,
+                device,
+                Shape::new([len]),
+                handle,
+                dtype,
+            ));
+        }
+        let squares = of(empty_tensor(&pictures, Shape::new([len])));
+        let [views, height, width] = squares.sizes();
+        let (count, dim) = grid_of(len / 3, 1, CUBE);
+        means_of_squares::launch(
+            &pictures.client,
+            count,
+            dim,
+            argument(&pictures),
+            argument(&squares.numbers),
+            views,
+            width,
+            height,
+            sides,
+        );
+        squares
     }
-    let shape = pictures.shape();
-    let (height, width) = (shape[2], shape[3]);
-    let out = empty_tensor(&pictures, Shape::new([shape[0], shape[1], height / side, width / side]));
-    let (count, dim) = grid_of(out.shape().num_elements(), 1, CUBE);
-    means_of_squares::launch(
-        &pictures.client,
-        count,
-        dim,
-        argument(&pictures),
-        argument(&out),
-        width as u32,
-        height as u32,
-        side as u32,
-    );
-    out
+
+    /// How rare the colour of each square is, and the sum of that over each chunk.
+    fn rarity(&self, equalization: f32) -> [CubeTensor; 2] {
+        let chunks = self.chunks();
+        let counts = self.new(&[chunks, GRID]);
+        let grids = self.new(&[self.sides.count, self.views, GRID]);
+        let (rarity, totals) = (self.new(&[self.numbers.shape()[0] / 3]), self.new(&[chunks]));
+        let [views, height, width] = self.sizes();
+        let client = &self.numbers.client;
+        let (count, dim) = grid_of(chunks * GRID / CORNERS, 1, CUBE);
+        chunk_counts::launch(
+            client,
+            count,
+            dim,
+            argument(&self.numbers),
+            argument(&counts),
+            views,
+            width,
+            height,
+            self.sides,
+        );
+        let (count, dim) = grid_of(grids.shape().num_elements(), 1, CUBE);
+        sums_of_chunks::launch(
+            client,
+            count,
+            dim,
+            argument(&counts),
+            argument(&grids),
+            views,
+            width,
+            height,
+            self.sides,
+        );
+        let (count, dim) = a_cube_each(chunks);
+        rarities::launch(
+            client,
+            count,
+            dim,
+            argument(&self.numbers),
+            argument(&grids),
+            argument(&rarity),
+            argument(&totals),
+            views,
+            width,
+            height,
+            equalization,
+            self.sides,
+        );
+        [rarity, totals]
+    }
+
+    /// Chunks of all views and scales.
+    fn chunks(&self) -> usize {
+        let of_view = self.sides.squares(self.height, self.width);
+        self.views * of_view.map(|squares| squares.div_ceil(CHUNK)).sum::<usize>()
+    }
+
+    /// Views, height and width as kernels take them.
+    fn sizes(&self) -> [u32; 3] {
+        [self.views, self.height, self.width].map(|size| size as u32)
+    }
+
+    fn new(&self, shape: &[usize]) -> CubeTensor {
+        empty_tensor(&self.numbers, Shape::from(shape.to_vec()))
+    }
 }
 
 fn argument(tensor: &CubeTensor) -> cubecl::prelude::BufferArg {

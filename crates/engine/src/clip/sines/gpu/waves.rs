@@ -4,6 +4,7 @@
 use cubecl::prelude::*;
 
 use super::CHUNK;
+use super::layout::{Sides, chunks_of, place_of};
 use crate::clip::sines::TURN;
 use crate::clip::sines::kernel::SINE;
 
@@ -39,110 +40,124 @@ fn cosine(angle: f32) -> f32 {
     sine_of(on - f32::round(on))
 }
 
-/// A unit for each picture, chunk of pixels and wave: `sums` is `[views][chunks][waves]`. Rarities of pixels are
-/// `[views][pixels]`, and not read unless `weighted`.
+/// Means of squares of pixels at all scales, a unit a square: of `pictures` (`[views][3][height][width]`).
+#[cube(launch)]
+pub fn means_of_squares(
+    pictures: &[f32],
+    squares: &mut [f32],
+    views: u32,
+    width: u32,
+    height: u32,
+    #[comptime] sides: Sides,
+) {
+    let unit = ABSOLUTE_POS;
+    if 3 * unit < squares.len() {
+        let (width, height) = (width as usize, height as usize);
+        let at = place_of(unit, views as usize, width, height, sides, false);
+        let columns = width / at.side;
+        let corner = at.within / columns * at.side * width + at.within % columns * at.side;
+        let pixels = f32::cast_from((at.side * at.side) as u32);
+        for channel in 0..3usize {
+            let first = (at.view * 3 + channel) * width * height + corner;
+            let mut sum = 0.0f32;
+            for down in 0..at.side {
+                for along in 0..at.side {
+                    sum += pictures[first + down * width + along];
+                }
+            }
+            squares[3 * at.first + channel * at.squares + at.within] = sum / pixels;
+        }
+    }
+}
+
+/// A unit for each chunk of squares and wave of its scale: `sums` is `[chunks][waves]`, of `filters` (`[scales][waves][3]`) and
+/// `phases` (`[scales][waves]`). Rarities of squares weigh them if `weighted`, and are not read otherwise.
 #[cube(launch)]
 pub fn chunk_sums(
-    pictures: &[f32],
+    squares: &[f32],
     filters: &[f32],
     phases: &[f32],
     rarity: &[f32],
     sums: &mut [f32],
-    pixels: u32,
-    chunks: u32,
+    views: u32,
+    width: u32,
+    height: u32,
+    #[comptime] sides: Sides,
     #[comptime] weighted: bool,
 ) {
     let unit = ABSOLUTE_POS;
     if unit < sums.len() {
-        let waves = phases.len();
-        let wave = unit % waves;
-        let chunk = unit / waves % chunks as usize;
-        let view = unit / waves / chunks as usize;
-        let picture = view * 3 * pixels as usize;
+        let waves = phases.len() / comptime!(sides.count);
+        let chunk = unit / waves;
+        let at = place_of(chunk, views as usize, width as usize, height as usize, sides, true);
+        let wave = at.scale * waves + unit % waves;
         let red = filters[3 * wave];
         let green = filters[3 * wave + 1];
         let blue = filters[3 * wave + 2];
         let phase = phases[wave];
-        let mut pixel = chunk * CHUNK;
-        let end = min(pixel + CHUNK, pixels as usize);
+        let mut square = at.within * CHUNK;
+        let end = min(square + CHUNK, at.squares);
         let mut sum = 0.0f32;
-        while pixel < end {
-            let at = picture + pixel;
-            let angle = red * pictures[at]
-                + green * pictures[at + pixels as usize]
-                + blue * pictures[at + 2 * pixels as usize]
+        while square < end {
+            let first = 3 * at.first + square;
+            let angle = red * squares[first]
+                + green * squares[first + at.squares]
+                + blue * squares[first + 2 * at.squares]
                 + phase;
             let mut value = sine(angle);
             if weighted {
-                value *= rarity[view * pixels as usize + pixel];
+                value *= rarity[at.first + square];
             }
             sum += value;
-            pixel += 1;
+            square += 1;
         }
         sums[unit] = sum;
     }
 }
 
-/// A unit for each picture and wave: the mean over pixels, from sums and the `totals` (`[views][chunks]`) of their weights, which
-/// are not read unless `weighted`; and one over the sum of all weights to `shares` (`[views]`).
+/// A unit for each view, scale and wave: the mean over squares, `[views][scales][waves]`, from sums and the `totals` (`[chunks]`)
+/// of their weights, which are not read unless `weighted`; and one over the sum of all weights to `shares` (`[scales][views]`).
 #[cube(launch)]
 pub fn means_of_chunks(
     sums: &[f32],
     totals: &[f32],
     means: &mut [f32],
     shares: &mut [f32],
-    waves: u32,
-    pixels: u32,
-    chunks: u32,
+    views: u32,
+    width: u32,
+    height: u32,
+    #[comptime] sides: Sides,
     #[comptime] weighted: bool,
 ) {
     let unit = ABSOLUTE_POS;
     if unit < means.len() {
-        let view = unit / waves as usize;
-        let wave = unit % waves as usize;
+        let views = views as usize;
+        let waves = means.len() / views / comptime!(sides.count);
+        let wave = unit % waves;
+        let scale = unit / waves % comptime!(sides.count);
+        let view = unit / waves / comptime!(sides.count);
+        let (first, count, squares) = chunks_of(scale, view, views, width as usize, height as usize, sides);
         let mut sum = 0.0f32;
         let mut total = 0.0f32;
-        for chunk in 0..chunks as usize {
-            let at = view * chunks as usize + chunk;
-            sum += sums[at * waves as usize + wave];
+        for chunk in first..first + count {
+            sum += sums[chunk * waves + wave];
             if weighted {
-                total += totals[at];
+                total += totals[chunk];
             }
         }
         if !weighted {
-            total = f32::cast_from(pixels);
+            total = f32::cast_from(squares as u32);
         }
         means[unit] = sum / total;
         if wave == 0 {
-            shares[view] = 1.0f32 / total;
+            shares[scale * views + view] = 1.0f32 / total;
         }
     }
 }
 
-/// Means of squares of `side` pixels of planes: a unit a square, `squares` is `[planes][rows][columns]`.
+/// A unit a square: the gradient to its three colours, as squares lie, from that to means.
 #[cube(launch)]
-pub fn means_of_squares(planes: &[f32], squares: &mut [f32], width: u32, height: u32, side: u32) {
-    let unit = ABSOLUTE_POS;
-    if unit < squares.len() {
-        let columns = (width / side) as usize;
-        let rows = (height / side) as usize;
-        let plane = unit / (rows * columns) * (width * height) as usize;
-        let top = unit / columns % rows * side as usize;
-        let left = unit % columns * side as usize;
-        let mut sum = 0.0f32;
-        for down in 0..side as usize {
-            for along in 0..side as usize {
-                sum += planes[plane + (top + down) * width as usize + left + along];
-            }
-        }
-        squares[unit] = sum / f32::cast_from(side * side);
-    }
-}
-
-/// A unit for each picture and square of `side` pixels: the gradient to the three colours of its pixels. What is left of a picture
-/// beside the last squares has none.
-#[cube(launch)]
-pub fn to_pixels(
+pub fn to_squares(
     squares: &[f32],
     filters: &[f32],
     phases: &[f32],
@@ -150,62 +165,68 @@ pub fn to_pixels(
     shares: &[f32],
     gradient: &[f32],
     out: &mut [f32],
+    views: u32,
     width: u32,
     height: u32,
-    side: u32,
+    #[comptime] sides: Sides,
     #[comptime] weighted: bool,
 ) {
     let unit = ABSOLUTE_POS;
-    let columns = (width / side) as usize;
-    let rows = (height / side) as usize;
     if 3 * unit < squares.len() {
-        let waves = phases.len();
-        let view = unit / (rows * columns);
-        let square = unit % (rows * columns);
-        let at = view * 3 * rows * columns + square;
-        let r = squares[at];
-        let g = squares[at + rows * columns];
-        let b = squares[at + 2 * rows * columns];
-        let mut share = shares[view] / f32::cast_from(side * side);
+        let views = views as usize;
+        let at = place_of(unit, views, width as usize, height as usize, sides, false);
+        let waves = phases.len() / comptime!(sides.count);
+        let first = 3 * at.first + at.within;
+        let r = squares[first];
+        let g = squares[first + at.squares];
+        let b = squares[first + 2 * at.squares];
+        let mut share = shares[at.scale * views + at.view];
         if weighted {
-            share *= rarity[unit];
+            share *= rarity[at.first + at.within];
         }
         let mut to_r = 0.0f32;
         let mut to_g = 0.0f32;
         let mut to_b = 0.0f32;
-        for wave in 0..waves {
+        for own in 0..waves {
+            let wave = at.scale * waves + own;
             let red = filters[3 * wave];
             let green = filters[3 * wave + 1];
             let blue = filters[3 * wave + 2];
             let angle = red * r + green * g + blue * b + phases[wave];
-            let slope = cosine(angle) * gradient[view * waves + wave] * share;
+            let slope = cosine(angle) * gradient[at.view * phases.len() + wave] * share;
             to_r += red * slope;
             to_g += green * slope;
             to_b += blue * slope;
         }
-        let row = square / columns;
-        let column = square % columns;
-        let mut down = side as usize;
-        let mut along = side as usize;
-        if row + 1 == rows {
-            down = height as usize - row * side as usize;
-        }
-        if column + 1 == columns {
-            along = width as usize - column * side as usize;
-        }
-        let area = (width * height) as usize;
-        let first = view * 3 * area + row * side as usize * width as usize + column * side as usize;
-        for y in 0..down {
-            for x in 0..along {
-                let pixel = first + y * width as usize + x;
-                let mut inside = 0.0f32;
-                if x < side as usize && y < side as usize {
-                    inside = 1.0f32;
-                }
-                out[pixel] = inside * to_r;
-                out[pixel + area] = inside * to_g;
-                out[pixel + 2 * area] = inside * to_b;
+        out[first] = to_r;
+        out[first + at.squares] = to_g;
+        out[first + 2 * at.squares] = to_b;
+    }
+}
+
+/// A unit for each number of pictures: the gradient to it, from those to the squares that it is in.
+#[cube(launch)]
+pub fn to_pixels(of_squares: &[f32], out: &mut [f32], views: u32, width: u32, height: u32, #[comptime] sides: Sides) {
+    let unit = ABSOLUTE_POS;
+    if unit < out.len() {
+        let (width, height) = (width as usize, height as usize);
+        let plane = unit / (width * height);
+        let row = unit / width % height;
+        let column = unit % width;
+        let mut sum = 0.0f32;
+        let mut first = 0usize;
+        #[unroll]
+        for s in 0..comptime!(sides.count) {
+            let side = comptime!(sides.side(s));
+            let columns = width / side;
+            let rows = height / side;
+            // What is left of a picture beside the last squares is in none.
+            if row / side < rows && column / side < columns {
+                let at = first + plane * rows * columns + row / side * columns + column / side;
+                sum += of_squares[at] / comptime!((side * side) as f32);
             }
+            first += 3 * views as usize * rows * columns;
         }
+        out[unit] = sum;
     }
 }
