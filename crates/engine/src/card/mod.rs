@@ -3,7 +3,9 @@
 //!
 //! The CPU device computes the same by burn's tensors; callers ask [`on_card`] which of both it is.
 mod affine;
+mod attention;
 mod cross_entropy;
+mod gelu;
 mod standardize;
 mod unit_rows;
 
@@ -16,6 +18,8 @@ use burn::backend::{Autodiff, Backend, Cube, Dispatch, DispatchDevice, backend_e
 use burn::nn::Linear;
 use burn::tensor::Tensor;
 use burn_cubecl::tensor::CubeTensor;
+
+use self::attention::Attention;
 
 /// Whether a tensor is on a card.
 pub(crate) fn on_card<const D: usize>(tensor: &Tensor<D>) -> bool {
@@ -64,6 +68,22 @@ pub(crate) fn cross_entropy(logits: Tensor<2>, targets: Tensor<2>, temperature: 
     Tensor::from_dispatch(Dispatch::mean_cross_entropy(logits, targets, temperature))
 }
 
+/// Whether [`attend`] takes so many tokens, and numbers of a head.
+pub(crate) fn attends(tokens: usize, dim: usize) -> bool {
+    attention::fits(tokens, dim)
+}
+
+/// Scaled dot-product attention of tokens to each other, `[b, n, w]`, from queries, keys and values side by side, `[b, n, 3 w]`; to
+/// themselves and those before them only if `causal`. [`attends`] says which sizes.
+pub(crate) fn attend(qkv: Tensor<3>, heads: usize, causal: bool) -> Tensor<3> {
+    Tensor::from_dispatch(Dispatch::attended(qkv.into_dispatch(), heads, causal))
+}
+
+/// Gaussian error linear units of every value, or if `quick` CLIP's approximation `x sigmoid(1.702 x)`.
+pub(crate) fn gelu<const D: usize>(x: Tensor<D>, quick: bool) -> Tensor<D> {
+    Tensor::from_dispatch(Dispatch::gaussian_units(x.into_dispatch(), quick))
+}
+
 /// The operations, on a card alone.
 #[backend_extension(Autodiff, Cube)]
 trait CardOperations: Backend {
@@ -82,6 +102,10 @@ trait CardOperations: Backend {
 
     fn mean_cross_entropy(logits: FloatTensor<Self>, targets: FloatTensor<Self>, temperature: f32)
     -> FloatTensor<Self>;
+
+    fn attended(qkv: FloatTensor<Self>, heads: usize, causal: bool) -> FloatTensor<Self>;
+
+    fn gaussian_units(x: FloatTensor<Self>, quick: bool) -> FloatTensor<Self>;
 }
 
 impl CardOperations for Cube {
@@ -111,6 +135,14 @@ impl CardOperations for Cube {
     ) -> FloatTensor<Self> {
         cross_entropy::forward(logits, targets, temperature).0
     }
+
+    fn attended(qkv: FloatTensor<Self>, heads: usize, causal: bool) -> FloatTensor<Self> {
+        Attention { heads, causal }.forward(qkv)
+    }
+
+    fn gaussian_units(x: FloatTensor<Self>, quick: bool) -> FloatTensor<Self> {
+        gelu::forward(x, quick)
+    }
 }
 
 /// How a gradient goes back through an operation.
@@ -124,6 +156,10 @@ enum Kept {
     Standardized([f32; 3]),
     /// The gradient to the logits.
     CrossEntropy(CubeTensor),
+    /// Queries, keys and values.
+    Attention(Attention, CubeTensor),
+    /// The values, and whether they were approximated.
+    Gelu(CubeTensor, bool),
 }
 
 impl Kept {
@@ -133,6 +169,8 @@ impl Kept {
             Self::UnitRows(rows, scales) => unit_rows::backward(gradient, rows, scales),
             Self::Standardized(deviation) => standardize::scaled(gradient, [0.0; 3], deviation),
             Self::CrossEntropy(to_logits) => cross_entropy::backward(gradient, to_logits),
+            Self::Attention(attention, qkv) => attention.backward(gradient, qkv),
+            Self::Gelu(x, quick) => gelu::backward(gradient, x, quick),
         }
     }
 }
@@ -208,6 +246,17 @@ impl<C: CheckpointStrategy> CardOperations for Autodiff<Cube, C> {
             let (out, to_logits) = cross_entropy::forward(logits, targets, temperature);
             (out, Kept::CrossEntropy(to_logits))
         })
+    }
+
+    fn attended(qkv: FloatTensor<Self>, heads: usize, causal: bool) -> FloatTensor<Self> {
+        let attention = Attention { heads, causal };
+        tracked::<C>(qkv, |qkv| {
+            (attention.forward(qkv.clone()), Kept::Attention(attention, qkv))
+        })
+    }
+
+    fn gaussian_units(x: FloatTensor<Self>, quick: bool) -> FloatTensor<Self> {
+        tracked::<C>(x, |x| (gelu::forward(x.clone(), quick), Kept::Gelu(x, quick)))
     }
 }
 

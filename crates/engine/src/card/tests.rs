@@ -131,3 +131,42 @@ fn cross_entropy_is_that_of_tensors_also_for_logits_beyond_measure() {
         );
     }
 }
+
+#[test]
+fn attention_is_that_of_tensors() {
+    for (batch, tokens, heads, dim) in [(1, 1, 1, 3), (2, 7, 3, 8), (3, 70, 2, 80)] {
+        for causal in [false, true] {
+            let width = heads * dim;
+            agree(
+                &numbers(batch * tokens * 3 * width, 4),
+                [batch, tokens, 3 * width],
+                |x, _| attend(x, heads, causal),
+                |x, device| {
+                    let [q, k, v] =
+                        [0, 1, 2].map(|part| x.clone().slice([0..batch, 0..tokens, part * width..(part + 1) * width]));
+                    let mask = Tensor::<2>::full([tokens, tokens], -1e9, device).triu(1).unsqueeze();
+                    crate::clip::attention(q, k, v, heads, causal.then_some(&mask))
+                },
+            );
+        }
+    }
+    assert!(attends(50, 64) && attends(577, 64) && !attends(2000, 64));
+}
+
+#[test]
+fn gaussian_units_are_those_of_tensors() {
+    let mut x = numbers(1000, 4);
+    x.iter_mut().for_each(|x| *x *= 6.0);
+    (x[0], x[1], x[2]) = (60.0, -60.0, 0.0);
+    for quick in [false, true] {
+        agree(
+            &x,
+            [10, 100],
+            |x, _| gelu(x, quick),
+            |x, _| match quick {
+                true => crate::clip::config::Activation::QuickGelu.forward(x),
+                false => crate::clip::config::Activation::Gelu.forward(x),
+            },
+        );
+    }
+}

@@ -29,6 +29,8 @@ pub use shipped::ShippedClip;
 pub use tensor_file::{TensorFile, TensorSource};
 pub use text::TextTransformer;
 pub use transformer::Transformer;
+#[cfg(test)]
+pub(crate) use transformer::attention;
 pub use vit::VisionTransformer;
 pub use weights::Precision;
 
