@@ -12,20 +12,18 @@ use std::f32::consts::FRAC_1_SQRT_2;
 use crate::launch::{empty_tensor, grid};
 
 /// The factor of the approximation.
-pub(crate) const QUICK: f32 = 1.702;
+const QUICK: f32 = 1.702;
 /// One over the root of two pi.
 const DENSITY: f32 = 0.398_942_3;
 
 /// Share of a value that is let through: the normal distribution's, or if `quick` a logistic one.
 #[cube]
 fn share(x: f32, #[comptime] quick: bool) -> f32 {
-    let mut share = 0.0f32;
     if comptime!(quick) {
-        share = 1.0f32 / (1.0f32 + f32::exp(-QUICK * x));
+        1.0f32 / (1.0f32 + f32::exp(-QUICK * x))
     } else {
-        share = 0.5f32 * (1.0f32 + f32::erf(x * FRAC_1_SQRT_2));
+        0.5f32 * (1.0f32 + f32::erf(x * FRAC_1_SQRT_2))
     }
-    share
 }
 
 #[cube(launch)]
@@ -42,12 +40,11 @@ fn units_backward(x: &[f32], gradient: &[f32], out: &mut [f32], #[comptime] quic
     if unit < x.len() {
         let value = x[unit];
         let through = share(value, quick);
-        let mut density = 0.0f32;
-        if comptime!(quick) {
-            density = QUICK * through * (1.0f32 - through);
+        let density = if comptime!(quick) {
+            QUICK * through * (1.0f32 - through)
         } else {
-            density = DENSITY * f32::exp(-0.5f32 * value * value);
-        }
+            DENSITY * f32::exp(-0.5f32 * value * value)
+        };
         out[unit] = gradient[unit] * (through + value * density);
     }
 }

@@ -6,6 +6,7 @@ mod affine;
 mod attention;
 mod cross_entropy;
 mod gelu;
+mod product;
 mod standardize;
 mod unit_rows;
 
@@ -42,13 +43,30 @@ pub(crate) fn affine(x: Tensor<2>, mean: Option<Tensor<1>>, weight: Tensor<2>, b
     ))
 }
 
-/// A linear layer: in one launch on a card where its weights are constants.
-pub(crate) fn linear(layer: &Linear, x: Tensor<2>) -> Tensor<2> {
-    let weight = layer.weight.val();
-    if on_card(&x) && !weight.is_require_grad() {
-        return affine(x, None, weight, layer.bias.as_ref().map(|bias| bias.val()));
+/// Rows from which on a product is computed by squares of the output; of fewer each row is one of a few.
+const MANY: usize = 33;
+
+/// A linear layer.
+pub(crate) fn layer<const D: usize>(layer: &Linear, x: Tensor<D>) -> Tensor<D> {
+    linear(x, layer.weight.val(), layer.bias.as_ref().map(|bias| bias.val()))
+}
+
+/// `x weight + bias` of the last dimension of x: in one launch on a card where the weights are constants.
+pub(crate) fn linear<const D: usize>(x: Tensor<D>, weight: Tensor<2>, bias: Option<Tensor<1>>) -> Tensor<D> {
+    if !on_card(&x) || weight.is_require_grad() {
+        return burn::tensor::module::linear(x, weight, bias);
     }
-    layer.forward(x)
+    let rows = x.shape().num_elements() / weight.dims()[0];
+    if rows < MANY {
+        let mut shape = x.dims();
+        let out = affine(x.reshape([rows as i64, -1]), None, weight, bias);
+        shape[D - 1] = out.dims()[1];
+        return out.reshape(shape);
+    }
+    let (biased, weight) = (bias.is_some(), weight.into_dispatch());
+    // What is not there is not read.
+    let bias = bias.map_or_else(|| weight.clone(), Tensor::into_dispatch);
+    Tensor::from_dispatch(Dispatch::many_rows(x.into_dispatch(), weight, bias, biased))
 }
 
 /// Rows `[b, n]` of length 1; of almost no length where `tiny`, squared, is not small beside them.
@@ -96,6 +114,13 @@ trait CardOperations: Backend {
         biased: bool,
     ) -> FloatTensor<Self>;
 
+    fn many_rows(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self>;
+
     fn rows_of_unit_length(x: FloatTensor<Self>, tiny: f32) -> FloatTensor<Self>;
 
     fn standardized(pictures: FloatTensor<Self>, mean: [f32; 3], deviation: [f32; 3]) -> FloatTensor<Self>;
@@ -118,6 +143,15 @@ impl CardOperations for Cube {
         biased: bool,
     ) -> FloatTensor<Self> {
         affine::forward(x, centred.then_some(mean), weight, biased.then_some(bias))
+    }
+
+    fn many_rows(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self> {
+        product::forward(x, weight, biased.then_some(bias))
     }
 
     fn rows_of_unit_length(x: FloatTensor<Self>, tiny: f32) -> FloatTensor<Self> {
@@ -150,6 +184,8 @@ impl CardOperations for Cube {
 enum Kept {
     /// The weights.
     Affine(CubeTensor),
+    /// The weights.
+    Product(CubeTensor),
     /// The rows, and one over their lengths.
     UnitRows(CubeTensor, CubeTensor),
     /// The deviations.
@@ -166,6 +202,7 @@ impl Kept {
     fn backward(self, gradient: CubeTensor) -> CubeTensor {
         match self {
             Self::Affine(weight) => affine::backward(gradient, weight),
+            Self::Product(weight) => product::backward(gradient, weight),
             Self::UnitRows(rows, scales) => unit_rows::backward(gradient, rows, scales),
             Self::Standardized(deviation) => standardize::scaled(gradient, [0.0; 3], deviation),
             Self::CrossEntropy(to_logits) => cross_entropy::backward(gradient, to_logits),
@@ -217,6 +254,19 @@ impl<C: CheckpointStrategy> CardOperations for Autodiff<Cube, C> {
         tracked::<C>(x, |x| {
             let out = Cube::affine_rows(x, mean, weight.clone(), bias, centred, biased);
             (out, Kept::Affine(weight))
+        })
+    }
+
+    fn many_rows(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self> {
+        let [(weight, _), (bias, _)] = [weight, bias].map(|constant| constant.into_parts());
+        tracked::<C>(x, |x| {
+            let out = Cube::many_rows(x, weight.clone(), bias, biased);
+            (out, Kept::Product(weight))
         })
     }
 

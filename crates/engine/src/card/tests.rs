@@ -86,6 +86,40 @@ fn affine_maps_are_those_of_tensors() {
 }
 
 #[test]
+fn products_of_many_rows_are_those_of_tensors() {
+    for (batch, tokens, width, columns) in [(1, 33, 3, 2), (2, 50, 96, 200), (1, 130, 65, 63)] {
+        let (weights, biases) = (numbers(width * columns, 1), numbers(columns, 3));
+        for biased in [false, true] {
+            let parts = |device: &Device| {
+                let bias = biased.then(|| tensor(&biases, [columns], device));
+                (tensor(&weights, [width, columns], device), bias)
+            };
+            agree(
+                &numbers(batch * tokens * width, 4),
+                [batch, tokens, width],
+                |x, device| {
+                    let (weight, bias) = parts(device);
+                    linear(x, weight, bias)
+                },
+                |x, device| {
+                    let (weight, bias) = parts(device);
+                    burn::tensor::module::linear(x, weight, bias)
+                },
+            );
+        }
+    }
+}
+
+#[test]
+fn layers_that_learn_keep_their_gradient() {
+    let Some(compute) = wgpu() else { return };
+    let device = compute.device.autodiff();
+    let weight = tensor(&numbers(6, 1), [3, 2], &device).require_grad();
+    let out = linear(tensor(&numbers(120, 2), [40, 3], &device), weight.clone(), None);
+    assert!(weight.grad(&out.sum().backward()).is_some());
+}
+
+#[test]
 fn unit_rows_are_those_of_tensors() {
     for (rows, width) in [(1, 3), (8, 512), (300, 7)] {
         agree(

@@ -12,7 +12,7 @@ use super::config::VisionConfig;
 use super::params::param;
 use super::sines::mean_sines;
 use super::weights::set;
-use crate::card::linear;
+use crate::card;
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::module::avg_pool2d;
@@ -125,7 +125,7 @@ impl RandomFourierEncoder {
 
     /// Features `[batch, embed_dim]` of normalised pictures.
     pub fn forward(&self, pictures: &Tensor<4>) -> Tensor<2> {
-        linear(&self.proj, self.statistics(pictures))
+        card::layer(&self.proj, self.statistics(pictures))
     }
 
     /// Filters `[scales][filters][3][kernel][kernel]` and phases `[scales][filters]`.

@@ -2,11 +2,10 @@
 use super::config::{Activation, BlockConfig};
 use super::layer_norm::LayerNorm;
 use super::params::param;
-use crate::card::{attend, attends, gelu, on_card};
+use crate::card::{attend, attends, gelu, layer, linear, on_card};
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::{sigmoid, softmax};
-use burn::tensor::module::linear;
 use burn::tensor::{Device, Tensor};
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -79,8 +78,8 @@ impl Block {
 
     fn forward(&self, x: Tensor<3>, mask: Option<&Tensor<4>>) -> Tensor<3> {
         let x = x.clone() + self.attn.forward(self.ln_1.forward(x), mask);
-        let hidden = self.mlp.c_fc.forward(self.ln_2.forward(x.clone()));
-        x + self.mlp.c_proj.forward(self.mlp.activation.forward(hidden))
+        let hidden = layer(&self.mlp.c_fc, self.ln_2.forward(x.clone()));
+        x + layer(&self.mlp.c_proj, self.mlp.activation.forward(hidden))
     }
 }
 
@@ -90,7 +89,7 @@ impl Attention {
         let (weight, bias) = (self.in_proj_weight.val(), self.in_proj_bias.val());
         if on_card(&x) && attends(tokens, width / self.heads) {
             let qkv = linear(x, weight, Some(bias));
-            return self.out_proj.forward(attend(qkv, self.heads, mask.is_some()));
+            return layer(&self.out_proj, attend(qkv, self.heads, mask.is_some()));
         }
         // Slicing the weights rather than the product keeps the gradient to `x` free of zero-padded copies.
         let [q, k, v] = [0, 1, 2].map(|i| {
@@ -98,7 +97,7 @@ impl Attention {
             let bias = bias.clone().slice([columns.clone()]);
             linear(x.clone(), weight.clone().slice([0..width, columns]), Some(bias))
         });
-        self.out_proj.forward(attention(q, k, v, self.heads, mask))
+        layer(&self.out_proj, attention(q, k, v, self.heads, mask))
     }
 }
 

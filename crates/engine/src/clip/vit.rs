@@ -3,8 +3,8 @@ use super::config::{BlockConfig, VisionConfig};
 use super::layer_norm::LayerNorm;
 use super::params::param;
 use super::transformer::{Transformer, layer_norm};
+use crate::card::linear;
 use burn::module::{Module, Param};
-use burn::tensor::module::linear;
 use burn::tensor::{Device, Tensor};
 
 /// Image tower of the transformer kind. Fields are named as in OpenCLIP's checkpoints.
@@ -61,7 +61,7 @@ impl VisionTransformer {
         let tokens = Tensor::cat(vec![class, patches], 1) + self.positional_embedding.val().unsqueeze();
         let tokens = self.transformer.forward(self.ln_pre.forward(tokens), false);
         let class = tokens.slice([0..batch, 0..1]).reshape([batch, width]);
-        self.ln_post.forward(class).matmul(self.proj.val())
+        linear(self.ln_post.forward(class), self.proj.val(), None)
     }
 }
 

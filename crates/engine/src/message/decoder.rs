@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha20Rng;
 
-use crate::card::linear;
+use crate::card;
 use crate::error::{Error, Result};
 
 /// Width of the two hidden layers.
@@ -93,7 +93,11 @@ impl Decoder {
     /// Puts weights on a device; with an autodiff device they can be trained.
     pub fn new(weights: &DecoderWeights, device: &Device) -> Self {
         Self {
-            layers: weights.layers.iter().map(|layer| to_linear(layer, device)).collect(),
+            layers: weights
+                .layers
+                .iter()
+                .map(|layer| to_linear(layer, device))
+                .collect(),
         }
     }
 
@@ -108,7 +112,7 @@ impl Decoder {
     pub fn forward(&self, features: Tensor<2>) -> Tensor<2> {
         let mut x = features;
         for (i, layer) in self.layers.iter().enumerate() {
-            x = linear(layer, if i == 0 { x } else { gelu(x) });
+            x = card::layer(layer, if i == 0 { x } else { gelu(x) });
         }
         x
     }
