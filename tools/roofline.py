@@ -25,11 +25,12 @@ def kernels(visible: float, pairs: float, gaussians: float, columns: float) -> d
     terms = columns / 3
     words = 4 * (8 * visible + 2 * pairs)  # A packed view: six of a splat, its slots' place and its row; lists.
     splat = 24 + 12 + 4  # What a tile loads of a pair: shape, colour, index.
+    lights = 4 * (VIEWS * pairs + PIXELS)  # What pixels have left before each chunk of a tile's list.
     return {
         "views side by side": (0, VIEWS * 2 * words),
-        "colours, twice": (2 * VIEWS * visible * (40 + 9 * terms), 2 * VIEWS * visible * (8 * columns + 12 + 16)),
-        "drawing, twice": (2 * VIEWS * pairs * TILE * 22, 2 * (VIEWS * pairs * splat + 12 * PIXELS)),
-        "gradient to splats": (VIEWS * pairs * TILE * 22, VIEWS * pairs * (splat + 12) + 12 * PIXELS),
+        "colours": (VIEWS * visible * (40 + 15 * terms), VIEWS * visible * (8 * columns + 24 + 16)),
+        "drawing": (VIEWS * pairs * TILE * 28, VIEWS * pairs * (splat + 12) + 24 * PIXELS + lights),
+        "gradient to splats": (VIEWS * pairs * TILE * 22, VIEWS * pairs * (splat + 12) + 12 * PIXELS + lights),
         "gradient to coefficients": (
             VIEWS * visible * (40 + 6 * terms) + VIEWS * pairs * 3,
             VIEWS * (pairs * 16 + visible * 40) + gaussians * 4 * columns,
@@ -46,7 +47,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=float, default=132_211)
     parser.add_argument("--gaussians", type=float, default=101_407)
     parser.add_argument("--columns", type=float, default=48)
-    parser.add_argument("--launches", type=float, default=161)
+    parser.add_argument("--launches", type=float, default=37)
     parser.add_argument("--launch-us", type=float, default=60, help="of the host for one: launching by a step's log, over launches")
     parser.add_argument("--copy", type=float, default=5e9, help="bytes a second that the host copies to where the card fetches them")
     a = parser.parse_args()
