@@ -66,10 +66,8 @@ fn weigh(
         for k in 0..comptime!(sizes.dim) {
             score += query[k] * qkv[key + k];
         }
-        if comptime!(sizes.causal) {
-            if other > own {
-                score = -1e9f32;
-            }
+        if comptime!(sizes.causal) && other > own {
+            score = -1e9f32;
         }
         weights[other] = score;
         other += UNITS;

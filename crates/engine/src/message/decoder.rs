@@ -93,11 +93,7 @@ impl Decoder {
     /// Puts weights on a device; with an autodiff device they can be trained.
     pub fn new(weights: &DecoderWeights, device: &Device) -> Self {
         Self {
-            layers: weights
-                .layers
-                .iter()
-                .map(|layer| to_linear(layer, device))
-                .collect(),
+            layers: weights.layers.iter().map(|layer| to_linear(layer, device)).collect(),
         }
     }
 

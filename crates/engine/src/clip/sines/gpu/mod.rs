@@ -69,10 +69,10 @@ impl WeightedSines for Cube {
         let squares = Squares::of(into_contiguous(pictures), Sides::new(&sides));
         let rare = (equalization != 0.0).then(|| squares.rarity(equalization));
         let (waves, scales) = (phases.shape()[0], squares.sides.count);
-        let sums = squares.new(&[squares.chunks() * waves / scales]);
+        let sums = squares.room(&[squares.chunks() * waves / scales]);
         let (means, shares) = (
-            squares.new(&[squares.views, waves]),
-            squares.new(&[scales, squares.views]),
+            squares.room(&[squares.views, waves]),
+            squares.room(&[scales, squares.views]),
         );
         // Without weights nothing of these buffers is read.
         let [rarity, totals] = match &rare {
@@ -126,7 +126,7 @@ impl WeightedSines for Cube {
         let (squares, gradient) = (&kept.squares, into_contiguous(gradient));
         let [views, height, width] = squares.sizes();
         let client = &squares.numbers.client;
-        let of_squares = squares.new(&[squares.numbers.shape()[0]]);
+        let of_squares = squares.room(&[squares.numbers.shape()[0]]);
         let (count, dim) = grid_of(of_squares.shape()[0] / 3, 1, CUBE);
         to_squares::launch(
             client,
@@ -145,7 +145,7 @@ impl WeightedSines for Cube {
             squares.sides,
             kept.rarity.is_some(),
         );
-        let out = squares.new(&[squares.views, 3, squares.height, squares.width]);
+        let out = squares.room(&[squares.views, 3, squares.height, squares.width]);
         let (count, dim) = grid_of(out.shape().num_elements(), 1, CUBE);
         to_pixels::launch(
             client,
@@ -205,9 +205,9 @@ impl Squares {
     /// How rare the colour of each square is, and the sum of that over each chunk.
     fn rarity(&self, equalization: f32) -> [CubeTensor; 2] {
         let chunks = self.chunks();
-        let counts = self.new(&[chunks, GRID]);
-        let grids = self.new(&[self.sides.count, self.views, GRID]);
-        let (rarity, totals) = (self.new(&[self.numbers.shape()[0] / 3]), self.new(&[chunks]));
+        let counts = self.room(&[chunks, GRID]);
+        let grids = self.room(&[self.sides.count, self.views, GRID]);
+        let (rarity, totals) = (self.room(&[self.numbers.shape()[0] / 3]), self.room(&[chunks]));
         let [views, height, width] = self.sizes();
         let client = &self.numbers.client;
         let (count, dim) = grid_of(chunks * GRID / CORNERS, 1, CUBE);
@@ -263,7 +263,8 @@ impl Squares {
         [self.views, self.height, self.width].map(|size| size as u32)
     }
 
-    fn new(&self, shape: &[usize]) -> CubeTensor {
+    /// A new tensor where these are.
+    fn room(&self, shape: &[usize]) -> CubeTensor {
         empty_tensor(&self.numbers, Shape::from(shape.to_vec()))
     }
 }
