@@ -63,6 +63,26 @@ impl Backward<Cube, 1> for ToInput {
     }
 }
 
+/// The backward step of a product that is added to something: both have a gradient.
+#[derive(Debug)]
+struct ToBoth;
+
+impl Backward<Cube, 2> for ToBoth {
+    /// The weights.
+    type State = CubeTensor;
+
+    fn backward(self, ops: Ops<CubeTensor, 2>, gradients: &mut Gradients, _: &mut Checkpointer) {
+        let gradient = gradients.consume::<Cube>(&ops.node);
+        let [x, onto] = ops.parents;
+        if let Some(x) = x {
+            gradients.register::<Cube>(x.id, product::backward(gradient.clone(), ops.state));
+        }
+        if let Some(onto) = onto {
+            gradients.register::<Cube>(onto.id, gradient);
+        }
+    }
+}
+
 /// Puts an operation on a tensor that may have a gradient into its graph.
 fn tracked<C: CheckpointStrategy>(
     x: FloatTensor<Autodiff<Cube, C>>,
@@ -103,6 +123,22 @@ impl<C: CheckpointStrategy> CardOperations for Autodiff<Cube, C> {
             let out = Cube::many_rows(x, weight.clone(), bias, biased);
             (out, Kept::Product(weight))
         })
+    }
+
+    fn many_rows_onto(
+        x: FloatTensor<Self>,
+        onto: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self> {
+        let [(weight, _), (bias, _)] = [weight, bias].map(|constant| constant.into_parts());
+        let [(x, of_x), (onto, of_onto)] = [x, onto].map(|input| input.into_parts());
+        let out = Cube::many_rows_onto(x, onto, weight.clone(), bias, biased);
+        match ToBoth.prepare::<C>([of_x, of_onto]).compute_bound().stateful() {
+            OpsKind::Tracked(graph) => graph.finish(weight, out),
+            OpsKind::UnTracked(graph) => graph.finish(out),
+        }
     }
 
     fn rows_of_unit_length(x: FloatTensor<Self>, tiny: f32) -> FloatTensor<Self> {

@@ -65,6 +65,21 @@ pub(crate) fn linear<const D: usize>(x: Tensor<D>, weight: Tensor<2>, bias: Opti
     Tensor::from_dispatch(Dispatch::many_rows(x.into_dispatch(), weight, bias, biased))
 }
 
+/// `onto` and a linear layer of x.
+pub(crate) fn layer_onto<const D: usize>(layer: &Linear, x: Tensor<D>, onto: Tensor<D>) -> Tensor<D> {
+    let weight = layer.weight.val();
+    let rows = x.shape().num_elements() / weight.dims()[0];
+    if !on_card(&x) || weight.is_require_grad() || rows < MANY {
+        return onto + self::layer(layer, x);
+    }
+    let (biased, weight) = (layer.bias.is_some(), weight.into_dispatch());
+    // What is not there is not read.
+    let bias = layer.bias.as_ref().map(|bias| bias.val());
+    let bias = bias.map_or_else(|| weight.clone(), Tensor::into_dispatch);
+    let (x, onto) = (x.into_dispatch(), onto.into_dispatch());
+    Tensor::from_dispatch(Dispatch::many_rows_onto(x, onto, weight, bias, biased))
+}
+
 /// Rows `[b, n]` of length 1; of almost no length where `tiny`, squared, is not small beside them.
 pub(crate) fn unit_rows(x: Tensor<2>, tiny: f32) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::rows_of_unit_length(x.into_dispatch(), tiny))

@@ -3,6 +3,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Cube, backend_extension};
 
 use super::attention::Attention;
+use super::product::Addends;
 use super::{affine, cross_entropy, gelu, product, standardize, unit_rows};
 
 /// What [`super`] says of each.
@@ -19,6 +20,14 @@ pub(super) trait CardOperations: Backend {
 
     fn many_rows(
         x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self>;
+
+    fn many_rows_onto(
+        x: FloatTensor<Self>,
+        onto: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
         biased: bool,
@@ -54,7 +63,19 @@ impl CardOperations for Cube {
         bias: FloatTensor<Self>,
         biased: bool,
     ) -> FloatTensor<Self> {
-        product::forward(x, weight, biased.then_some(bias))
+        let bias = biased.then_some(bias);
+        product::forward(x, weight, Addends { bias, onto: None })
+    }
+
+    fn many_rows_onto(
+        x: FloatTensor<Self>,
+        onto: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        biased: bool,
+    ) -> FloatTensor<Self> {
+        let (bias, onto) = (biased.then_some(bias), Some(onto));
+        product::forward(x, weight, Addends { bias, onto })
     }
 
     fn rows_of_unit_length(x: FloatTensor<Self>, tiny: f32) -> FloatTensor<Self> {

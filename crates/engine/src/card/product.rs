@@ -20,19 +20,21 @@ const OWN: usize = 4;
 const SIDE: usize = SQUARE / OWN;
 const UNITS: usize = SIDE * SIDE;
 
-/// `out` (`[rows][columns]`) is `x weight + bias`, of `x` (`[rows][depth]`) and a weight `[depth][columns]`, or of one
+/// `out` (`[rows][columns]`) is `x weight + bias + onto`, of `x` (`[rows][depth]`) and a weight `[depth][columns]`, or of one
 /// `[columns][depth]` if `transposed`.
 #[cube(launch)]
 fn product(
     x: &[f32],
     weight: &[f32],
     bias: &[f32],
+    onto: &[f32],
     out: &mut [f32],
     rows: u32,
     depth: u32,
     columns: u32,
     #[comptime] transposed: bool,
     #[comptime] biased: bool,
+    #[comptime] adding: bool,
 ) {
     let (rows, depth, columns) = (rows as usize, depth as usize, columns as usize);
     let unit = UNIT_POS as usize;
@@ -108,16 +110,28 @@ fn product(
                 if comptime!(biased) {
                     sum += bias[column];
                 }
+                if comptime!(adding) {
+                    sum += onto[row * columns + column];
+                }
                 out[row * columns + column] = sum;
             }
         }
     }
 }
 
-fn launched(x: CubeTensor, weight: CubeTensor, bias: Option<CubeTensor>, transposed: bool) -> CubeTensor {
-    let (biased, shape, sizes) = (bias.is_some(), x.shape(), weight.shape());
+/// What a product is added to: `[columns]`, and `[rows, columns]`.
+#[derive(Default)]
+pub(super) struct Addends {
+    pub bias: Option<CubeTensor>,
+    pub onto: Option<CubeTensor>,
+}
+
+fn launched(x: CubeTensor, weight: CubeTensor, addends: Addends, transposed: bool) -> CubeTensor {
+    let (biased, adding) = (addends.bias.is_some(), addends.onto.is_some());
+    let (shape, sizes) = (x.shape(), weight.shape());
     let [x, weight] = [x, weight].map(into_contiguous);
-    let bias = bias.map_or_else(|| weight.clone(), into_contiguous);
+    // What is not there is not read.
+    let [bias, onto] = [addends.bias, addends.onto].map(|part| part.map_or_else(|| weight.clone(), into_contiguous));
     let (depth, columns) = match transposed {
         true => (sizes[1], sizes[0]),
         false => (sizes[0], sizes[1]),
@@ -135,22 +149,24 @@ fn launched(x: CubeTensor, weight: CubeTensor, bias: Option<CubeTensor>, transpo
         x.into_buffer_arg(),
         weight.into_buffer_arg(),
         bias.into_buffer_arg(),
+        onto.into_buffer_arg(),
         out.clone().into_buffer_arg(),
         rows as u32,
         depth as u32,
         columns as u32,
         transposed,
         biased,
+        adding,
     );
     out
 }
 
-/// `x weight + bias` of the last dimension of x.
-pub(super) fn forward(x: CubeTensor, weight: CubeTensor, bias: Option<CubeTensor>) -> CubeTensor {
-    launched(x, weight, bias, false)
+/// `x weight` of the last dimension of x, and what it is added to.
+pub(super) fn forward(x: CubeTensor, weight: CubeTensor, addends: Addends) -> CubeTensor {
+    launched(x, weight, addends, false)
 }
 
 /// The gradient to x.
 pub(super) fn backward(gradient: CubeTensor, weight: CubeTensor) -> CubeTensor {
-    launched(gradient, weight, None, true)
+    launched(gradient, weight, Addends::default(), true)
 }

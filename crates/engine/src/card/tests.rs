@@ -110,6 +110,24 @@ fn products_of_many_rows_are_those_of_tensors() {
     }
 }
 
+/// With a gradient to what the product is added to, and through both where they are one.
+#[test]
+fn products_are_added_to_what_they_came_from() {
+    let (weights, biases) = (numbers(20 * 20, 1), numbers(20, 3));
+    let of = |device: &Device| {
+        let mut layer = burn::nn::LinearConfig::new(20, 20).init(device);
+        layer.weight = layer.weight.map(|_| tensor(&weights, [20, 20], device));
+        layer.bias = layer.bias.map(|bias| bias.map(|_| tensor(&biases, [20], device)));
+        burn::module::Module::freeze(layer)
+    };
+    agree(
+        &numbers(2 * 25 * 20, 4),
+        [2, 25, 20],
+        |x, device| layer_onto(&of(device), x.clone(), x),
+        |x, device| x.clone() + of(device).forward(x),
+    );
+}
+
 #[test]
 fn layers_that_learn_keep_their_gradient() {
     let Some(compute) = wgpu() else { return };

@@ -2,7 +2,7 @@
 use super::config::{Activation, BlockConfig};
 use super::layer_norm::LayerNorm;
 use super::params::param;
-use crate::card::{attend, attends, gelu, layer, linear, on_card};
+use crate::card::{attend, attends, gelu, layer, layer_onto, linear, on_card};
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::{sigmoid, softmax};
@@ -77,19 +77,21 @@ impl Block {
     }
 
     fn forward(&self, x: Tensor<3>, mask: Option<&Tensor<4>>) -> Tensor<3> {
-        let x = x.clone() + self.attn.forward(self.ln_1.forward(x), mask);
+        let attended = self.attn.forward(self.ln_1.forward(x.clone()), mask);
+        let x = layer_onto(&self.attn.out_proj, attended, x);
         let hidden = layer(&self.mlp.c_fc, self.ln_2.forward(x.clone()));
-        x + layer(&self.mlp.c_proj, self.mlp.activation.forward(hidden))
+        layer_onto(&self.mlp.c_proj, self.mlp.activation.forward(hidden), x)
     }
 }
 
 impl Attention {
+    /// What tokens take of each other, before the last linear map.
     fn forward(&self, x: Tensor<3>, mask: Option<&Tensor<4>>) -> Tensor<3> {
         let [_, tokens, width] = x.dims();
         let (weight, bias) = (self.in_proj_weight.val(), self.in_proj_bias.val());
         if on_card(&x) && attends(tokens, width / self.heads) {
             let qkv = linear(x, weight, Some(bias));
-            return layer(&self.out_proj, attend(qkv, self.heads, mask.is_some()));
+            return attend(qkv, self.heads, mask.is_some());
         }
         // Slicing the weights rather than the product keeps the gradient to `x` free of zero-padded copies.
         let [q, k, v] = [0, 1, 2].map(|i| {
@@ -97,7 +99,7 @@ impl Attention {
             let bias = bias.clone().slice([columns.clone()]);
             linear(x.clone(), weight.clone().slice([0..width, columns]), Some(bias))
         });
-        layer(&self.out_proj, attention(q, k, v, self.heads, mask))
+        attention(q, k, v, self.heads, mask)
     }
 }
 
