@@ -14,10 +14,8 @@ use super::{affine, cross_entropy, gelu, product, standardize, unit_rows};
 /// How a gradient goes back through an operation.
 #[derive(Clone, Debug)]
 enum Kept {
-    /// The weights, of a few rows.
+    /// The weights.
     Affine(CubeTensor),
-    /// The weights, of many rows.
-    Product(CubeTensor),
     /// The rows, and one over their lengths.
     UnitRows(Box<[CubeTensor; 2]>),
     /// The deviations.
@@ -34,7 +32,6 @@ impl Kept {
     fn backward(self, gradient: CubeTensor) -> CubeTensor {
         match self {
             Self::Affine(weight) => affine::backward(gradient, weight),
-            Self::Product(weight) => product::backward(gradient, weight),
             Self::UnitRows(kept) => {
                 let [rows, scales] = *kept;
                 unit_rows::backward(gradient, rows, scales)
@@ -63,7 +60,7 @@ impl Backward<Cube, 1> for ToInput {
     }
 }
 
-/// The backward step of a product that is added to something: both have a gradient.
+/// The backward step of a product and of what it is added to, if that has a gradient.
 #[derive(Debug)]
 struct ToBoth;
 
@@ -116,25 +113,13 @@ impl<C: CheckpointStrategy> CardOperations for Autodiff<Cube, C> {
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
-        biased: bool,
-    ) -> FloatTensor<Self> {
-        let [(weight, _), (bias, _)] = [weight, bias].map(|constant| constant.into_parts());
-        tracked::<C>(x, |x| {
-            let out = Cube::many_rows(x, weight.clone(), bias, biased);
-            (out, Kept::Product(weight))
-        })
-    }
-
-    fn many_rows_onto(
-        x: FloatTensor<Self>,
         onto: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        bias: FloatTensor<Self>,
         biased: bool,
+        adding: bool,
     ) -> FloatTensor<Self> {
         let [(weight, _), (bias, _)] = [weight, bias].map(|constant| constant.into_parts());
         let [(x, of_x), (onto, of_onto)] = [x, onto].map(|input| input.into_parts());
-        let out = Cube::many_rows_onto(x, onto, weight.clone(), bias, biased);
+        let out = Cube::many_rows(x, weight.clone(), bias, onto, biased, adding);
         match ToBoth.prepare::<C>([of_x, of_onto]).compute_bound().stateful() {
             OpsKind::Tracked(graph) => graph.finish(weight, out),
             OpsKind::UnTracked(graph) => graph.finish(out),

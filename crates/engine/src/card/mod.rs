@@ -47,37 +47,55 @@ pub(crate) fn layer<const D: usize>(layer: &Linear, x: Tensor<D>) -> Tensor<D> {
     linear(x, layer.weight.val(), layer.bias.as_ref().map(|bias| bias.val()))
 }
 
+/// `onto` and a linear layer of x.
+pub(crate) fn layer_onto<const D: usize>(layer: &Linear, x: Tensor<D>, onto: Tensor<D>) -> Tensor<D> {
+    let (weight, bias) = (layer.weight.val(), layer.bias.as_ref().map(|bias| bias.val()));
+    match in_squares(&x, &weight) {
+        true => product(x, weight, bias, Some(onto)),
+        false => onto + linear(x, weight, bias),
+    }
+}
+
 /// `x weight + bias` of the last dimension of x: in one launch on a card where the weights are constants.
 pub(crate) fn linear<const D: usize>(x: Tensor<D>, weight: Tensor<2>, bias: Option<Tensor<1>>) -> Tensor<D> {
+    if in_squares(&x, &weight) {
+        return product(x, weight, bias, None);
+    }
     if !on_card(&x) || weight.is_require_grad() {
         return burn::tensor::module::linear(x, weight, bias);
     }
-    let rows = x.shape().num_elements() / weight.dims()[0];
-    if rows < MANY {
-        let mut shape = x.dims();
-        let out = affine(x.reshape([rows as i64, -1]), None, weight, bias);
-        shape[D - 1] = out.dims()[1];
-        return out.reshape(shape);
-    }
-    let (biased, weight) = (bias.is_some(), weight.into_dispatch());
-    // What is not there is not read.
-    let bias = bias.map_or_else(|| weight.clone(), Tensor::into_dispatch);
-    Tensor::from_dispatch(Dispatch::many_rows(x.into_dispatch(), weight, bias, biased))
+    let mut shape = x.dims();
+    let out = affine(x.reshape([-1, weight.dims()[0] as i64]), None, weight, bias);
+    shape[D - 1] = out.dims()[1];
+    out.reshape(shape)
 }
 
-/// `onto` and a linear layer of x.
-pub(crate) fn layer_onto<const D: usize>(layer: &Linear, x: Tensor<D>, onto: Tensor<D>) -> Tensor<D> {
-    let weight = layer.weight.val();
+/// Whether a product with these weights is computed by squares of the output.
+fn in_squares<const D: usize>(x: &Tensor<D>, weight: &Tensor<2>) -> bool {
     let rows = x.shape().num_elements() / weight.dims()[0];
-    if !on_card(&x) || weight.is_require_grad() || rows < MANY {
-        return onto + self::layer(layer, x);
-    }
-    let (biased, weight) = (layer.bias.is_some(), weight.into_dispatch());
+    on_card(x) && !weight.is_require_grad() && rows >= MANY
+}
+
+/// `x weight + bias + onto`, of many rows.
+fn product<const D: usize>(
+    x: Tensor<D>,
+    weight: Tensor<2>,
+    bias: Option<Tensor<1>>,
+    onto: Option<Tensor<D>>,
+) -> Tensor<D> {
+    let (biased, adding) = (bias.is_some(), onto.is_some());
+    let weight = weight.into_dispatch();
     // What is not there is not read.
-    let bias = layer.bias.as_ref().map(|bias| bias.val());
     let bias = bias.map_or_else(|| weight.clone(), Tensor::into_dispatch);
-    let (x, onto) = (x.into_dispatch(), onto.into_dispatch());
-    Tensor::from_dispatch(Dispatch::many_rows_onto(x, onto, weight, bias, biased))
+    let onto = onto.map_or_else(|| weight.clone(), Tensor::into_dispatch);
+    Tensor::from_dispatch(Dispatch::many_rows(
+        x.into_dispatch(),
+        weight,
+        bias,
+        onto,
+        biased,
+        adding,
+    ))
 }
 
 /// Rows `[b, n]` of length 1; of almost no length where `tiny`, squared, is not small beside them.
@@ -102,8 +120,8 @@ pub(crate) fn attends(tokens: usize, dim: usize) -> bool {
     attention::fits(tokens, dim)
 }
 
-/// Scaled dot-product attention of tokens to each other, `[b, n, w]`, from queries, keys and values side by side, `[b, n, 3 w]`; to
-/// themselves and those before them only if `causal`. [`attends`] says which sizes.
+/// Scaled dot-product attention of tokens to each other, `[b, n, w]`, from queries, keys and values side by side,
+/// `[b, n, 3 w]`; to themselves and those before them only if `causal`. [`attends`] says which sizes.
 pub(crate) fn attend(qkv: Tensor<3>, heads: usize, causal: bool) -> Tensor<3> {
     Tensor::from_dispatch(Dispatch::attended(qkv.into_dispatch(), heads, causal))
 }

@@ -22,15 +22,9 @@ pub(super) trait CardOperations: Backend {
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
-        biased: bool,
-    ) -> FloatTensor<Self>;
-
-    fn many_rows_onto(
-        x: FloatTensor<Self>,
         onto: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        bias: FloatTensor<Self>,
         biased: bool,
+        adding: bool,
     ) -> FloatTensor<Self>;
 
     fn rows_of_unit_length(x: FloatTensor<Self>, tiny: f32) -> FloatTensor<Self>;
@@ -61,20 +55,11 @@ impl CardOperations for Cube {
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
-        biased: bool,
-    ) -> FloatTensor<Self> {
-        let bias = biased.then_some(bias);
-        product::forward(x, weight, Addends { bias, onto: None })
-    }
-
-    fn many_rows_onto(
-        x: FloatTensor<Self>,
         onto: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        bias: FloatTensor<Self>,
         biased: bool,
+        adding: bool,
     ) -> FloatTensor<Self> {
-        let (bias, onto) = (biased.then_some(bias), Some(onto));
+        let (bias, onto) = (biased.then_some(bias), adding.then_some(onto));
         product::forward(x, weight, Addends { bias, onto })
     }
 

@@ -162,7 +162,8 @@ fn from_linear(linear: &Linear) -> Result<LayerWeights> {
     })
 }
 
-/// Mean binary cross entropy of logits `[b, bits]` against targets of exactly 0 or 1, of the same shape or `[1, bits]`; one number.
+/// Mean binary cross entropy of logits `[b, bits]` against targets of exactly 0 or 1, of the same shape or `[1, bits]`; one
+/// number.
 ///
 /// For such targets -log of the target's probability is softplus of the logit, its sign turned where the target is 1.
 /// That form neither overflows nor cancels, and its gradient is right at 0 too.

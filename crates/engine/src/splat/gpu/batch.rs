@@ -169,8 +169,9 @@ pub(super) fn group(client: &Client, views: Range<usize>, all: &[Shown<'_>], upl
     let (mut base, mut colours, mut pairs, mut of_all, mut most_chunks) = (0, 0, 0, 0, 0);
     for (shown, picture) in of_group.iter().zip(views.clone()) {
         table.extend(row(shown, [base, colours, pairs, picture, of_all]));
-        of_all += chunks(shown.view);
-        most_chunks = most_chunks.max(chunks(shown.view));
+        let chunks = chunks(shown.view);
+        of_all += chunks;
+        most_chunks = most_chunks.max(chunks);
         base += len(shown.view);
         colours += shown.view.visible.len();
         pairs += shown.view.tiles.pairs();
