@@ -180,7 +180,7 @@ pub fn inspect(path: &Path, asked: &Asked) -> Result<Inspection> {
             learning: clip,
             verifying: clip,
         };
-        embed = Some(predict_memory(size, view, &settings, models, 1));
+        embed = Some(predict_memory(size, view, &settings, models, 1, true));
         let sampler = ViewSampler::seen_from(gaussians, 0, settings.viewpoints(cameras))?;
         let (found, openness) = SceneKind::of(gaussians)?;
         kind = Some(Found {

@@ -61,6 +61,7 @@ pub(super) fn admit(engine: &Engine, scene: &Scene, work: &Work<'_>, marks: usiz
         settings,
         model_bytes(engine, settings),
         marks,
+        engine.on_cpu(),
     );
     engine.limits.admit(&memory)?;
     Ok(memory)

@@ -14,8 +14,16 @@ use crate::splat::Geometry;
 const STEPS: usize = 2;
 /// The same where a card computes the steps: it needs views faster, and the cores have nothing else to do.
 const STEPS_FOR_A_CARD: usize = 4;
-/// Gaussians up to which more steps are prepared for a card: views of large scenes take memory that nobody foresaw.
+/// Gaussians up to which more steps are prepared for a card: views of large scenes take much memory.
 const SMALL: usize = 1 << 18;
+
+/// Steps of a scene of so many Gaussians whose views are prepared while one before is computed.
+pub(super) fn steps_ahead(on_cpu: bool, gaussians: usize) -> usize {
+    match on_cpu || gaussians > SMALL {
+        true => STEPS,
+        false => STEPS_FOR_A_CARD,
+    }
+}
 
 /// Threads that prepare views, of the nearest step first.
 pub(super) struct Preparing<'scope, 'env> {
@@ -40,10 +48,7 @@ impl<'scope, 'env: 'scope> Preparing<'scope, 'env> {
         steps: usize,
         upcoming: impl Fn(usize) -> Upcoming,
     ) {
-        let at_once = match engine.on_cpu() || geometry.len() > SMALL {
-            true => STEPS,
-            false => STEPS_FOR_A_CARD,
-        };
+        let at_once = steps_ahead(engine.on_cpu(), geometry.len());
         while self.running.len() < steps.min(at_once) {
             let (upcoming, geometry) = (upcoming(self.running.len()), geometry.clone());
             let running = self.scope.spawn(move || upcoming.prepare(engine, &geometry));

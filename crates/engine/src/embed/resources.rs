@@ -1,5 +1,6 @@
 //! How much memory an embedding will need, by its settings.
 use super::pooled_view::PooledView;
+use super::preparing::steps_ahead;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::extract::{Engine, cpu_weight_cache};
@@ -8,13 +9,15 @@ use crate::scene::Gaussians;
 use crate::splat::{Geometry, PreparedView};
 use crate::view::{Camera, Split, ViewSampler};
 
-/// Predicts the most memory that an embedding of so many `marks` at once, with these settings, has in use at a time.
+/// Predicts the most memory that an embedding of so many `marks` at once, with these settings, has in use at a time, where
+/// steps are computed on the CPU or on a card.
 pub fn predict_memory(
     scene: SceneSize,
     view: ViewSize,
     settings: &Settings,
     models: ModelBytes,
     marks: usize,
+    on_cpu: bool,
 ) -> MemoryRequirements {
     let distorts_pictures = settings.robust_to.of_pictures().next().is_some();
     let work = EmbeddingWorkload {
@@ -23,6 +26,7 @@ pub fn predict_memory(
         distorted_size: distorts_pictures.then_some(settings.distorted_size),
         views_per_step: settings.views_per_step,
         fresh_per_step: settings.fresh_per_step,
+        steps_ahead: steps_ahead(on_cpu, scene.gaussians as usize),
         pool_views: settings.pool_views,
         pool_bytes: settings.pool_mebibytes << 20,
         early_stop_views: settings.early_stop.map_or(0, |stop| stop.views),
@@ -140,6 +144,7 @@ mod tests {
                 &Preset::Draft.settings(),
                 ModelBytes::default(),
                 1,
+                true,
             );
             admit_marking(&path, &up_to(needed.total()), MemoryRequirements::of_program()).unwrap();
             admit_reading(

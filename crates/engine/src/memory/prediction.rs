@@ -94,6 +94,8 @@ pub struct EmbeddingWorkload {
     pub views_per_step: usize,
     /// How many of them are new.
     pub fresh_per_step: usize,
+    /// Steps to come whose new views are prepared meanwhile.
+    pub steps_ahead: usize,
     /// Most views that are kept for later steps.
     pub pool_views: usize,
     /// Most bytes that these take.
@@ -132,11 +134,17 @@ pub fn embedding_requirements(
     let learned = 4 * scene.gaussians * coefficients(scene.learned_degree);
     let mean = view.mean(work.size);
     let kept = (work.pool_views as f64 * mean).min(work.pool_bytes as f64);
-    // Fresh views have not come into the pool yet; those of the early stop stay.
     let fresh = work
         .fresh_per_step
         .max(work.views_per_step.saturating_sub(work.pool_views));
-    let in_hand = fresh as f64 * mean;
+    // Fresh views push others out of the pool; where it holds few, a step still draws some of these.
+    let few = kept < work.pool_views as f64 * mean;
+    let pushed_out = match few {
+        true => fresh.min(work.views_per_step.saturating_sub(fresh)),
+        false => 0,
+    };
+    // Fresh views, and those of steps to come, have not come into the pool yet; those of the early stop stay.
+    let in_hand = (fresh + pushed_out + work.steps_ahead * work.fresh_per_step) as f64 * mean;
     let held_out = work.early_stop_views as f64 * (view.visible + pixels(work.size) * view.pixel);
     let drawn = 2.0 * 12.0 * pixels(work.size) * work.views_per_step as f64;
     let picture = 12 * u64::from(work.size).pow(2);
@@ -153,8 +161,8 @@ pub fn embedding_requirements(
         offsets: work.marks * (2 * learned + if scene.exact { 0 } else { learned } + 9 * scene.gaussians),
         optimiser: work.marks * (2 * learned + 4 * scene.gaussians),
         views: (kept + in_hand + held_out) as u64 + GEOMETRY_OF_VIEWS * scene.gaussians,
-        // First the one, then the other.
-        pictures: differentiating.max(preparing),
+        // Views are prepared while a step is computed.
+        pictures: differentiating + preparing,
         ..MemoryRequirements::of_program()
     };
     // When the marked scene is verified, views and optimiser are gone, and there are two scenes.

@@ -41,7 +41,7 @@ pub fn memory_is_predicted() {
             exact: true,
             file: 4 * NUMBERS * n,
         };
-        let needed = predict_memory(size, view, &settings, ModelBytes::default(), 1);
+        let needed = predict_memory(size, view, &settings, ModelBytes::default(), 1, true);
         assert_eq!(needed.scene, 2 * 4 * NUMBERS * n);
         assert_eq!(needed.offsets, (2 * 4 * 48 + 9) * n);
         assert_eq!(needed.optimiser, (2 * 4 * 48 + 4) * n);
