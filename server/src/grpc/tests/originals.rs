@@ -69,9 +69,31 @@ async fn a_search_beside_an_original_is_for_its_assets() {
     assert_eq!((found.assets, found.assets_paid), (1, 3));
     let (other, _) = bench.claimed(beside(bench.assets[1].1.clone()), compared(&word)).await;
     assert_eq!(other.verdict(), Verdict::NoMatch);
-    // The marked scene itself, which would give its mark to whatever is compared with it.
+    // The marked scene itself, which would give its mark to whatever is compared with it, is refused before any work.
     let marked = bench.server.upload("marked.ply", b"marked").await.name;
-    let (none, _) = bench.claimed(beside(marked), compared(&word)).await;
-    assert_eq!(none.verdict(), Verdict::UnknownKey);
-    assert!(none.reason.contains("from this original"), "{}", none.reason);
+    let answer = bench.verify(beside(marked)).await;
+    let told = answer.as_ref().unwrap_err().message().to_owned();
+    assert!(
+        told.contains("from which no asset of this key was registered"),
+        "{told}"
+    );
+    assert_eq!(invalid(answer), ["job.verify.original"]);
+}
+
+#[tokio::test]
+async fn an_owner_is_claimed_beside_her_own_originals() {
+    let bench = bench().await;
+    // The first two assets are of the first owner.
+    for (i, (_, original)) in bench.assets.iter().enumerate() {
+        let spec = VerifySpec {
+            owner: bench.owners[0].clone(),
+            original: original.clone(),
+            ..Default::default()
+        };
+        let answer = bench.verify(spec).await;
+        match i {
+            0 | 1 => drop(answer.unwrap()),
+            _ => assert_eq!(invalid(answer), ["job.verify.original"]),
+        }
+    }
 }

@@ -6,10 +6,11 @@ mod disclosure;
 mod hypotheses;
 mod readings;
 
+use futures::TryStreamExt;
 use guardsplat_proto::v1::{EmbedSpec, VerifySpec};
 
 use crate::error::{Error, Result};
-use crate::ledger::{ArtifactId, AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId};
+use crate::ledger::{ArtifactId, AssetId, JobKind, JobRow, JobSpec, KeyRow, OwnerId, candidates};
 use crate::marks;
 use crate::service::names::ResourceKind;
 use crate::service::submission::Submission;
@@ -18,6 +19,9 @@ use crate::service::{Service, upload};
 pub(crate) use conclusion::WorkerReadings;
 pub(crate) use decided::{Best, Decided};
 pub(crate) use disclosure::Disclosure;
+
+/// The field of a verification that names the original.
+const VERIFIED_WITH: &str = "job.verify.original";
 
 /// What a claim is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,10 +96,15 @@ impl Service {
             JobKind::Embed => ("job.embed.asset", "job.embed.key"),
             _ => ("job.verify.asset", "job.verify.key"),
         };
+        let original = match &submission.spec {
+            JobSpec::Verify(spec) => submission.inputs.last().filter(|_| !spec.original.is_empty()),
+            _ => None,
+        };
         let id = match claim {
-            Claim::Search => return Ok(()),
+            Claim::Search => return self.check_registered(project, key, None, original).await,
             Claim::Owner(id) => {
-                return self.owned_owner(project, *id).await.map(|_| ());
+                self.owned_owner(project, *id).await?;
+                return self.check_registered(project, key, Some(*id), original).await;
             }
             Claim::Asset(id) => *id,
         };
@@ -107,10 +116,9 @@ impl Service {
             );
             return Err(Error::invalid(field, reason));
         }
-        if let JobSpec::Verify(spec) = &submission.spec {
-            let original = submission.inputs.last().filter(|_| !spec.original.is_empty());
+        if let JobSpec::Verify(_) = &submission.spec {
             return self
-                .check_original(project, "job.verify.original", original, &asset.sha256)
+                .check_original(project, VERIFIED_WITH, original, &asset.sha256)
                 .await;
         }
         if key.bits != marks::bits() {
@@ -119,6 +127,36 @@ impl Service {
         }
         self.check_original(project, "job.embed.scene", submission.inputs.first(), &asset.sha256)
             .await
+    }
+
+    /// Refuses an original from which no asset of the key, or of this owner of them, was registered: nothing could be
+    /// claimed with it.
+    async fn check_registered(
+        &self,
+        project: &str,
+        key: &KeyRow,
+        owner: Option<OwnerId>,
+        original: Option<&ArtifactId>,
+    ) -> Result<()> {
+        let Some(&id) = original else {
+            return Ok(());
+        };
+        let Some(original) = self.find_artifact(project, id).await?.map(|row| row.sha256) else {
+            return Ok(());
+        };
+        let sha256 = upload::digest(&original);
+        let mut assets = std::pin::pin!(candidates::of_key(self.ledger(), key.id));
+        while let Some(asset) = assets.try_next().await? {
+            if Some(asset.sha256) == sha256 && owner.is_none_or(|owner| owner == asset.owner) {
+                return Ok(());
+            }
+        }
+        let of = match owner {
+            Some(owner) => format!("asset of {} and this key", ResourceKind::Owner.name(owner)),
+            None => "asset of this key".to_owned(),
+        };
+        let reason = format!("has the SHA-256 {original}, from which no {of} was registered");
+        Err(Error::invalid(VERIFIED_WITH, reason))
     }
 
     /// Refuses an original that is not the one that was registered.
