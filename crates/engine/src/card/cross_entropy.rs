@@ -11,8 +11,8 @@ use crate::launch::{CUBE, empty_tensor, grid, sum_of_cube};
 
 const UNITS: usize = CUBE as usize;
 
-/// For logits `[rows][bits]` and targets `[bits]`: `temperature` times the mean of `softplus(z)` to `out` (`[1]`), with `z` the
-/// softened logit, its sign turned where the target is 1; its derivative by each logit to `slopes`.
+/// For logits `[rows][bits]` and targets `[bits]`: `temperature` times the mean of `softplus(z)` to `out` (`[1]`), with `z`
+/// the softened logit, its sign turned where the target is 1; its derivative by each logit to `slopes`.
 #[cube(launch)]
 fn mean_of_all(logits: &[f32], targets: &[f32], out: &mut [f32], slopes: &mut [f32], temperature: f32) {
     let count = logits.len();

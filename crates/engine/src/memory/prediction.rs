@@ -133,13 +133,13 @@ pub fn embedding_requirements(
     let threads = rayon::current_num_threads() as u64;
     let learned = 4 * scene.gaussians * coefficients(scene.learned_degree);
     let mean = view.mean(work.size);
-    let kept = (work.pool_views as f64 * mean).min(work.pool_bytes as f64);
+    let all = work.pool_views as f64 * mean;
+    let kept = all.min(work.pool_bytes as f64);
     let fresh = work
         .fresh_per_step
         .max(work.views_per_step.saturating_sub(work.pool_views));
     // Fresh views push others out of the pool; where it holds few, a step still draws some of these.
-    let few = kept < work.pool_views as f64 * mean;
-    let pushed_out = match few {
+    let pushed_out = match kept < all {
         true => fresh.min(work.views_per_step.saturating_sub(fresh)),
         false => 0,
     };

@@ -138,10 +138,7 @@ impl Service {
         owner: Option<OwnerId>,
         original: Option<&ArtifactId>,
     ) -> Result<()> {
-        let Some(&id) = original else {
-            return Ok(());
-        };
-        let Some(original) = self.find_artifact(project, id).await?.map(|row| row.sha256) else {
+        let Some(original) = self.original_hash(project, original).await? else {
             return Ok(());
         };
         let sha256 = upload::digest(&original);
@@ -167,11 +164,7 @@ impl Service {
         original: Option<&ArtifactId>,
         registered: &[u8; 32],
     ) -> Result<()> {
-        let Some(&id) = original else {
-            return Ok(());
-        };
-        // One that is gone is told of by the ledger, which also knows whether the same was asked for before.
-        let Some(original) = self.find_artifact(project, id).await?.map(|row| row.sha256) else {
+        let Some(original) = self.original_hash(project, original).await? else {
             return Ok(());
         };
         if upload::digest(&original).as_ref() != Some(registered) {
@@ -182,6 +175,15 @@ impl Service {
             return Err(Error::invalid(field, reason));
         }
         Ok(())
+    }
+
+    /// The SHA-256 of an original, if one is given and there. One that is gone is told of by the ledger, which also knows
+    /// whether the same was asked for before.
+    async fn original_hash(&self, project: &str, original: Option<&ArtifactId>) -> Result<Option<String>> {
+        match original {
+            Some(&id) => Ok(self.find_artifact(project, id).await?.map(|row| row.sha256)),
+            None => Ok(None),
+        }
     }
 
     /// The word that an asset of a key is marked with, in hexadecimal, for the worker that marks it.

@@ -28,10 +28,10 @@ use burn::tensor::Tensor;
 /// 2 pi in two parts, for the GPU: multiples of the first by less than 2^15 are exact.
 const TURN: [f32; 2] = [6.281_25, 1.935_307_2e-3];
 
-/// Mean sines `[b, n]` of pictures `[b, 3, h, w]`, for filters `[n, 3]` and phases `[n]`: as many of each scale, which averages
-/// over squares of a side of `sides` pixels first. A pixel weighs its colour's density to the power of minus `equalization`,
-/// from 0 to 1, and at 0 all weigh alike. Differentiable in the pictures; filters, phases and weights are constants. Good to 1e-5 for arguments of some
-/// hundreds of radians.
+/// Mean sines `[b, n]` of pictures `[b, 3, h, w]`, for filters `[n, 3]` and phases `[n]`: as many of each scale, which
+/// averages over squares of a side of `sides` pixels first. A pixel weighs its colour's density to the power of minus
+/// `equalization`, from 0 to 1, and at 0 all weigh alike. Differentiable in the pictures; filters, phases and weights are
+/// constants. Good to 1e-5 for arguments of some hundreds of radians.
 pub(super) fn mean_sines(
     pictures: Tensor<4>,
     filters: Tensor<2>,

@@ -14,6 +14,18 @@ fn rows(n: usize, seed: u64, offset: f32, spread: impl Fn(usize) -> f32) -> Vec<
         .collect()
 }
 
+fn options(remove: usize, keep: Option<usize>) -> FitOptions {
+    FitOptions {
+        remove,
+        keep,
+        ranked: false,
+    }
+}
+
+fn fitted(images: &[f32], texts: &[f32], options: FitOptions) -> Projection {
+    fit(images, texts, WIDTH, options).unwrap()
+}
+
 fn features() -> (Vec<f32>, Vec<f32>) {
     // Pictures vary most in dimensions 0 and 1, texts least in 2.
     let images = rows(400, 1, 0.3, |i| if i < 2 { 5.0 } else { 0.2 + 0.02 * i as f32 });
@@ -32,17 +44,7 @@ fn check_spread(projected: &[f32], rank: usize) -> Vec<f64> {
 #[test]
 fn strong_natural_directions_vanish_and_spreads_agree() {
     let (images, texts) = features();
-    let p = fit(
-        &images,
-        &texts,
-        WIDTH,
-        FitOptions {
-            remove: 2,
-            keep: None,
-            ranked: false,
-        },
-    )
-    .unwrap();
+    let p = fitted(&images, &texts, options(2, None));
     p.check().unwrap();
     assert_eq!((p.width, p.rank), (WIDTH, 10));
     for matrix in [&p.matrix_image, &p.matrix_text] {
@@ -56,17 +58,7 @@ fn strong_natural_directions_vanish_and_spreads_agree() {
 #[test]
 fn texts_vary_alike_in_all_directions() {
     let (images, texts) = features();
-    let p = fit(
-        &images,
-        &texts,
-        WIDTH,
-        FitOptions {
-            remove: 2,
-            keep: Some(9),
-            ranked: false,
-        },
-    )
-    .unwrap();
+    let p = fitted(&images, &texts, options(2, Some(9)));
     let covariance = check_spread(&p.project_text(&texts), p.rank);
     for (i, row) in covariance.chunks_exact(p.rank).enumerate() {
         for (j, value) in row.iter().enumerate() {
@@ -80,17 +72,7 @@ fn texts_vary_alike_in_all_directions() {
 fn noise_has_the_covariance_of_projected_pictures() {
     let (images, texts) = features();
     for keep in [None, Some(4)] {
-        let p = fit(
-            &images,
-            &texts,
-            WIDTH,
-            FitOptions {
-                remove: 3,
-                keep,
-                ranked: false,
-            },
-        )
-        .unwrap();
+        let p = fitted(&images, &texts, options(3, keep));
         let covariance = check_spread(&p.project_image(&images), p.rank);
         let f: Vec<f64> = p.noise.iter().map(|&v| f64::from(v)).collect();
         for (i, row) in f.chunks_exact(p.rank).enumerate() {
@@ -105,17 +87,7 @@ fn noise_has_the_covariance_of_projected_pictures() {
 #[test]
 fn keep_takes_the_directions_in_which_texts_vary() {
     let (images, texts) = features();
-    let p = fit(
-        &images,
-        &texts,
-        WIDTH,
-        FitOptions {
-            remove: 2,
-            keep: Some(9),
-            ranked: false,
-        },
-    )
-    .unwrap();
+    let p = fitted(&images, &texts, options(2, Some(9)));
     let dimension_2 = &p.matrix_text[2 * p.rank..3 * p.rank];
     let other = &p.matrix_text[5 * p.rank..6 * p.rank];
     let norm = |row: &[f32]| row.iter().map(|v| v * v).sum::<f32>();
@@ -126,28 +98,13 @@ fn keep_takes_the_directions_in_which_texts_vary() {
 fn fewer_pictures_than_dimensions_are_enough() {
     let (_, texts) = features();
     let images = rows(6, 4, 0.0, |_| 1.0);
-    let p = fit(
-        &images,
-        &texts,
-        WIDTH,
-        FitOptions {
-            remove: 2,
-            keep: None,
-            ranked: false,
-        },
-    )
-    .unwrap();
+    let p = fitted(&images, &texts, options(2, None));
     p.check().unwrap();
 }
 
 #[test]
 fn bad_input_is_refused() {
     let (images, texts) = features();
-    let options = |remove, keep| FitOptions {
-        remove,
-        keep,
-        ranked: false,
-    };
     let reason = |i: &[f32], t: &[f32], o| fit(i, t, WIDTH, o).unwrap_err().to_string();
     assert!(reason(&images, &texts, options(12, None)).contains("leave nothing of 12"));
     assert!(reason(&images, &texts, options(2, Some(11))).contains("1 to 10"));
