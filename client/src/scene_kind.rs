@@ -13,6 +13,8 @@ pub enum SceneKind {
     Terrain,
     /// Seen from one side
     Forward,
+    /// Something amid its surroundings, seen from around it
+    Unbounded,
 }
 
 /// The number that the API has for a kind; found from the scene where none is given.
@@ -23,6 +25,7 @@ pub fn number(kind: Option<SceneKind>) -> i32 {
         Some(SceneKind::Room) => embed_spec::SceneKind::Room,
         Some(SceneKind::Terrain) => embed_spec::SceneKind::Terrain,
         Some(SceneKind::Forward) => embed_spec::SceneKind::Forward,
+        Some(SceneKind::Unbounded) => embed_spec::SceneKind::Unbounded,
     };
     kind.into()
 }

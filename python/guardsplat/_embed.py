@@ -91,7 +91,7 @@ def embed(
         message: hexadecimal digits, or bytes, as many bits as the key has.
         preset: ``draft``, ``standard``, ``robust``, ``thorough`` or ``paper``.
         cameras: where the scene's viewers are: a file, a folder of COLMAP, or cameras.
-        kind: ``object``, ``room``, ``terrain`` or ``forward``; found from the scene unless given.
+        kind: ``object``, ``room``, ``terrain``, ``forward`` or ``unbounded``; found from the scene unless given.
         seed: decides views, backgrounds and augmentation.
         device: ``auto``, ``wgpu`` or ``cpu``.
         size: side of training views and of those of the verification, in pixels.

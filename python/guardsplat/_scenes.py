@@ -58,7 +58,7 @@ def sample(
 ) -> None:
     """Makes a small scene to try things with, of the format that the name says.
 
-    ``cameras`` is a file for cameras of the viewers of a room, of terrain or of a stage (``forward``).
+    ``cameras`` is a file for cameras of the viewers of a room, of terrain, of a stage (``forward``) or of an ``unbounded`` scene.
     """
     gaussians = within("gaussians", gaussians, 1, 10_000_000)
     degree = within("sh_degree", sh_degree, 0, 4)

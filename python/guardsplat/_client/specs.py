@@ -53,7 +53,7 @@ class Embed(Submission, total=False):
     cameras: FileOrArtifact
     """Where the scene's viewers are: cameras.json, transforms.json or a glTF."""
     kind: str
-    """``object``, ``room``, ``terrain`` or ``forward``."""
+    """``object``, ``room``, ``terrain``, ``forward`` or ``unbounded``."""
     robust_to: str | Iterable[str]
     """What the mark is trained to stand: names, or ``all``."""
     force: bool

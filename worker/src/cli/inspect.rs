@@ -96,6 +96,8 @@ fn kind_text(kind: &Found) -> String {
         hidden_from_behind,
         seen_from_above,
         flatness,
+        spread,
+        surrounded,
         ..
     } = kind.openness;
     let percent = |share: f32| format!("{:.0} %", 100.0 * share);
@@ -105,14 +107,16 @@ fn kind_text(kind: &Found) -> String {
         None => format!("{}, which says nothing where cameras are given", kind.found),
     };
     format!(
-        "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width",
+        "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width; goes {:.1} times as far as what is fine in it, around which {} of the horizon is covered",
         percent(hollow),
         percent(inside),
         percent(seen_from_front),
         percent(hidden_from_front),
         percent(hidden_from_behind),
         percent(seen_from_above),
-        flatness
+        flatness,
+        spread,
+        percent(surrounded)
     )
 }
 

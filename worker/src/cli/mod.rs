@@ -137,6 +137,8 @@ enum Kind {
     Terrain,
     /// Seen from one side
     Forward,
+    /// Something amid its surroundings, seen from around it
+    Unbounded,
 }
 
 impl Kind {
@@ -146,6 +148,7 @@ impl Kind {
             Self::Room => SceneKind::Room,
             Self::Terrain => SceneKind::Terrain,
             Self::Forward => SceneKind::Forward,
+            Self::Unbounded => SceneKind::Unbounded,
         }
     }
 }

@@ -52,6 +52,7 @@ fn kind(number: i32) -> Result<Option<SceneKind>> {
         Ok(ApiKind::Room) => Ok(Some(SceneKind::Room)),
         Ok(ApiKind::Terrain) => Ok(Some(SceneKind::Terrain)),
         Ok(ApiKind::Forward) => Ok(Some(SceneKind::Forward)),
+        Ok(ApiKind::Unbounded) => Ok(Some(SceneKind::Unbounded)),
         Err(_) => Err(Error::BadJob(format!("scene_kind: {number} is none"))),
     }
 }

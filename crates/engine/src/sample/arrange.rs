@@ -1,4 +1,4 @@
-//! What stands where in each kind of sample: solids on a disc, in a room, on hills, on a stage.
+//! What stands where in each kind of sample: solids on a disc, in a room, on hills, on a stage, on a disc amid a landscape.
 use std::f64::consts::TAU;
 
 use rand::{Rng, RngExt};
@@ -22,6 +22,22 @@ pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
     solids
 }
 
+/// A rectangle of half these sides that faces `inwards`.
+fn sheet(half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]) -> Solid {
+    // A sheet's normal is its own -y.
+    let down = inwards.map(|x| -x);
+    let along = if inwards[1] == 0.0 {
+        [0.0, 1.0, 0.0]
+    } else {
+        [1.0, 0.0, 0.0]
+    };
+    Solid {
+        shape: Shape::Sheet { half },
+        axes: [along, down, cross(along, down)],
+        centre: centre.map(|x| x as f32),
+    }
+}
+
 /// Half the sides of a room, and how high it is.
 pub(super) const ROOM: [f64; 2] = [2.0, 1.6];
 pub(super) const CEILING: f64 = 1.7;
@@ -30,20 +46,6 @@ pub(super) const CEILING: f64 = 1.7;
 pub(super) fn furnish(random: &mut impl Rng) -> Vec<Solid> {
     let [a, b] = ROOM;
     let high = 0.5 * CEILING;
-    // A sheet's normal is its own -y, which is turned to point inwards.
-    let sheet = |half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]| {
-        let down = inwards.map(|x| -x);
-        let along = if inwards[1] == 0.0 {
-            [0.0, 1.0, 0.0]
-        } else {
-            [1.0, 0.0, 0.0]
-        };
-        Solid {
-            shape: Shape::Sheet { half },
-            axes: [along, down, cross(along, down)],
-            centre: centre.map(|x| x as f32),
-        }
-    };
     let mut solids = vec![
         sheet([a, b], [0.0, -1.0, 0.0], [0.0; 3]),
         sheet([a, b], [0.0, 1.0, 0.0], [0.0, -CEILING, 0.0]),
@@ -91,6 +93,67 @@ pub(super) fn landscape(random: &mut impl Rng) -> Vec<Solid> {
         });
     }
     solids
+}
+
+/// Radii of the ground around the disc, finer and coarser.
+const GROUNDS: [f64; 2] = [4.5, 16.0];
+/// Half the height of the walls around it, and the radius of the sky.
+const WALL: f64 = 3.5;
+const SKY: f64 = 45.0;
+
+/// The disc of [`arrange`] in wide ground with houses and trees on it, walls behind these, and the sky.
+pub(super) fn surroundings(random: &mut impl Rng) -> Vec<Solid> {
+    let upright = |shape: Shape| Solid {
+        shape,
+        axes: UPRIGHT,
+        centre: [0.0; 3],
+    };
+    let [near, far] = GROUNDS;
+    let mut solids = arrange(random);
+    solids.extend([
+        upright(Shape::Ring {
+            inner: GROUND,
+            outer: near,
+        }),
+        upright(Shape::Ring {
+            inner: near,
+            outer: far,
+        }),
+        sheet([WALL, far], [-1.0, 0.0, 0.0], [far, -WALL, 0.0]),
+        sheet([WALL, far], [1.0, 0.0, 0.0], [-far, -WALL, 0.0]),
+        sheet([WALL, far], [0.0, 0.0, -1.0], [0.0, -WALL, far]),
+        sheet([WALL, far], [0.0, 0.0, 1.0], [0.0, -WALL, -far]),
+        upright(Shape::Sphere { radius: SKY }),
+    ]);
+    for i in 0..HOUSES + TREES {
+        let size = random.random_range(0.8..1.25);
+        let (turn, reach): (f64, f64) = (random.random_range(0.0..TAU), random.random_range(5.0..12.0));
+        let (shape, high) = if i < HOUSES {
+            let half = [1.6 * size, 0.9 * size, 1.1 * size];
+            (Shape::Block { half }, half[1])
+        } else {
+            let half = 1.6 * size;
+            (Shape::Cone { radius: 0.9, half }, half)
+        };
+        solids.push(Solid {
+            shape,
+            axes: turned(random.random_range(0.0..TAU)),
+            centre: [reach * turn.cos(), -high, reach * turn.sin()].map(|x| x as f32),
+        });
+    }
+    solids
+}
+
+/// How coarse a solid of [`surroundings`] is, as trained Gaussians are: in proportion to how far it is from cameras that go
+/// around the disc, and 1 there.
+pub(super) fn coarseness(solid: &Solid) -> f64 {
+    let reach = match solid.shape {
+        Shape::Ring { inner, outer } => 0.5 * (inner + outer),
+        Shape::Sphere { radius } => radius,
+        _ => 0.0,
+    };
+    let [x, _, z] = solid.centre.map(f64::from);
+    (x.hypot(z).max(reach) / GROUND).max(1.0)
 }
 
 /// Where the camera stood, in the mean, that captured a stage; it saw nothing that faces away.
@@ -161,7 +224,7 @@ fn things(random: &mut impl Rng, reaches: [f64; 2]) -> Vec<Solid> {
         let reach = reaches[usize::from(i > 0)];
         let turn = random.random_range(0.0..TAU);
         let (axes, height) = match shape {
-            Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. } => (UPRIGHT, 0.0),
+            Shape::Ground { .. } | Shape::Ring { .. } | Shape::Sheet { .. } | Shape::Hills { .. } => (UPRIGHT, 0.0),
             Shape::Sphere { radius } => (turned(turn), radius),
             // The ring stands on its rim, so that one sees through it.
             Shape::Torus { ring, tube } => (on_edge(turn), ring + tube),

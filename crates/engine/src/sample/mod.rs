@@ -1,7 +1,8 @@
-//! Scenes of the project's own: Gaussians on textured solid shapes that stand on a disc of ground, in a room, on hills, or on
-//! a stage of which only what its captors saw is there.
+//! Scenes of the project's own: Gaussians on textured solid shapes that stand on a disc of ground, in a room, on hills, on
+//! a stage of which only what its captors saw is there, or on a disc amid a landscape.
 //!
-//! Points are spread over each surface in proportion to its area. A Gaussian there is as wide as the spacing of
+//! Points are spread over each surface in proportion to its area; surroundings of the disc are coarser in proportion to
+//! their distance. A Gaussian there is as wide as the spacing of
 //! points and a tenth of that thick along the surface normal, so that the surface closes without fringes. Its
 //! constant colour is the texture under a lamp and a sky; its highlight is a Phong lobe fitted into the spherical
 //! harmonics of the scene's degree.
@@ -66,6 +67,12 @@ pub fn cameras(kind: SceneKind, count: usize) -> Vec<Camera> {
                 let eye = [x + 1.1 * share * angle.cos(), y + 0.5 * share * angle.sin(), z];
                 (eye, [0.3 * eye[0], -0.4 * arrange::STAGE[1] as f32, 0.0])
             }
+            SceneKind::Unbounded => {
+                let (elevation, distance) = (0.2 + 0.15 * (i % 4) as f32, 2.8 + 0.7 * share);
+                let (sine, cosine) = elevation.sin_cos();
+                let eye = [cosine * angle.cos(), -sine, cosine * angle.sin()].map(|x| distance * x);
+                (eye, [0.0, -0.3, 0.0])
+            }
         };
         Camera::look_at(eye, target, [0.0, -1.0, 0.0], 0.9, 640, 480)
     };
@@ -108,10 +115,17 @@ pub fn sample_of(kind: SceneKind, gaussians: usize, sh_degree: usize, seed: u64)
         SceneKind::Room => arrange::furnish(&mut random),
         SceneKind::Terrain => arrange::landscape(&mut random),
         SceneKind::Forward => arrange::stage(&mut random),
+        SceneKind::Unbounded => arrange::surroundings(&mut random),
     };
     let lamp = unit(LAMP).unwrap_or([0.0, -1.0, 0.0]);
     let highlight = Highlight::new(sh_degree);
-    let area: f64 = solids.iter().map(Solid::area).sum();
+    let coarseness = |solid: &Solid| match kind {
+        SceneKind::Unbounded => arrange::coarseness(solid),
+        _ => 1.0,
+    };
+    // Of equally coarse ones.
+    let weighed = |solid: &Solid| solid.area() / coarseness(solid).powi(2);
+    let area: f64 = solids.iter().map(weighed).sum();
     let mut scene = Gaussians {
         sh: Sh {
             degree: sh_degree,
@@ -122,15 +136,20 @@ pub fn sample_of(kind: SceneKind, gaussians: usize, sh_degree: usize, seed: u64)
     let mut area_done = 0.0;
     for solid in &solids {
         let texture = Texture::random(&mut random, solid.is_ground());
-        area_done += solid.area();
+        area_done += weighed(solid);
         // Rounding the running total gives the last solid exactly what is left.
         let count = (gaussians as f64 * area_done / area).round() as usize - scene.len();
         let seen_from = (kind == SceneKind::Forward).then_some(STAND);
         let points = Points::new(solid, count, seen_from);
         let deviation = WIDTH * points.spacing();
+        let finer = 1.0 / coarseness(solid) as f32;
         for i in 0..count {
             let (position, normal) = points.draw(i, &mut random);
-            let shade = shade(texture.colour(solid.to_own_axes(position)), normal, lamp);
+            let shade = shade(
+                texture.colour(solid.to_own_axes(position).map(|x| finer * x)),
+                normal,
+                lamp,
+            );
             scene.positions.push(position);
             scene.rotations.push(facing(normal));
             scene
@@ -210,6 +229,34 @@ mod tests {
             }
             let [a, b] = arrange::ROOM.map(|side| side as f32 + 0.01);
             assert!(scene.positions.iter().all(|p| p[0].abs() < a && p[2].abs() < b));
+        }
+    }
+
+    /// Gaussians are as large as they look from where the cameras are, and nothing stands in their way.
+    #[test]
+    fn surroundings_are_coarse_and_around() {
+        for seed in 0..4 {
+            let scene = sample_of(SceneKind::Unbounded, 4000, 1, seed).unwrap().gaussians;
+            let far = |p: &[f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
+            let size = |which: &dyn Fn(f32) -> bool| {
+                let sizes = scene.positions.iter().zip(&scene.log_scales);
+                let sizes: Vec<f32> = sizes.filter(|(p, _)| which(far(p))).map(|(_, s)| s[0].exp()).collect();
+                sizes.iter().sum::<f32>() / sizes.len() as f32
+            };
+            let [near, away, sky] = [
+                size(&|d| d < 1.4),
+                size(&|d| (6.0..20.0).contains(&d)),
+                size(&|d| d > 40.0),
+            ];
+            assert!(
+                away > 2.5 * near && sky > 3.0 * away,
+                "seed {seed}: {near} {away} {sky}"
+            );
+            for camera in cameras(SceneKind::Unbounded, 24) {
+                let [x, y, z] = camera.centre();
+                let near = |p: &&[f32; 3]| ((p[0] - x).powi(2) + (p[1] - y).powi(2) + (p[2] - z).powi(2)).sqrt() < 0.3;
+                assert_eq!(scene.positions.iter().filter(near).count(), 0, "seed {seed}");
+            }
         }
     }
 

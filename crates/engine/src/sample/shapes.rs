@@ -9,6 +9,11 @@ pub(super) enum Shape {
     Ground {
         radius: f64,
     },
+    /// Level ring, its inner and outer radius.
+    Ring {
+        inner: f64,
+        outer: f64,
+    },
     /// A rectangle, seen from above: half its sides.
     Sheet {
         half: [f64; 2],
@@ -54,6 +59,7 @@ impl Solid {
     pub fn area(&self) -> f64 {
         match self.shape {
             Shape::Ground { radius } => PI * radius * radius,
+            Shape::Ring { inner, outer } => PI * (outer * outer - inner * inner),
             Shape::Sheet { half: [a, b] } => 4.0 * a * b,
             Shape::Hills { half, .. } => 4.0 * half * half,
             Shape::Sphere { radius } => 4.0 * PI * radius * radius,
@@ -68,7 +74,7 @@ impl Solid {
     pub fn is_ground(&self) -> bool {
         matches!(
             self.shape,
-            Shape::Ground { .. } | Shape::Sheet { .. } | Shape::Hills { .. }
+            Shape::Ground { .. } | Shape::Ring { .. } | Shape::Sheet { .. } | Shape::Hills { .. }
         )
     }
 
@@ -112,6 +118,10 @@ fn surface(shape: Shape, u: f64, v: f64) -> ([f64; 3], [f64; 3]) {
     let disc = |radius: f64, share: f64, y: f64| [radius * share.sqrt() * cosine, y, radius * share.sqrt() * sine];
     match shape {
         Shape::Ground { radius } => (disc(radius, u, 0.0), [0.0, -1.0, 0.0]),
+        Shape::Ring { inner, outer } => {
+            let radius = (inner * inner + u * (outer * outer - inner * inner)).sqrt();
+            (disc(radius, 1.0, 0.0), [0.0, -1.0, 0.0])
+        }
         Shape::Sheet { half: [a, b] } => ([a * (2.0 * u - 1.0), 0.0, b * (2.0 * v - 1.0)], [0.0, -1.0, 0.0]),
         Shape::Hills { half, phase } => {
             let [x, z] = [u, v].map(|t| half * (2.0 * t - 1.0));

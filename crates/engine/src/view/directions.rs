@@ -17,6 +17,8 @@ use super::vector::{along, dot, frame, unit};
 const LOWEST: f32 = 0.1;
 /// Lowest sine of elevation over terrain: 35 degrees.
 const OBLIQUE: f32 = 0.573_576_44;
+/// Highest sine of elevation around the focus of an unbounded scene: 53 degrees. Few captors stand higher.
+const ORBIT: f32 = 0.8;
 /// Least cosine to the middle of a forward-facing capture: 25 degrees.
 const FACING: f32 = 0.906_307_8;
 /// Sines of elevation between which one looks about in a room: 30 degrees down to 25 up.
@@ -78,6 +80,11 @@ impl Directions {
     /// From which terrain is seen: above and obliquely.
     pub fn above(up: [f32; 3], random: &mut ChaCha8Rng) -> Self {
         Self::new(Zone::new(up, [OBLIQUE, 1.0], 2 * HELD_OUT_PLACES), random)
+    }
+
+    /// From which the focus of an unbounded scene is seen: above its ground, and not from overhead.
+    pub fn orbiting(up: [f32; 3], random: &mut ChaCha8Rng) -> Self {
+        Self::new(Zone::new(up, [LOWEST, ORBIT], 2 * HELD_OUT_PLACES), random)
     }
 
     /// From which a forward-facing capture is seen: those near `front`.

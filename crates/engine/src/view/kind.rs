@@ -2,9 +2,10 @@
 //!
 //! A scene of fewer than a hundred Gaussians is an object. Else the first of these that holds, on the figures of [`Openness`]:
 //!
+//! * *unbounded*: what is drawn finest is a small part of it, amid surroundings on most sides,
 //! * *terrain*: flat and seen from above,
 //! * *room*: a good part of it is hollow, and something inside is seen by nobody outside,
-//! * *forward*: from one level side most is seen and nearly nothing is hidden, and more is hidden from behind,
+//! * *forward*: from one level side most is seen and nearly nothing is hidden, and much more is hidden from behind,
 //! * *object*: all others.
 //!
 //! Colours do not count, so that a marked scene is of the kind that it was.
@@ -18,6 +19,9 @@ use super::openness::Openness;
 use super::solid::SolidGrid;
 use crate::scene::Gaussians;
 
+/// An unbounded scene goes so much farther than what is fine in it, and covers so much of the horizon there.
+const SPREAD: f32 = 4.0;
+const SURROUNDED: f32 = 0.5;
 /// A room's least share of cells that are free and closed in.
 const HOLLOW: f32 = 0.25;
 /// A room's least share that only those see who are inside.
@@ -25,10 +29,13 @@ const INSIDE: f32 = 0.05;
 /// Terrain is at most so high for its width, and so much of it is seen from above.
 const FLAT: f32 = 0.2;
 const FROM_ABOVE: f32 = 0.75;
-/// So much of a forward-facing capture is seen from its front, at most so much is hidden from there, and so much more from behind.
+/// So much of a forward-facing capture is seen from its front, at most so much is hidden from there, so much from behind, and so
+/// much more. What is hidden from no side, as glass and floaters, is an object: a mark that is made for one side is not read
+/// from another, while one that is made from all around is read from the front as well.
 const FROM_FRONT: f32 = 0.6;
 const HIDDEN: f32 = 0.09;
-const MORE_BEHIND: f32 = 0.03;
+const BEHIND: f32 = 0.08;
+const MORE_BEHIND: f32 = 0.04;
 /// Fewer Gaussians than these say nothing.
 const FEWEST: usize = 100;
 
@@ -44,11 +51,13 @@ pub enum SceneKind {
     Terrain,
     /// What a camera saw that faced one way, seen from that side.
     Forward,
+    /// Something amid its surroundings, seen from around it.
+    Unbounded,
 }
 
 impl SceneKind {
     /// All kinds.
-    pub const ALL: [SceneKind; 4] = [Self::Object, Self::Room, Self::Terrain, Self::Forward];
+    pub const ALL: [SceneKind; 5] = [Self::Object, Self::Room, Self::Terrain, Self::Forward, Self::Unbounded];
 
     /// The kind of a scene, and the figures that say so.
     ///
@@ -57,7 +66,7 @@ impl SceneKind {
     pub fn of(gaussians: &Gaussians) -> crate::Result<(SceneKind, Openness)> {
         let extent = Extent::of(gaussians)?;
         let grid = SolidGrid::of(gaussians, &weights(gaussians));
-        let openness = Openness::of(gaussians, &extent, &grid);
+        let openness = Openness::of(gaussians, &extent, &grid)?;
         Ok((Self::by(&openness), openness))
     }
 
@@ -65,12 +74,15 @@ impl SceneKind {
     pub fn by(found: &Openness) -> SceneKind {
         if found.gaussians < FEWEST {
             Self::Object
+        } else if found.spread >= SPREAD && found.surrounded >= SURROUNDED {
+            Self::Unbounded
         } else if found.flatness <= FLAT && found.seen_from_above >= FROM_ABOVE {
             Self::Terrain
         } else if found.hollow >= HOLLOW && found.inside >= INSIDE {
             Self::Room
         } else if found.seen_from_front >= FROM_FRONT
             && found.hidden_from_front <= HIDDEN
+            && found.hidden_from_behind >= BEHIND
             && found.hidden_from_behind - found.hidden_from_front >= MORE_BEHIND
         {
             Self::Forward
@@ -86,6 +98,7 @@ impl SceneKind {
             Self::Room => "room",
             Self::Terrain => "terrain",
             Self::Forward => "forward",
+            Self::Unbounded => "unbounded",
         }
     }
 }
@@ -101,6 +114,6 @@ impl FromStr for SceneKind {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let found = Self::ALL.into_iter().find(|kind| kind.name() == text);
-        found.ok_or_else(|| format!("{text:?} is none of object, room, terrain, forward"))
+        found.ok_or_else(|| format!("{text:?} is none of object, room, terrain, forward, unbounded"))
     }
 }

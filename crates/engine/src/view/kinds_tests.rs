@@ -61,6 +61,7 @@ fn splits_of_every_kind_are_apart_whatever_the_seeds() {
         (SceneKind::Room, 2.4f32),
         (SceneKind::Terrain, 1.7),
         (SceneKind::Forward, 1.2),
+        (SceneKind::Unbounded, 1.7),
     ] {
         let scene = scene(kind, 1);
         let [a, b] = [4, 5].map(|seed| ViewSampler::new(&scene, seed).unwrap());
@@ -132,6 +133,53 @@ fn a_stage_is_seen_from_its_front_and_terrain_from_above() {
                 view.centre()
             );
         }
+    }
+}
+
+/// Marks of forward-facing captures are not read from behind, so nothing may be taken for one because nothing hides behind it.
+#[test]
+fn glass_and_floaters_leave_an_object_an_object() {
+    for seed in 0..4 {
+        let mut glass = scene(SceneKind::Object, seed);
+        glass.opacity_logits.fill(-2.0);
+        assert_eq!(SceneKind::of(&glass).unwrap().0, SceneKind::Object, "glass {seed}");
+        let mut floaters = scene(SceneKind::Object, seed);
+        for i in 0..200 {
+            let (sine, cosine) = (i as f32 * 2.4).sin_cos();
+            let reach = 2.0 + 0.02 * i as f32;
+            floaters.positions[20 * i] = [reach * cosine, 3.0 * (i as f32 * 0.77).sin() - 1.0, reach * sine];
+            floaters.log_scales[20 * i] = [-2.5; 3];
+        }
+        let (kind, openness) = SceneKind::of(&floaters).unwrap();
+        assert_eq!(kind, SceneKind::Object, "floaters {seed}: {openness:?}");
+    }
+}
+
+#[test]
+fn viewers_of_an_unbounded_scene_stand_around_what_it_was_captured_for() {
+    for seed in 0..3 {
+        let scene = scene(SceneKind::Unbounded, seed);
+        let sampler = ViewSampler::new(&scene, seed).unwrap();
+        assert_eq!(sampler.kind(), SceneKind::Unbounded);
+        let mut sides = [false; 8];
+        for split in [Split::Training, Split::HeldOut] {
+            for view in views(&sampler, split) {
+                let [x, y, z] = view.centre();
+                let reach = x.hypot(z);
+                // Above the ground (y points down), beyond the disc's things and before the nearest house.
+                assert!((1.0..9.0).contains(&reach) && y < -0.1, "seed {seed}: {reach}, {y}");
+                // The disc's middle is in the middle half of the picture.
+                let ahead = dot(view.rotation[2], sub([0.0, -0.3, 0.0], [x, y, z]));
+                let aside = dot(view.rotation[0], sub([0.0, -0.3, 0.0], [x, y, z]));
+                assert!(
+                    ahead > 0.0 && (aside / ahead).abs() < 0.25,
+                    "seed {seed}: {aside} of {ahead}"
+                );
+                let turn = z.atan2(x) / std::f32::consts::TAU + 0.5;
+                sides[((turn * 8.0) as usize).min(7)] = true;
+            }
+        }
+        assert_eq!(sides, [true; 8]);
     }
 }
 

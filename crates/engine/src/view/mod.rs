@@ -4,6 +4,7 @@ mod colmap;
 mod directions;
 mod extent;
 mod files;
+mod focus;
 mod given;
 mod gltf;
 mod inside;
@@ -12,6 +13,7 @@ mod kind;
 #[cfg(test)]
 mod kinds_tests;
 mod openness;
+mod orbit;
 mod sampler;
 mod solid;
 pub(crate) mod vector;

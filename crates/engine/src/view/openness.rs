@@ -5,8 +5,10 @@
 //! surface lie there. From free cells the same looks tell how far they are *closed in*.
 use super::directions::lattice;
 use super::extent::{Extent, weights};
+use super::focus::Focus;
 use super::solid::SolidGrid;
 use super::vector::dot;
+use crate::error::Result;
 use crate::scene::Gaussians;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -59,11 +61,18 @@ pub struct Openness {
     pub seen_from_above: f32,
     /// Height over width, of the middle nine tenths of what is shown.
     pub flatness: f32,
+    /// How much farther what is shown goes than what is drawn finest.
+    pub spread: f32,
+    /// Share of the horizon, as seen from there, that surroundings cover.
+    pub surrounded: f32,
 }
 
 impl Openness {
     /// Measures a scene with its grid; the same scene gives the same figures, whatever its colours.
-    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, grid: &SolidGrid) -> Self {
+    ///
+    /// # Errors
+    /// Those of [`Extent::of`].
+    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, grid: &SolidGrid) -> Result<Self> {
         let looks: Vec<[f32; 3]> = lattice(LOOKS).collect();
         let length = grid.side * *grid.counts.iter().max().unwrap_or(&1) as f32;
         let rows = drawn(&weights(gaussians));
@@ -101,7 +110,8 @@ impl Openness {
         let level = (0..LOOKS).filter(|side| dot(looks[*side], extent.up).abs() < LEVEL);
         let front = level.max_by(|a, b| open(*a).total_cmp(&open(*b))).unwrap_or(0);
         let behind = nearest(looks[front].map(|x| -x));
-        Self {
+        let focus = Focus::of(gaussians)?;
+        Ok(Self {
             gaussians: gaussians.len(),
             hollow: hollow(grid, &looks, extent.up),
             inside: inside as f32 / count,
@@ -111,7 +121,9 @@ impl Openness {
             hidden_from_behind: hidden[behind],
             seen_from_above: seen[nearest(extent.up)],
             flatness: flatness(gaussians, extent),
-        }
+            spread: focus.spread,
+            surrounded: focus.surrounded,
+        })
     }
 }
 

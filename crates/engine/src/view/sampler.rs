@@ -6,7 +6,8 @@
 //!   ground ([`Extent::on_ground`]). Each camera fills its picture with the scene;
 //! * terrain: above and obliquely, over the whole or a part of it;
 //! * forward: near the side from which it was captured, as around an object;
-//! * room: at free places [inside](super::inside), looking about.
+//! * room: at free places [inside](super::inside), looking about;
+//! * unbounded: at free places [around](super::orbit) what it was captured for, which is in the middle of the picture.
 //!
 //! **Split.** Held-out directions lie in caps around fixed places, training directions outside of larger ones. So views held
 //! out under one seed are apart from the training views of every seed. For objects that is 2.5 degrees.
@@ -27,10 +28,12 @@ use rand_chacha::ChaCha8Rng;
 use super::camera::Camera;
 use super::directions::Directions;
 use super::extent::{Extent, weights};
+use super::focus::Focus;
 use super::given::GivenViews;
 use super::inside::InsideViews;
 use super::kind::SceneKind;
 use super::openness::Openness;
+use super::orbit::Orbit;
 use super::solid::SolidGrid;
 use super::vector::{along, frame};
 use crate::error::{Error, Result};
@@ -47,10 +50,18 @@ const MEAN_FILL: f32 = 0.5 * (FILL.start + FILL.end);
 const FILL_FORWARD: std::ops::Range<f32> = 0.7..1.0;
 /// The same over terrain.
 const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
+/// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
+/// the ground on which they stood is as fine, hardly more than one.
+const FILL_UNBOUNDED: std::ops::Range<f32> = 0.4..1.2;
 /// How far from the centre views aim, in radii.
 const AIM: f32 = 0.04;
+/// The same around the focus of an unbounded scene.
+const AIM_UNBOUNDED: f32 = 0.3;
 /// The same over terrain, along the ground, times what the picture does not show.
 const AIM_TERRAIN: f32 = 0.7;
+
+/// How often a view of an unbounded scene is drawn anew before it is taken from where it is.
+const TRIES: usize = 8;
 
 /// Which of the two disjoint sets of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +92,8 @@ pub struct ViewSampler {
     ring: Option<f32>,
     /// Where views stand inside a room.
     inside: Option<Arc<InsideViews>>,
+    /// Where they stand around the focus of an unbounded scene.
+    orbit: Option<Arc<Orbit>>,
     /// Where views are, if not where the scene says.
     given: Option<Arc<GivenViews>>,
 }
@@ -108,7 +121,7 @@ impl ViewSampler {
     /// # Errors
     /// Those of [`Extent::of`] and [`GivenViews::new`], and [`Error::BadOption`] for a room without a free place inside.
     pub fn seen_from(gaussians: &Gaussians, seed: u64, viewpoints: Viewpoints<'_>) -> Result<ViewSampler> {
-        let extent = Extent::of(gaussians)?;
+        let mut extent = Extent::of(gaussians)?;
         let given = match viewpoints.cameras {
             [] => None,
             cameras => Some(Arc::new(GivenViews::new(gaussians, cameras)?)),
@@ -120,19 +133,26 @@ impl ViewSampler {
         let mut random = stream(seed, u64::MAX);
         let mut inside = None;
         let (kind, front, grid) = match known {
-            Some(kind @ (SceneKind::Object | SceneKind::Terrain)) => (kind, extent.up, None),
+            Some(kind @ (SceneKind::Object | SceneKind::Terrain | SceneKind::Unbounded)) => (kind, extent.up, None),
             Some(kind @ SceneKind::Room) => (kind, extent.up, Some(grid())),
             Some(SceneKind::Forward) | None => {
                 let grid = grid();
-                let openness = openness(&grid);
+                let openness = openness(&grid)?;
                 (known.unwrap_or(SceneKind::by(&openness)), openness.front, Some(grid))
             }
         };
+        let mut orbit = None;
+        if kind == SceneKind::Unbounded {
+            extent = Focus::of(gaussians)?.extent;
+            let reach = extent.radius * FILL_UNBOUNDED.end / (0.5 * FIELD_OF_VIEW).sin();
+            orbit = Some(Arc::new(Orbit::new(gaussians, &extent, reach + extent.radius)));
+        }
         let directions = match kind {
             SceneKind::Object => Directions::around(&extent, &mut random),
             SceneKind::Terrain => Directions::above(extent.up, &mut random),
             SceneKind::Forward => Directions::facing(front, &mut random),
             SceneKind::Room => Directions::level(extent.up, &mut random),
+            SceneKind::Unbounded => Directions::orbiting(extent.up, &mut random),
         };
         if let (SceneKind::Room, Some(grid)) = (kind, grid) {
             inside = Some(Arc::new(InsideViews::new(grid, &extent)?));
@@ -144,6 +164,7 @@ impl ViewSampler {
             directions,
             ring: None,
             inside,
+            orbit,
             given,
         })
     }
@@ -183,7 +204,7 @@ impl ViewSampler {
 
     /// Whether every view shows another part of the scene, and none the whole.
     pub fn shows_parts(&self) -> bool {
-        self.given.is_some() || self.inside.is_some()
+        self.given.is_some() || self.inside.is_some() || self.orbit.is_some()
     }
 
     /// Whether all views are of a forward-facing capture, from its front.
@@ -215,7 +236,14 @@ impl ViewSampler {
             return inside.look(direction, self.extent.up, size, &mut random);
         }
         let still = split == Split::Training && self.ring.is_some();
-        self.place(direction, size, still, &mut random)
+        let mut view = self.place(direction, size, still, &mut random);
+        if let Some(orbit) = &self.orbit {
+            let mut tries = 1..TRIES;
+            while !orbit.is_clear(view.centre(), &self.extent) && tries.next().is_some() {
+                view = self.place(direction, size, still, &mut random);
+            }
+        }
+        view
     }
 
     /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane. `still` ones are
@@ -228,6 +256,11 @@ impl ViewSampler {
             (false, SceneKind::Object | SceneKind::Room) => random.random_range(FILL),
             (false, SceneKind::Forward) => random.random_range(FILL_FORWARD),
             (false, SceneKind::Terrain) => random.random_range(FILL_TERRAIN),
+            (false, SceneKind::Unbounded) => random.random_range(FILL_UNBOUNDED),
+        };
+        let off = match self.kind {
+            SceneKind::Unbounded => AIM_UNBOUNDED,
+            _ => AIM,
         };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
@@ -235,7 +268,7 @@ impl ViewSampler {
         let field_of_view = 2.0 * (radius * fill / distance).min(0.99).asin();
         let aim: [f32; 3] = match still {
             true => [0.0; 3],
-            false => std::array::from_fn(|_| random.random_range(-AIM..AIM)),
+            false => std::array::from_fn(|_| random.random_range(-off..off)),
         };
         let mut target = along(centre, radius, aim);
         if terrain {

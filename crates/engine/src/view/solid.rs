@@ -1,7 +1,7 @@
 //! Where a scene is solid and where it is free: a coarse grid of cells, and rays through it.
 //!
-//! The grid spans the middle 96 % of what the scene shows along each axis, with a margin, in cubes of a 48th of its longest
-//! side. A cell is solid when Gaussians cover at least a quarter of one of its faces; each counts with its opacity, spread
+//! The grid spans the middle 96 % of what the scene shows along each axis, with a margin, or as much as it is told, in cubes of
+//! a 48th of its longest side. A cell is solid when Gaussians cover at least a quarter of one of its faces; each counts with its opacity, spread
 //! over its two longer axes. Fields of a grid are coarse on purpose: a shell of several layers is one layer.
 use super::extent::{quantiles, shortest_axis};
 use super::vector::along;
@@ -46,6 +46,17 @@ impl SolidGrid {
         let size = |scales: &[f32; 3]| scales.iter().map(|s| f64::from(s.exp())).fold(0.0, f64::max);
         let [largest] = quantiles(gaussians.log_scales.iter().map(size), weights, [0.5]);
         let longest = (1.0 + 2.0 * MARGIN) * longest.max(largest).max(1e-6);
+        Self::spanning(gaussians, ends, longest)
+    }
+
+    /// The grid of what is between two ends along each axis, world units.
+    pub fn within(gaussians: &Gaussians, ends: [[f64; 2]; 3]) -> Self {
+        let longest = ends.iter().map(|[low, high]| high - low).fold(1e-6, f64::max);
+        Self::spanning(gaussians, ends, longest)
+    }
+
+    /// The grid of what is between two ends and a margin beyond them, whose cells are a part of `longest`.
+    fn spanning(gaussians: &Gaussians, ends: [[f64; 2]; 3], longest: f64) -> Self {
         let side = longest / CELLS;
         let margin = MARGIN * longest;
         let mut grid = Self {
