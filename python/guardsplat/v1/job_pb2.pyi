@@ -132,11 +132,13 @@ class EmbedSpec(_message.Message):
         SCENE_KIND_ROOM: _ClassVar[EmbedSpec.SceneKind]
         SCENE_KIND_TERRAIN: _ClassVar[EmbedSpec.SceneKind]
         SCENE_KIND_FORWARD: _ClassVar[EmbedSpec.SceneKind]
+        SCENE_KIND_UNBOUNDED: _ClassVar[EmbedSpec.SceneKind]
     SCENE_KIND_UNSPECIFIED: EmbedSpec.SceneKind
     SCENE_KIND_OBJECT: EmbedSpec.SceneKind
     SCENE_KIND_ROOM: EmbedSpec.SceneKind
     SCENE_KIND_TERRAIN: EmbedSpec.SceneKind
     SCENE_KIND_FORWARD: EmbedSpec.SceneKind
+    SCENE_KIND_UNBOUNDED: EmbedSpec.SceneKind
     SCENE_FIELD_NUMBER: _ClassVar[int]
     KEY_FIELD_NUMBER: _ClassVar[int]
     MESSAGE_FIELD_NUMBER: _ClassVar[int]

@@ -97,6 +97,7 @@ impl Preset {
             enlarged: 9.0,
             black_backgrounds: 0.1,
             windows: 0.25,
+            cut_out: 0.25,
             lambda: LossWeights {
                 reconstruction: 1.0,
                 l1: 0.0,
@@ -244,6 +245,7 @@ impl Preset {
                 enlarged: 1.0,
                 black_backgrounds: 0.0,
                 windows: 0.0,
+                cut_out: 0.0,
                 distorted_size: 224,
                 distorted_views: None,
                 robust_to: RobustTo::none(),

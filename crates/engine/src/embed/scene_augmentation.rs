@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use crate::splat::{Geometry, PreparedView};
+use crate::view::vector::{dot, sub};
 
 /// Largest deviation of noise on coefficients that a mark is to stand; smaller ones are drawn too.
 const NOISE: f32 = 0.1;
@@ -33,6 +34,8 @@ pub(super) enum SceneAugmentation {
     Noise { dc: f32, rest: f32, seed: u64 },
     /// A share of the Gaussians is left out, at random.
     Prune { share: f32, seed: u64 },
+    /// What lies farther than a radius from a centre is left out, world units.
+    CutOut { centre: [f32; 3], radius: f32 },
 }
 
 impl SceneAugmentation {
@@ -56,11 +59,17 @@ impl SceneAugmentation {
 
     /// The scene without the Gaussians that are left out, where there are any; rows stay what they were.
     pub fn pruned<'a>(self, geometry: &Geometry<'a>) -> Option<Geometry<'a>> {
-        let Self::Prune { share, seed } = self else {
-            return None;
-        };
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        Some(geometry.without(|| rng.random::<f32>() < share))
+        match self {
+            Self::Prune { share, seed } => {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                Some(geometry.without(|_| rng.random::<f32>() < share))
+            }
+            Self::CutOut { centre, radius } => Some(geometry.without(|position| {
+                let from_centre = sub(position, centre);
+                dot(from_centre, from_centre) > radius * radius
+            })),
+            _ => None,
+        }
     }
 
     /// What is added to the colours of the visible Gaussians of a view, `[visible][3]`; empty for nothing. Noise of the

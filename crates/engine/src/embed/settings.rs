@@ -160,6 +160,10 @@ pub struct Settings {
     /// Share of training views of a forward-facing capture of which a part is shown, 0.35 to 0.9 of each side: what is left of
     /// a cropped picture is another part of such a scene each time, and views of the whole teach no mark to be read there.
     pub windows: f32,
+    /// Share of training views of an unbounded scene that show what it was captured for alone: people cut that out, and its
+    /// surroundings carry a good part of the mark.
+    #[serde(default, skip_serializing_if = "is_none_of_them")]
+    pub cut_out: f32,
     /// Weights of the loss.
     pub lambda: LossWeights,
     /// Views of a step that LPIPS looks at, the next ones at every step; its time is nearly all of a step's. `None` for all.
@@ -280,6 +284,7 @@ impl Settings {
         within("enlarged", f64::from(self.enlarged), 1.0, 16.0)?;
         within("black_backgrounds", f64::from(self.black_backgrounds), 0.0, 1.0)?;
         within("windows", f64::from(self.windows), 0.0, 1.0)?;
+        within("cut_out", f64::from(self.cut_out), 0.0, 1.0)?;
         let l = &self.lambda;
         for (field, value) in [
             ("lambda.reconstruction", l.reconstruction),
@@ -320,6 +325,10 @@ impl Settings {
 /// Settings from before this one was there have the hash that they had.
 fn once() -> u32 {
     1
+}
+
+fn is_none_of_them(share: &f32) -> bool {
+    *share == 0.0
 }
 
 fn is_once(times: &u32) -> bool {

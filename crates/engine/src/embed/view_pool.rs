@@ -20,6 +20,8 @@ use crate::view::{Camera, Split, ViewSampler};
 
 /// How much of each side a window has.
 const KEPT: std::ops::Range<f32> = 0.35..0.9;
+/// What is cut out of an unbounded scene, in radii of its focus.
+const CUT_OUT: std::ops::Range<f32> = 1.0..1.5;
 /// Views enough have been looked at when as many as a step's show no more than this share of new Gaussians.
 const NEWLY_SEEN: f64 = 1e-3;
 /// Most views that are looked at to find the Gaussians that can be seen.
@@ -81,18 +83,27 @@ impl ViewMaker {
     }
 
     /// How a training view is drawn, seeded: over white, or black for a share of the views; for pictures of up to
-    /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand.
+    /// [`Settings::enlarged`] times its size; and what happened to the scene, of what the mark is to stand, or that all but the
+    /// focus of an unbounded scene was cut off.
     fn chosen(&self, index: u64, degree: usize) -> TrainingView {
         let s = &self.settings;
         let mut rng = ChaCha8Rng::seed_from_u64(s.seed.wrapping_add(1));
         rng.set_stream(index);
         let black = rng.random::<f32>() < s.black_backgrounds;
         let times = 1.0 + (s.enlarged - 1.0) * rng.random::<f32>();
+        let cut_out = self.sampler.focus().filter(|_| rng.random::<f32>() < s.cut_out);
+        let augmentation = match cut_out {
+            Some(focus) => SceneAugmentation::CutOut {
+                centre: focus.centre,
+                radius: focus.radius * rng.random_range(CUT_OUT),
+            },
+            None => SceneAugmentation::draw(s.robust_to, degree, s.seed, index),
+        };
         TrainingView {
             times,
             half: s.half_weights,
             background: if black { [0.0; 3] } else { [1.0; 3] },
-            augmentation: SceneAugmentation::draw(s.robust_to, degree, s.seed, index),
+            augmentation,
         }
     }
 }

@@ -50,13 +50,14 @@ impl<'a> Geometry<'a> {
         &self.gaussians.sh
     }
 
-    /// Without the Gaussians for which `left_out` says so, which is asked in the order of rows. Rows stay what they were.
-    pub fn without(&self, mut left_out: impl FnMut() -> bool) -> Self {
-        let keep = |opacity: &f32| if left_out() { 0.0 } else { *opacity };
+    /// Without the Gaussians for which `left_out` says so, which is asked for their positions in the order of rows. Rows stay
+    /// what they were.
+    pub fn without(&self, mut left_out: impl FnMut([f32; 3]) -> bool) -> Self {
+        let keep = |(opacity, position): (&f32, &[f32; 3])| if left_out(*position) { 0.0 } else { *opacity };
         Self {
             gaussians: self.gaussians,
             scales: self.scales.clone(),
-            opacities: self.opacities.iter().map(keep).collect(),
+            opacities: self.opacities.iter().zip(&self.gaussians.positions).map(keep).collect(),
         }
     }
 

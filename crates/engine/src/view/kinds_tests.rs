@@ -168,11 +168,11 @@ fn viewers_of_an_unbounded_scene_stand_around_what_it_was_captured_for() {
                 let reach = x.hypot(z);
                 // Above the ground (y points down), beyond the disc's things and before the nearest house.
                 assert!((1.0..9.0).contains(&reach) && y < -0.1, "seed {seed}: {reach}, {y}");
-                // The disc's middle is in the middle half of the picture.
+                // The middle of the disc is in the picture.
                 let ahead = dot(view.rotation[2], sub([0.0, -0.3, 0.0], [x, y, z]));
                 let aside = dot(view.rotation[0], sub([0.0, -0.3, 0.0], [x, y, z]));
                 assert!(
-                    ahead > 0.0 && (aside / ahead).abs() < 0.25,
+                    ahead > 0.0 && (aside / ahead).abs() < 0.4,
                     "seed {seed}: {aside} of {ahead}"
                 );
                 let turn = z.atan2(x) / std::f32::consts::TAU + 0.5;

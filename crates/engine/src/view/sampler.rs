@@ -212,7 +212,12 @@ impl ViewSampler {
         self.kind == SceneKind::Forward && self.given.is_none()
     }
 
-    /// Where and how large the scene is.
+    /// What an unbounded scene was captured for, where views go around that.
+    pub fn focus(&self) -> Option<&Extent> {
+        (self.orbit.is_some() && self.given.is_none()).then_some(&self.extent)
+    }
+
+    /// Where and how large the scene is, or the focus of one that is unbounded.
     pub fn extent(&self) -> &Extent {
         &self.extent
     }
