@@ -114,7 +114,7 @@ impl TracedView {
                 background: how.background,
             }),
             _ => Err(Error::BadOption {
-                field: "robust_to",
+                field: "robust_to, cut_out",
                 reason: "only what drops bands of spherical harmonics can be traced".into(),
             }),
         }

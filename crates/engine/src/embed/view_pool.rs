@@ -302,4 +302,36 @@ mod tests {
         assert_eq!(parts(SceneKind::Object, standard), 0);
         assert_eq!(parts(SceneKind::Forward, Preset::Paper.settings()), 0);
     }
+
+    #[test]
+    fn some_views_of_an_unbounded_scene_show_its_focus_alone() {
+        let alone = |kind, settings: Settings| {
+            let scene = sample_of(kind, 4000, 0, 1).unwrap().gaussians;
+            let geometry = Geometry::new(&scene);
+            let sampler = ViewSampler::new(&scene, 1).unwrap();
+            let maker = ViewMaker { sampler, settings };
+            let shown = |index| -> Option<Vec<[f32; 3]>> {
+                let how = maker.chosen(index, 0);
+                let SceneAugmentation::CutOut { .. } = how.augmentation else {
+                    return None;
+                };
+                let left = how.augmentation.pruned(&geometry)?;
+                let view = left
+                    .prepare(&maker.camera(index), crate::splat::WeightCache::None)
+                    .unwrap();
+                Some(view.visible.iter().map(|row| scene.positions[*row as usize]).collect())
+            };
+            (0..200).filter_map(shown).collect::<Vec<_>>()
+        };
+        let standard = Preset::Standard.settings();
+        let views = alone(SceneKind::Unbounded, standard);
+        assert!((35..65).contains(&views.len()), "{}", views.len());
+        // The disc and what stands on it, and nothing of the houses, the walls and the sky.
+        for view in &views {
+            let farthest = view.iter().map(|p| p[0].hypot(p[2])).fold(0.0, f32::max);
+            assert!(view.len() > 100 && (1.0..4.5).contains(&farthest), "{farthest}");
+        }
+        assert_eq!(alone(SceneKind::Object, standard).len(), 0);
+        assert_eq!(alone(SceneKind::Unbounded, Preset::Paper.settings()).len(), 0);
+    }
 }

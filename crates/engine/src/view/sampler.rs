@@ -52,7 +52,7 @@ const FILL_FORWARD: std::ops::Range<f32> = 0.7..1.0;
 const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
 /// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
 /// the ground on which they stood is as fine, hardly more than one.
-const FILL_UNBOUNDED: std::ops::Range<f32> = 0.4..1.2;
+const FILL_UNBOUNDED: std::ops::Range<f32> = 0.5..1.2;
 /// How far from the centre views aim, in radii.
 const AIM: f32 = 0.04;
 /// The same around the focus of an unbounded scene.
