@@ -14,7 +14,6 @@ use std::f64::consts::TAU;
 
 use super::extent::{Extent, quantiles, weights};
 use super::vector::{dot, frame, sub};
-use crate::error::Result;
 use crate::scene::Gaussians;
 
 /// Share of Gaussians that are all taken for as fine as the coarsest of them.
@@ -42,11 +41,8 @@ pub(super) struct Focus {
 }
 
 impl Focus {
-    /// Finds the focus of a scene.
-    ///
-    /// # Errors
-    /// Those of [`Extent::of`].
-    pub fn of(gaussians: &Gaussians) -> Result<Self> {
+    /// Finds the focus of a scene of that extent.
+    pub fn of(gaussians: &Gaussians, whole: &Extent) -> Self {
         let shown = weights(gaussians);
         let fine = fineness(gaussians);
         let centre: [f64; 3] = std::array::from_fn(|k| {
@@ -62,26 +58,25 @@ impl Focus {
         let [most] = quantiles(distances.iter().copied(), &fine, [MOST]);
         let radius = RADIUS * most;
         let [far] = quantiles(distances.iter().copied(), &shown, [MOST]);
-        let whole = Extent::of(gaussians)?;
         // Where all that is fine is at one place there is nothing to go around.
         if !(radius > 0.0 && radius.is_finite()) {
-            return Ok(Self {
-                extent: whole,
+            return Self {
+                extent: whole.clone(),
                 spread: 1.0,
                 surrounded: 0.0,
-            });
+            };
         }
-        let near = Extent::of(&nearer(gaussians, &distances, AROUND * radius)).unwrap_or(whole);
+        let near = Extent::of(&nearer(gaussians, &distances, AROUND * radius)).unwrap_or_else(|_| whole.clone());
         let extent = Extent {
             centre: centre.map(|x| x as f32),
             radius: radius as f32,
             ..near
         };
-        Ok(Self {
+        Self {
             spread: (far / most) as f32,
             surrounded: surrounded(gaussians, &distances, &extent),
             extent,
-        })
+        }
     }
 }
 

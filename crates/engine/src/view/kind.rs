@@ -66,7 +66,7 @@ impl SceneKind {
     pub fn of(gaussians: &Gaussians) -> crate::Result<(SceneKind, Openness)> {
         let extent = Extent::of(gaussians)?;
         let grid = SolidGrid::of(gaussians, &weights(gaussians));
-        let openness = Openness::of(gaussians, &extent, &grid)?;
+        let openness = Openness::of(gaussians, &extent, &grid);
         Ok((Self::by(&openness), openness))
     }
 

@@ -8,7 +8,6 @@ use super::extent::{Extent, weights};
 use super::focus::Focus;
 use super::solid::SolidGrid;
 use super::vector::dot;
-use crate::error::Result;
 use crate::scene::Gaussians;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -69,10 +68,7 @@ pub struct Openness {
 
 impl Openness {
     /// Measures a scene with its grid; the same scene gives the same figures, whatever its colours.
-    ///
-    /// # Errors
-    /// Those of [`Extent::of`].
-    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, grid: &SolidGrid) -> Result<Self> {
+    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, grid: &SolidGrid) -> Self {
         let looks: Vec<[f32; 3]> = lattice(LOOKS).collect();
         let length = grid.side * *grid.counts.iter().max().unwrap_or(&1) as f32;
         let rows = drawn(&weights(gaussians));
@@ -110,8 +106,8 @@ impl Openness {
         let level = (0..LOOKS).filter(|side| dot(looks[*side], extent.up).abs() < LEVEL);
         let front = level.max_by(|a, b| open(*a).total_cmp(&open(*b))).unwrap_or(0);
         let behind = nearest(looks[front].map(|x| -x));
-        let focus = Focus::of(gaussians)?;
-        Ok(Self {
+        let focus = Focus::of(gaussians, extent);
+        Self {
             gaussians: gaussians.len(),
             hollow: hollow(grid, &looks, extent.up),
             inside: inside as f32 / count,
@@ -123,7 +119,7 @@ impl Openness {
             flatness: flatness(gaussians, extent),
             spread: focus.spread,
             surrounded: focus.surrounded,
-        })
+        }
     }
 }
 

@@ -137,13 +137,13 @@ impl ViewSampler {
             Some(kind @ SceneKind::Room) => (kind, extent.up, Some(grid())),
             Some(SceneKind::Forward) | None => {
                 let grid = grid();
-                let openness = openness(&grid)?;
+                let openness = openness(&grid);
                 (known.unwrap_or(SceneKind::by(&openness)), openness.front, Some(grid))
             }
         };
         let mut orbit = None;
         if kind == SceneKind::Unbounded {
-            extent = Focus::of(gaussians)?.extent;
+            extent = Focus::of(gaussians, &extent).extent;
             let reach = extent.radius * FILL_UNBOUNDED.end / (0.5 * FIELD_OF_VIEW).sin();
             orbit = Some(Arc::new(Orbit::new(gaussians, &extent, reach + extent.radius)));
         }
