@@ -5,6 +5,7 @@
 //! at least the 10 % quantile of all. Then
 //!
 //! * centre: per axis, midway between the 10 % and the 90 % quantile of the positions;
+//! * up: away from the [ground](super::ground) there;
 //! * radius: 1.25 times the 75 % quantile of the distance to the centre, since some of what is fine lies scattered about;
 //! * spread: the 75 % quantile of that distance by what Gaussians show (as [`Extent`] counts them) over that by how fine they
 //!   are. About 1 where all is equally fine;
@@ -13,6 +14,7 @@
 use std::f64::consts::TAU;
 
 use super::extent::{Extent, quantiles, weights};
+use super::ground::upright;
 use super::vector::{dot, frame, sub};
 use crate::scene::Gaussians;
 
@@ -67,11 +69,12 @@ impl Focus {
             };
         }
         let near = Extent::of(&nearer(gaussians, &distances, AROUND * radius)).unwrap_or_else(|_| whole.clone());
-        let extent = Extent {
+        let mut extent = Extent {
             centre: centre.map(|x| x as f32),
             radius: radius as f32,
             ..near
         };
+        extent.up = upright(gaussians, &shown, &extent);
         Self {
             spread: (far / most) as f32,
             surrounded: surrounded(gaussians, &distances, &extent),

@@ -7,6 +7,7 @@ mod files;
 mod focus;
 mod given;
 mod gltf;
+mod ground;
 mod inside;
 mod json;
 mod kind;
