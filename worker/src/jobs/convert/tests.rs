@@ -59,8 +59,8 @@ fn presets_seeds_and_sizes_reach_the_settings() {
     let named: Vec<_> = (1..=4)
         .map(|number| kind(number).unwrap().kind.unwrap().name())
         .collect();
-    assert_eq!(named, ["object", "room", "terrain", "forward"]);
-    assert_eq!(kind(5).err().unwrap().to_string(), "scene_kind: 5 is none");
+    assert_eq!(named, ["object", "room", "terrain", "forward", "unbounded"]);
+    assert_eq!(kind(6).err().unwrap().to_string(), "scene_kind: 6 is none");
     let none = settings(&api::EmbedSpec {
         preset: 9,
         ..api::EmbedSpec::default()
