@@ -56,7 +56,7 @@ fn presets_seeds_and_sizes_reach_the_settings() {
         })
     };
     assert_eq!(kind(0).unwrap().kind, None);
-    let named: Vec<_> = (1..=4)
+    let named: Vec<_> = (1..=5)
         .map(|number| kind(number).unwrap().kind.unwrap().name())
         .collect();
     assert_eq!(named, ["object", "room", "terrain", "forward", "unbounded"]);
