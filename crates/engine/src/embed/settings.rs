@@ -162,7 +162,7 @@ pub struct Settings {
     pub windows: f32,
     /// Share of training views of an unbounded scene that show what it was captured for alone: people cut that out, and its
     /// surroundings carry a good part of the mark.
-    #[serde(default, skip_serializing_if = "is_none_of_them")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub cut_out: f32,
     /// Weights of the loss.
     pub lambda: LossWeights,
@@ -327,7 +327,7 @@ fn once() -> u32 {
     1
 }
 
-fn is_none_of_them(share: &f32) -> bool {
+fn is_zero(share: &f32) -> bool {
     *share == 0.0
 }
 

@@ -13,13 +13,18 @@ const UPRIGHT: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0
 
 /// The ground, a solid in its middle and four around, each of another shape; y points down.
 pub(super) fn arrange(random: &mut impl Rng) -> Vec<Solid> {
-    let mut solids = vec![Solid {
-        shape: Shape::Ground { radius: GROUND },
-        axes: UPRIGHT,
-        centre: [0.0; 3],
-    }];
+    let mut solids = vec![upright(Shape::Ground { radius: GROUND })];
     solids.extend(things(random, [0.0, 0.9 * GROUND - 0.42]));
     solids
+}
+
+/// A shape around the origin that is not turned.
+fn upright(shape: Shape) -> Solid {
+    Solid {
+        shape,
+        axes: UPRIGHT,
+        centre: [0.0; 3],
+    }
 }
 
 /// A rectangle of half these sides that faces `inwards`.
@@ -38,6 +43,16 @@ fn sheet(half: [f64; 2], inwards: [f32; 3], centre: [f64; 3]) -> Solid {
     }
 }
 
+/// Four walls that face inwards, so far from the middle and of half this height.
+fn walls([a, b]: [f64; 2], high: f64) -> [Solid; 4] {
+    [
+        sheet([high, b], [-1.0, 0.0, 0.0], [a, -high, 0.0]),
+        sheet([high, b], [1.0, 0.0, 0.0], [-a, -high, 0.0]),
+        sheet([high, a], [0.0, 0.0, -1.0], [0.0, -high, b]),
+        sheet([high, a], [0.0, 0.0, 1.0], [0.0, -high, -b]),
+    ]
+}
+
 /// Half the sides of a room, and how high it is.
 pub(super) const ROOM: [f64; 2] = [2.0, 1.6];
 pub(super) const CEILING: f64 = 1.7;
@@ -45,15 +60,11 @@ pub(super) const CEILING: f64 = 1.7;
 /// A room: floor, ceiling, four walls, and a thing near each wall, each of another shape; y points down.
 pub(super) fn furnish(random: &mut impl Rng) -> Vec<Solid> {
     let [a, b] = ROOM;
-    let high = 0.5 * CEILING;
     let mut solids = vec![
         sheet([a, b], [0.0, -1.0, 0.0], [0.0; 3]),
         sheet([a, b], [0.0, 1.0, 0.0], [0.0, -CEILING, 0.0]),
-        sheet([high, b], [-1.0, 0.0, 0.0], [a, -high, 0.0]),
-        sheet([high, b], [1.0, 0.0, 0.0], [-a, -high, 0.0]),
-        sheet([high, a], [0.0, 0.0, -1.0], [0.0, -high, b]),
-        sheet([high, a], [0.0, 0.0, 1.0], [0.0, -high, -b]),
     ];
+    solids.extend(walls(ROOM, 0.5 * CEILING));
     let far = b - 0.45;
     solids.extend(things(random, [far, far]));
     solids
@@ -68,22 +79,11 @@ const TREES: usize = 14;
 /// Hills with houses and trees on them; y points down.
 pub(super) fn landscape(random: &mut impl Rng) -> Vec<Solid> {
     let phase: [f64; 2] = std::array::from_fn(|_| random.random_range(0.0..TAU));
-    let hilly = Shape::Hills { half: LANDSCAPE, phase };
-    let mut solids = vec![Solid {
-        shape: hilly,
-        axes: UPRIGHT,
-        centre: [0.0; 3],
-    }];
+    let mut solids = vec![upright(Shape::Hills { half: LANDSCAPE, phase })];
     for i in 0..HOUSES + TREES {
         let size = random.random_range(0.8..1.25);
         let [x, z]: [f64; 2] = std::array::from_fn(|_| 0.9 * LANDSCAPE * random.random_range(-1.0..1.0));
-        let (shape, high) = if i < HOUSES {
-            let half = [0.2 * size, 0.1 * size, 0.13 * size];
-            (Shape::Block { half }, half[1])
-        } else {
-            let half = 0.13 * size;
-            (Shape::Cone { radius: 0.1, half }, half)
-        };
+        let (shape, high) = house_or_tree(i, [0.2 * size, 0.1 * size, 0.13 * size], [0.1, 0.13 * size]);
         // A little in the ground, which is not level under it.
         let (ground, _) = hills(phase, x, z);
         solids.push(Solid {
@@ -95,6 +95,14 @@ pub(super) fn landscape(random: &mut impl Rng) -> Vec<Solid> {
     solids
 }
 
+/// The shape of number `i` of these and half its height: a block of half these sides, or a cone of this radius and half height.
+fn house_or_tree(i: usize, house: [f64; 3], [radius, half]: [f64; 2]) -> (Shape, f64) {
+    match i < HOUSES {
+        true => (Shape::Block { half: house }, house[1]),
+        false => (Shape::Cone { radius, half }, half),
+    }
+}
+
 /// Radii of the ground around the disc, finer and coarser.
 const GROUNDS: [f64; 2] = [4.5, 16.0];
 /// Half the height of the walls around it, and the radius of the sky.
@@ -103,11 +111,6 @@ const SKY: f64 = 45.0;
 
 /// The disc of [`arrange`] in wide ground with houses and trees on it, walls behind these, and the sky.
 pub(super) fn surroundings(random: &mut impl Rng) -> Vec<Solid> {
-    let upright = |shape: Shape| Solid {
-        shape,
-        axes: UPRIGHT,
-        centre: [0.0; 3],
-    };
     let [near, far] = GROUNDS;
     let mut solids = arrange(random);
     solids.extend([
@@ -119,22 +122,13 @@ pub(super) fn surroundings(random: &mut impl Rng) -> Vec<Solid> {
             inner: near,
             outer: far,
         }),
-        sheet([WALL, far], [-1.0, 0.0, 0.0], [far, -WALL, 0.0]),
-        sheet([WALL, far], [1.0, 0.0, 0.0], [-far, -WALL, 0.0]),
-        sheet([WALL, far], [0.0, 0.0, -1.0], [0.0, -WALL, far]),
-        sheet([WALL, far], [0.0, 0.0, 1.0], [0.0, -WALL, -far]),
-        upright(Shape::Sphere { radius: SKY }),
     ]);
+    solids.extend(walls([far; 2], WALL));
+    solids.push(upright(Shape::Sphere { radius: SKY }));
     for i in 0..HOUSES + TREES {
         let size = random.random_range(0.8..1.25);
         let (turn, reach): (f64, f64) = (random.random_range(0.0..TAU), random.random_range(5.0..12.0));
-        let (shape, high) = if i < HOUSES {
-            let half = [1.6 * size, 0.9 * size, 1.1 * size];
-            (Shape::Block { half }, half[1])
-        } else {
-            let half = 1.6 * size;
-            (Shape::Cone { radius: 0.9, half }, half)
-        };
+        let (shape, high) = house_or_tree(i, [1.6 * size, 0.9 * size, 1.1 * size], [0.9, 1.6 * size]);
         solids.push(Solid {
             shape,
             axes: turned(random.random_range(0.0..TAU)),
@@ -164,13 +158,9 @@ pub(super) const STAGE: [f64; 3] = [1.9, 2.3, 1.8];
 /// A stage: a floor, a wall behind it, and things in between; y points down, and its front is at small z.
 pub(super) fn stage(random: &mut impl Rng) -> Vec<Solid> {
     let [wide, high, deep] = STAGE;
-    let floor = Solid {
-        shape: Shape::Sheet {
-            half: [wide, 0.5 * deep],
-        },
-        axes: UPRIGHT,
-        centre: [0.0; 3],
-    };
+    let floor = upright(Shape::Sheet {
+        half: [wide, 0.5 * deep],
+    });
     // The wall's own -y looks to the front.
     let wall = Solid {
         shape: Shape::Sheet {

@@ -85,17 +85,16 @@ fn longest(log_scales: &[f32; 3]) -> f64 {
     log_scales.iter().map(|s| f64::from(*s).exp()).fold(0.0, f64::max)
 }
 
+/// The product of the standard deviations along a Gaussian's two longer axes.
+pub(super) fn area(log_scales: &[f32; 3]) -> f64 {
+    // Scales of points and lines are minus infinity: they show nothing. A disc has one such axis, and an area.
+    let [a, b, c] = log_scales.map(f64::from);
+    (a + b).max(b + c).max(c + a).exp()
+}
+
 /// What each Gaussian shows: opacity times capped area; never all zero.
 pub(super) fn weights(gaussians: &Gaussians) -> Vec<f64> {
-    let areas: Vec<f64> = gaussians
-        .log_scales
-        .iter()
-        .map(|s| {
-            // Of a point or a line it is minus infinity: they show nothing. A disc has one such axis, and an area.
-            let [a, b, c] = s.map(f64::from);
-            (a + b).max(b + c).max(c + a).exp()
-        })
-        .collect();
+    let areas: Vec<f64> = gaussians.log_scales.iter().map(area).collect();
     let ones = vec![1.0; areas.len()];
     let cap = quantiles(areas.iter().copied(), &ones, [0.9])[0];
     let weights: Vec<f64> = (0..gaussians.len())

@@ -13,7 +13,7 @@
 //!   Each of twelve sectors counts by the sum of opacities times solid angles, at most as a whole.
 use std::f64::consts::TAU;
 
-use super::extent::{Extent, quantiles, weights};
+use super::extent::{Extent, area, quantiles, weights};
 use super::ground::upright;
 use super::vector::{dot, frame, sub};
 use crate::scene::Gaussians;
@@ -81,12 +81,6 @@ impl Focus {
             extent,
         }
     }
-}
-
-/// The area of a Gaussian's two longer axes, world units.
-fn area(log_scales: &[f32; 3]) -> f64 {
-    let [a, b, c] = log_scales.map(f64::from);
-    (a + b).max(b + c).max(c + a).exp()
 }
 
 /// How fine each Gaussian is: opacity over area. Never all zero.

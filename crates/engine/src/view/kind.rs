@@ -15,6 +15,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::extent::{Extent, weights};
+use super::focus::Focus;
 use super::openness::Openness;
 use super::solid::SolidGrid;
 use crate::scene::Gaussians;
@@ -66,7 +67,7 @@ impl SceneKind {
     pub fn of(gaussians: &Gaussians) -> crate::Result<(SceneKind, Openness)> {
         let extent = Extent::of(gaussians)?;
         let grid = SolidGrid::of(gaussians, &weights(gaussians));
-        let openness = Openness::of(gaussians, &extent, &grid);
+        let openness = Openness::of(gaussians, &extent, &Focus::of(gaussians, &extent), &grid);
         Ok((Self::by(&openness), openness))
     }
 

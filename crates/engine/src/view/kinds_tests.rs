@@ -186,7 +186,7 @@ fn viewers_of_an_unbounded_scene_stand_around_what_it_was_captured_for() {
 #[test]
 fn a_kind_can_be_said_and_is_refused_where_there_is_no_place() {
     let object = scene(SceneKind::Object, 1);
-    for kind in [SceneKind::Terrain, SceneKind::Forward] {
+    for kind in [SceneKind::Terrain, SceneKind::Forward, SceneKind::Unbounded] {
         let said = Viewpoints {
             kind: Some(kind),
             cameras: &[],

@@ -67,8 +67,8 @@ pub struct Openness {
 }
 
 impl Openness {
-    /// Measures a scene with its grid; the same scene gives the same figures, whatever its colours.
-    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, grid: &SolidGrid) -> Self {
+    /// Measures a scene with its focus and its grid; the same scene gives the same figures, whatever its colours.
+    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, focus: &Focus, grid: &SolidGrid) -> Self {
         let looks: Vec<[f32; 3]> = lattice(LOOKS).collect();
         let length = grid.side * *grid.counts.iter().max().unwrap_or(&1) as f32;
         let rows = drawn(&weights(gaussians));
@@ -106,7 +106,6 @@ impl Openness {
         let level = (0..LOOKS).filter(|side| dot(looks[*side], extent.up).abs() < LEVEL);
         let front = level.max_by(|a, b| open(*a).total_cmp(&open(*b))).unwrap_or(0);
         let behind = nearest(looks[front].map(|x| -x));
-        let focus = Focus::of(gaussians, extent);
         Self {
             gaussians: gaussians.len(),
             hollow: hollow(grid, &looks, extent.up),

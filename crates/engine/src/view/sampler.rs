@@ -129,21 +129,22 @@ impl ViewSampler {
         // Given cameras decide by themselves.
         let known = viewpoints.kind.or(given.is_some().then_some(SceneKind::Object));
         let grid = || SolidGrid::of(gaussians, &weights(gaussians));
-        let openness = |grid: &SolidGrid| Openness::of(gaussians, &extent, grid);
+        let find_focus = || Focus::of(gaussians, &extent);
         let mut random = stream(seed, u64::MAX);
-        let mut inside = None;
-        let (kind, front, grid) = match known {
-            Some(kind @ (SceneKind::Object | SceneKind::Terrain | SceneKind::Unbounded)) => (kind, extent.up, None),
-            Some(kind @ SceneKind::Room) => (kind, extent.up, Some(grid())),
+        let (mut inside, mut orbit) = (None, None);
+        let (kind, front, focus, grid) = match known {
+            Some(kind @ (SceneKind::Object | SceneKind::Terrain)) => (kind, extent.up, None, None),
+            Some(kind @ SceneKind::Unbounded) => (kind, extent.up, Some(find_focus()), None),
+            Some(kind @ SceneKind::Room) => (kind, extent.up, None, Some(grid())),
             Some(SceneKind::Forward) | None => {
-                let grid = grid();
-                let openness = openness(&grid);
-                (known.unwrap_or(SceneKind::by(&openness)), openness.front, Some(grid))
+                let (focus, grid) = (find_focus(), grid());
+                let found = Openness::of(gaussians, &extent, &focus, &grid);
+                let kind = known.unwrap_or(SceneKind::by(&found));
+                (kind, found.front, Some(focus), Some(grid))
             }
         };
-        let mut orbit = None;
-        if kind == SceneKind::Unbounded {
-            extent = Focus::of(gaussians, &extent).extent;
+        if let (SceneKind::Unbounded, Some(focus)) = (kind, focus) {
+            extent = focus.extent;
             let reach = extent.radius * FILL_UNBOUNDED.end / (0.5 * FIELD_OF_VIEW).sin();
             orbit = Some(Arc::new(Orbit::new(gaussians, &extent, reach + extent.radius)));
         }

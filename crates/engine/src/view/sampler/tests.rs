@@ -143,11 +143,17 @@ fn degenerate_scenes_give_finite_cameras() {
     };
     for log_scale in [f32::NEG_INFINITY, -30.0, 0.0, 20.0] {
         for position in [[0.0; 3], [1e6, -3.0, 2.0]] {
-            let sampler = ViewSampler::around(&one(log_scale, position), 1).unwrap();
-            let camera = sampler.camera(Split::HeldOut, 0, 64);
-            let numbers = camera.rotation.into_iter().flatten().chain(camera.translation);
-            assert!(numbers.chain([camera.fx, camera.fy]).all(f32::is_finite), "{camera:?}");
-            assert!(dot(sub(camera.centre(), position), [1.0; 3]).is_finite());
+            for kind in [SceneKind::Object, SceneKind::Unbounded] {
+                let said = Viewpoints {
+                    kind: Some(kind),
+                    cameras: &[],
+                };
+                let sampler = ViewSampler::seen_from(&one(log_scale, position), 1, said).unwrap();
+                let camera = sampler.camera(Split::HeldOut, 0, 64);
+                let numbers = camera.rotation.into_iter().flatten().chain(camera.translation);
+                assert!(numbers.chain([camera.fx, camera.fy]).all(f32::is_finite), "{camera:?}");
+                assert!(dot(sub(camera.centre(), position), [1.0; 3]).is_finite());
+            }
         }
     }
     assert!(ViewSampler::around(&Gaussians::default(), 1).is_err());
