@@ -55,8 +55,9 @@ const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
 const FILL_UNBOUNDED: std::ops::Range<f32> = 0.5..1.2;
 /// How far from the centre views aim, in radii.
 const AIM: f32 = 0.04;
-/// The same around the focus of an unbounded scene.
-const AIM_UNBOUNDED: f32 = 0.3;
+/// The same around the focus of an unbounded scene, times how far away the view is (as [`FILL_UNBOUNDED`]): a near view that
+/// turns away shows nothing of what somebody came near for.
+const AIM_UNBOUNDED: f32 = 0.25;
 /// The same over terrain, along the ground, times what the picture does not show.
 const AIM_TERRAIN: f32 = 0.7;
 
@@ -265,7 +266,7 @@ impl ViewSampler {
             (false, SceneKind::Unbounded) => random.random_range(FILL_UNBOUNDED),
         };
         let off = match self.kind {
-            SceneKind::Unbounded => AIM_UNBOUNDED,
+            SceneKind::Unbounded => AIM_UNBOUNDED * fill,
             _ => AIM,
         };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
