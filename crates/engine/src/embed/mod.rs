@@ -26,6 +26,7 @@ mod resources;
 mod run;
 mod scene_augmentation;
 mod settings;
+mod shown;
 mod step_timer;
 mod target;
 mod trace;

@@ -9,6 +9,7 @@ use guardsplat_codeword::{AcceptanceRule, Decision, Verdict};
 use serde::{Deserialize, Serialize};
 
 use super::verify::Verification;
+use crate::quality::Quality;
 
 /// Messages up to here must be right to the last bit.
 const SHORT: usize = 32;
@@ -42,6 +43,12 @@ impl Target {
             ..=SHORT => self.bit_accuracy,
             _ => self.bit_accuracy.min(enough),
         }
+    }
+
+    /// Whether a mark shows more than it may, by the likeness of pictures as a whole or over what the scene covers.
+    pub(super) fn is_too_visible(&self, quality: &Quality, psnr_covered_db: Option<f64>) -> bool {
+        let below = |found: Option<f64>, wanted: Option<f64>| matches!((found, wanted), (Some(f), Some(w)) if f < w);
+        below(quality.psnr.psnr_db, Some(self.psnr_db)) || below(psnr_covered_db, self.psnr_covered_db)
     }
 
     /// What a mark's changes are to be multiplied by where held-out views show it a little more than they may: they are other

@@ -4,21 +4,23 @@
 //! directions: those lie within a small cap around one, training directions at least twice as far from all of them.
 //!
 //! **Spread.** Training directions follow Roberts' R2 sequence, shifted by the seed. Held-out places are visited in order
-//! of largest distance to those before.
+//! of largest distance to those before; around a focus so that the first ones are as high as all.
 use std::f32::consts::{PI, TAU};
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::extent::Extent;
-use super::vector::{along, dot, frame, unit};
+use super::lattice::{evenly, farthest_first, lattice};
+use super::vector::{along, dot, frame};
 
 /// Lowest sine of elevation over ground: 6 degrees.
 const LOWEST: f32 = 0.1;
 /// Lowest sine of elevation over terrain: 35 degrees.
 const OBLIQUE: f32 = 0.573_576_44;
-/// Highest sine of elevation around the focus of an unbounded scene: 53 degrees. Few captors stand higher.
-const ORBIT: f32 = 0.8;
+/// Sines of elevation around the focus of an unbounded scene: 10 to 53 degrees. Few captors stand lower or higher, and lower
+/// views show little but the ground right before them.
+const ORBIT: [f32; 2] = [0.173_648_18, 0.8];
 /// Least cosine to the middle of a forward-facing capture: 25 degrees.
 const FACING: f32 = 0.906_307_8;
 /// Sines of elevation between which one looks about in a room: 30 degrees down to 25 up.
@@ -66,7 +68,7 @@ const HELD_OUT_CAP: f32 = 2.5 * PI / 180.0;
 pub(super) struct Directions {
     zone: Zone,
     shift: [f64; 2],
-    /// Places of held-out directions, farthest first.
+    /// Places of held-out directions, in the order in which they are looked from.
     places: Vec<[f32; 3]>,
 }
 
@@ -84,7 +86,8 @@ impl Directions {
 
     /// From which the focus of an unbounded scene is seen: above its ground, and not from overhead.
     pub fn orbiting(up: [f32; 3], random: &mut ChaCha8Rng) -> Self {
-        Self::new(Zone::new(up, [LOWEST, ORBIT], 2 * HELD_OUT_PLACES), random)
+        let zone = Zone::new(up, ORBIT, 2 * HELD_OUT_PLACES);
+        Self::ordered(zone, random, |seen, random| evenly(seen, random.random()))
     }
 
     /// From which a forward-facing capture is seen: those near `front`.
@@ -98,14 +101,21 @@ impl Directions {
     }
 
     fn new(zone: Zone, random: &mut ChaCha8Rng) -> Self {
+        Self::ordered(zone, random, |seen, random| {
+            let first = random.random_range(0..seen.len().max(1));
+            farthest_first(seen, first)
+        })
+    }
+
+    fn ordered(
+        zone: Zone,
+        random: &mut ChaCha8Rng,
+        order: impl Fn(Vec<[f32; 3]>, &mut ChaCha8Rng) -> Vec<[f32; 3]>,
+    ) -> Self {
         let shift = [random.random(), random.random()];
-        let seen: Vec<[f32; 3]> = lattice(zone.places).filter(|place| zone.holds(*place)).collect();
-        let first = random.random_range(0..seen.len().max(1));
-        Self {
-            zone,
-            shift,
-            places: farthest_first(seen, first),
-        }
+        let seen = lattice(zone.places).filter(|place| zone.holds(*place)).collect();
+        let places = order(seen, random);
+        Self { zone, shift, places }
     }
 
     /// A training direction; all of them at one elevation above the horizon in radians, where that is given.
@@ -157,29 +167,4 @@ impl Directions {
         let flat = along(east.map(|e| e * cosine), sine, north);
         along(place.map(|e| e * tilt.cos()), tilt.sin(), flat)
     }
-}
-
-/// `n` evenly spread directions: a Fibonacci lattice in world axes.
-pub(super) fn lattice(n: usize) -> impl Iterator<Item = [f32; 3]> {
-    (0..n).map(move |i| {
-        let z = 1.0 - (2.0 * i as f32 + 1.0) / n as f32;
-        let level = (1.0 - z * z).max(0.0).sqrt();
-        // The golden angle.
-        let (sine, cosine) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();
-        unit([level * cosine, level * sine, z]).unwrap_or([0.0, 0.0, 1.0])
-    })
-}
-
-/// Reorders points so that each is the farthest from all before it; ties go to the earlier one.
-fn farthest_first(mut points: Vec<[f32; 3]>, first: usize) -> Vec<[f32; 3]> {
-    if !points.is_empty() {
-        points.swap(0, first);
-    }
-    for done in 1..points.len() {
-        let nearest = |p: [f32; 3]| points[..done].iter().map(|q| dot(p, *q)).fold(-1.0, f32::max);
-        let closeness: Vec<f32> = points[done..].iter().map(|p| nearest(*p)).collect();
-        let best = (0..closeness.len()).min_by(|a, b| closeness[*a].total_cmp(&closeness[*b]));
-        points.swap(done, done + best.unwrap_or(0));
-    }
-    points
 }

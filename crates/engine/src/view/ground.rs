@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn without_ground_up_is_what_it_was() {
         let mut ball = Gaussians::default();
-        for direction in super::super::directions::lattice(2000) {
+        for direction in super::super::lattice::lattice(2000) {
             ball.positions.push(unit(direction).unwrap());
         }
         let focus = Extent {

@@ -9,8 +9,8 @@
 use rand::{Rng, RngExt};
 
 use super::camera::Camera;
-use super::directions::lattice;
 use super::extent::Extent;
+use super::lattice::lattice;
 use super::solid::SolidGrid;
 use super::vector::{along, dot};
 use crate::error::{Error, Result};

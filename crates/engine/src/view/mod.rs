@@ -13,8 +13,10 @@ mod json;
 mod kind;
 #[cfg(test)]
 mod kinds_tests;
+mod lattice;
 mod openness;
 mod orbit;
+mod placing;
 mod sampler;
 mod solid;
 pub(crate) mod vector;

@@ -3,9 +3,9 @@
 //! 4096 Gaussians, drawn by what they show, look along 64 even directions through the [grid](super::solid). A look that leaves
 //! the grid has *escaped*: from that side the Gaussian is seen. The first two cells are passed over, since layers of one
 //! surface lie there. From free cells the same looks tell how far they are *closed in*.
-use super::directions::lattice;
 use super::extent::{Extent, weights};
 use super::focus::Focus;
+use super::lattice::lattice;
 use super::solid::SolidGrid;
 use super::vector::dot;
 use crate::scene::Gaussians;

@@ -19,10 +19,9 @@
 //! published code has them ([`ViewSampler::train_on_ring`]); held-out views stay where they are.
 //!
 //! **Given cameras.** Views of both splits can be taken where cameras are ([`ViewSampler::seen_from`]).
-use std::f32::consts::PI;
 use std::sync::Arc;
 
-use rand::{Rng, RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::camera::Camera;
@@ -34,32 +33,10 @@ use super::inside::InsideViews;
 use super::kind::SceneKind;
 use super::openness::Openness;
 use super::orbit::Orbit;
+use super::placing::{Placing, farthest_from_focus};
 use super::solid::SolidGrid;
-use super::vector::{along, frame};
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
-
-/// Vertical field of view, radians, of views that need not keep away from a tiny scene: 45 degrees.
-const FIELD_OF_VIEW: f32 = 0.25 * PI;
-/// Distance at which the reference rasteriser culls, world units.
-const NEAR: f32 = 0.2;
-/// Distances of cameras, times that at which the scene just fills the picture; and that of all cameras on a ring.
-const FILL: std::ops::Range<f32> = 0.95..1.2;
-const MEAN_FILL: f32 = 0.5 * (FILL.start + FILL.end);
-/// The same before a forward-facing capture, which is not as deep as wide and may go on beyond the picture.
-const FILL_FORWARD: std::ops::Range<f32> = 0.7..1.0;
-/// The same over terrain.
-const FILL_TERRAIN: std::ops::Range<f32> = 0.5..1.1;
-/// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
-/// the ground on which they stood is as fine, hardly more than one.
-const FILL_UNBOUNDED: std::ops::Range<f32> = 0.5..1.2;
-/// How far from the centre views aim, in radii.
-const AIM: f32 = 0.04;
-/// The same around the focus of an unbounded scene, times how far away the view is (as [`FILL_UNBOUNDED`]): a near view that
-/// turns away shows nothing of what somebody came near for.
-const AIM_UNBOUNDED: f32 = 0.25;
-/// The same over terrain, along the ground, times what the picture does not show.
-const AIM_TERRAIN: f32 = 0.7;
 
 /// How often a view of an unbounded scene is drawn anew before it is taken from where it is.
 const TRIES: usize = 8;
@@ -146,7 +123,7 @@ impl ViewSampler {
         };
         if let (SceneKind::Unbounded, Some(focus)) = (kind, focus) {
             extent = focus.extent;
-            let reach = extent.radius * FILL_UNBOUNDED.end / (0.5 * FIELD_OF_VIEW).sin();
+            let reach = extent.radius * farthest_from_focus();
             orbit = Some(Arc::new(Orbit::new(gaussians, &extent, reach + extent.radius)));
         }
         let directions = match kind {
@@ -242,51 +219,20 @@ impl ViewSampler {
         if let Some(inside) = &self.inside {
             return inside.look(direction, self.extent.up, size, &mut random);
         }
-        let still = split == Split::Training && self.ring.is_some();
-        let mut view = self.place(direction, size, still, &mut random);
+        let placing = Placing {
+            kind: self.kind,
+            extent: &self.extent,
+            still: split == Split::Training && self.ring.is_some(),
+            size,
+        };
+        let mut view = placing.camera(direction, &mut random);
         if let Some(orbit) = &self.orbit {
             let mut tries = 1..TRIES;
             while !orbit.is_clear(view.centre(), &self.extent) && tries.next().is_some() {
-                view = self.place(direction, size, still, &mut random);
+                view = placing.camera(direction, &mut random);
             }
         }
         view
-    }
-
-    /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane. `still` ones are
-    /// all at the mean distance and look at the centre.
-    fn place(&self, direction: [f32; 3], size: u32, still: bool, random: &mut impl Rng) -> Camera {
-        let Extent { centre, radius, up, .. } = self.extent;
-        let terrain = self.kind == SceneKind::Terrain;
-        let fill = match (still, self.kind) {
-            (true, _) => MEAN_FILL,
-            (false, SceneKind::Object | SceneKind::Room) => random.random_range(FILL),
-            (false, SceneKind::Forward) => random.random_range(FILL_FORWARD),
-            (false, SceneKind::Terrain) => random.random_range(FILL_TERRAIN),
-            (false, SceneKind::Unbounded) => random.random_range(FILL_UNBOUNDED),
-        };
-        let off = match self.kind {
-            SceneKind::Unbounded => AIM_UNBOUNDED * fill,
-            _ => AIM,
-        };
-        let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
-        // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
-        let distance = wanted.max(radius + 1.1 * NEAR);
-        let field_of_view = 2.0 * (radius * fill / distance).min(0.99).asin();
-        let aim: [f32; 3] = match still {
-            true => [0.0; 3],
-            false => std::array::from_fn(|_| random.random_range(-off..off)),
-        };
-        let mut target = along(centre, radius, aim);
-        if terrain {
-            let [east, north, _] = frame(up);
-            for axis in [east, north] {
-                let beside = AIM_TERRAIN * (FILL_TERRAIN.end - fill) * random.random_range(-1.0..1.0);
-                target = along(target, radius * beside, axis);
-            }
-        }
-        let eye = along(target, distance, direction);
-        Camera::look_at(eye, target, up, field_of_view, size, size)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Where views are taken from, by kinds of scenes.
 use std::f32::consts::TAU;
 
-use super::super::directions::lattice;
+use super::super::lattice::lattice;
+use super::super::placing::NEAR;
 use super::*;
 use crate::view::vector::{dot, frame, sub};
 
