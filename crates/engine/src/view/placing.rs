@@ -23,6 +23,8 @@ const FILL_TERRAIN: Range<f32> = 0.5..1.1;
 /// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
 /// the ground on which they stood is as fine, hardly more than one.
 const FILL_UNBOUNDED: Range<f32> = 0.5..1.2;
+/// Vertical fields of view around it, radians: 40 to 60 degrees, as cameras and viewers have them. It does not fill the picture.
+const FIELDS_OF_VIEW_UNBOUNDED: Range<f32> = 0.698..1.047;
 /// How far from the centre views aim, in radii.
 const AIM: f32 = 0.04;
 /// The same around the focus of an unbounded scene, times how far away the view is (as [`FILL_UNBOUNDED`]): a near view that
@@ -64,7 +66,10 @@ impl Placing<'_> {
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
         let distance = wanted.max(radius + 1.1 * NEAR);
-        let field_of_view = 2.0 * (radius * fill / distance).min(0.99).asin();
+        let field_of_view = match self.kind {
+            SceneKind::Unbounded => random.random_range(FIELDS_OF_VIEW_UNBOUNDED),
+            _ => 2.0 * (radius * fill / distance).min(0.99).asin(),
+        };
         let aim: [f32; 3] = match self.still {
             true => [0.0; 3],
             false => std::array::from_fn(|_| random.random_range(-off..off)),
