@@ -184,6 +184,30 @@ fn viewers_of_an_unbounded_scene_stand_around_what_it_was_captured_for() {
 }
 
 #[test]
+fn training_views_of_an_unbounded_scene_go_beyond_those_that_are_verified() {
+    let scene = scene(SceneKind::Unbounded, 1);
+    let sampler = ViewSampler::new(&scene, 1).unwrap();
+    let focus = sampler.focus().unwrap();
+    let ends = |split| {
+        let numbers = (0..200).map(|index| sampler.camera(split, index, 100)).map(|view| {
+            let way = sub(focus.centre, view.centre());
+            [dot(way, way).sqrt() / focus.radius, view.fy]
+        });
+        let start = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
+        numbers.fold(start, |ends, numbers| {
+            std::array::from_fn(|k| [ends[k][0].min(numbers[k]), ends[k][1].max(numbers[k])])
+        })
+    };
+    let [training, held_out] = [Split::Training, Split::HeldOut].map(ends);
+    for (training, held_out) in training.iter().zip(held_out) {
+        assert!(
+            training[0] < held_out[0] && held_out[1] < training[1],
+            "{training:?} {held_out:?}"
+        );
+    }
+}
+
+#[test]
 fn a_kind_can_be_said_and_is_refused_where_there_is_no_place() {
     let object = scene(SceneKind::Object, 1);
     for kind in [SceneKind::Terrain, SceneKind::Forward, SceneKind::Unbounded] {

@@ -7,6 +7,7 @@ use rand::{Rng, RngExt};
 use super::camera::Camera;
 use super::extent::Extent;
 use super::kind::SceneKind;
+use super::sampler::Split;
 use super::vector::{along, frame};
 
 /// Vertical field of view, radians, of views that need not keep away from a tiny scene: 45 degrees.
@@ -21,27 +22,29 @@ const FILL_FORWARD: Range<f32> = 0.7..1.0;
 /// The same over terrain.
 const FILL_TERRAIN: Range<f32> = 0.5..1.1;
 /// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
-/// the ground on which they stood is as fine, hardly more than one.
-const FILL_UNBOUNDED: Range<f32> = 0.5..1.2;
-/// Vertical fields of view around it, radians: 40 to 60 degrees, as cameras and viewers have them. It does not fill the picture.
-const FIELDS_OF_VIEW_UNBOUNDED: Range<f32> = 0.698..1.047;
+/// the ground on which they stood is as fine, hardly more than one. Nobody knows which viewers there are, so training views
+/// go beyond those that are verified on all sides.
+const FILL_UNBOUNDED: [Range<f32>; 2] = [0.5..1.2, 0.6..1.1];
+/// Vertical fields of view around it, radians: 40 to 60 degrees, and 45 to 55; it does not fill the picture.
+const FIELD_OF_VIEW_UNBOUNDED: [Range<f32>; 2] = [0.698..1.047, 0.785..0.96];
 /// How far from the centre views aim, in radii.
 const AIM: f32 = 0.04;
-/// The same around the focus of an unbounded scene, times how far away the view is (as [`FILL_UNBOUNDED`]): a near view that
-/// turns away shows nothing of what somebody came near for.
-const AIM_UNBOUNDED: f32 = 0.25;
+/// The same around the focus of an unbounded scene, times how far away the view is: a near view that turns away shows nothing
+/// of what somebody came near for.
+const AIM_UNBOUNDED: [f32; 2] = [0.25, 0.12];
 /// The same over terrain, along the ground, times what the picture does not show.
 const AIM_TERRAIN: f32 = 0.7;
 
 /// How far from the centre of its focus views of an unbounded scene stand at most, in its radii.
 pub(super) fn farthest_from_focus() -> f32 {
-    FILL_UNBOUNDED.end / (0.5 * FIELD_OF_VIEW).sin()
+    FILL_UNBOUNDED[0].end / (0.5 * FIELD_OF_VIEW).sin()
 }
 
 /// Views of one scene that look at it as a whole, or at the focus of one that is unbounded.
 pub(super) struct Placing<'a> {
     pub kind: SceneKind,
     pub extent: &'a Extent,
+    pub split: Split,
     /// All at the mean distance, looking at the centre.
     pub still: bool,
     /// Side of the pictures, pixels.
@@ -52,22 +55,23 @@ impl Placing<'_> {
     /// The camera that looks from `direction`: near enough to fill the picture, and beyond the near plane.
     pub fn camera(&self, direction: [f32; 3], random: &mut impl Rng) -> Camera {
         let Extent { centre, radius, up, .. } = *self.extent;
+        let split = usize::from(self.split == Split::HeldOut);
         let fill = match (self.still, self.kind) {
             (true, _) => MEAN_FILL,
             (false, SceneKind::Object | SceneKind::Room) => random.random_range(FILL),
             (false, SceneKind::Forward) => random.random_range(FILL_FORWARD),
             (false, SceneKind::Terrain) => random.random_range(FILL_TERRAIN),
-            (false, SceneKind::Unbounded) => random.random_range(FILL_UNBOUNDED),
+            (false, SceneKind::Unbounded) => random.random_range(FILL_UNBOUNDED[split].clone()),
         };
         let off = match self.kind {
-            SceneKind::Unbounded => AIM_UNBOUNDED * fill,
+            SceneKind::Unbounded => AIM_UNBOUNDED[split] * fill,
             _ => AIM,
         };
         let wanted = radius * fill / (0.5 * FIELD_OF_VIEW).sin();
         // Tiny scenes: stay back so that their near side is beyond the near plane, and zoom in instead.
         let distance = wanted.max(radius + 1.1 * NEAR);
         let field_of_view = match self.kind {
-            SceneKind::Unbounded => random.random_range(FIELDS_OF_VIEW_UNBOUNDED),
+            SceneKind::Unbounded => random.random_range(FIELD_OF_VIEW_UNBOUNDED[split].clone()),
             _ => 2.0 * (radius * fill / distance).min(0.99).asin(),
         };
         let aim: [f32; 3] = match self.still {

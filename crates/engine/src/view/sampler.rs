@@ -222,6 +222,7 @@ impl ViewSampler {
         let placing = Placing {
             kind: self.kind,
             extent: &self.extent,
+            split,
             still: split == Split::Training && self.ring.is_some(),
             size,
         };
