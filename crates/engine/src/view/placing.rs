@@ -22,8 +22,8 @@ const FILL_FORWARD: Range<f32> = 0.7..1.0;
 /// The same over terrain.
 const FILL_TERRAIN: Range<f32> = 0.5..1.1;
 /// The same around the focus of an unbounded scene. Where it is all that is fine, captors stood three of its radii away; where
-/// the ground on which they stood is as fine, hardly more than one. Nobody knows which viewers there are, so training views
-/// go beyond those that are verified on all sides.
+/// the ground on which they stood is as fine, hardly more than one. Here and below first of training views, then of held-out
+/// ones: nobody knows where viewers stand, so a mark is made for more of them than it is verified for.
 const FILL_UNBOUNDED: [Range<f32>; 2] = [0.5..1.2, 0.6..1.1];
 /// Vertical fields of view around it, radians: 40 to 60 degrees, and 45 to 55; it does not fill the picture.
 const FIELD_OF_VIEW_UNBOUNDED: [Range<f32>; 2] = [0.698..1.047, 0.785..0.96];
