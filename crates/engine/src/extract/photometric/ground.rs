@@ -10,6 +10,11 @@ pub(in crate::extract) const DISTANCE: [f32; 2] = [0.06, 0.12];
 const DRAWN: [f32; 2] = [0.02, 0.04];
 /// Share of the border that must be ground.
 const SHARE: f32 = 0.5;
+/// Most of a ground's pixels are this near to its colour, even after noise of a tenth and a median; of the blurred surroundings
+/// of a scene, whose border varies slowly, a smaller share of those that are [near](DISTANCE).
+const CORE: f32 = 0.03;
+/// What share of them.
+const OF_NEAR: f32 = 0.6;
 /// Share of values cut at black or white from which on a ground was that: noise that is as often up as down cuts half.
 const CUT: f32 = 0.4;
 /// A ground is black or white when it is no further off than this.
@@ -111,8 +116,10 @@ fn plain(picture: &Picture) -> Option<[f32; 3]> {
 pub(in crate::extract) fn seen(picture: &Picture) -> Option<[f32; 3]> {
     let border = border(picture);
     let colour = medians(&border);
-    let count = border.iter().filter(|pixel| is_near(pixel, colour)).count();
-    (!border.is_empty() && count as f32 >= SHARE * border.len() as f32).then_some(colour)
+    let within = |limit: f32| border.iter().filter(|pixel| distance(pixel, colour) <= limit).count() as f32;
+    let near = within(DISTANCE[0]);
+    let is_ground = near >= SHARE * border.len() as f32 && within(CORE) >= OF_NEAR * near;
+    (!border.is_empty() && is_ground).then_some(colour)
 }
 
 /// The colour that a ground had before noise, from the outermost pixels: their median in each channel, but white or black
