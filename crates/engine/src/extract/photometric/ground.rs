@@ -10,11 +10,11 @@ pub(in crate::extract) const DISTANCE: [f32; 2] = [0.06, 0.12];
 const DRAWN: [f32; 2] = [0.02, 0.04];
 /// Share of the border that must be ground.
 const SHARE: f32 = 0.5;
-/// Most of a ground's pixels are this near to its colour, even after noise of a tenth and a median; of the blurred surroundings
-/// of a scene, whose border varies slowly, a smaller share of those that are [near](DISTANCE).
-const CORE: f32 = 0.03;
+/// Nearly all of a ground is this near to its colour; of the blurred surroundings of a scene, whose border varies slowly, a
+/// smaller share of what is [near](DISTANCE).
+const CORE: f32 = 0.04;
 /// What share of them.
-const OF_NEAR: f32 = 0.6;
+const OF_NEAR: f32 = 0.8;
 /// Share of values cut at black or white from which on a ground was that: noise that is as often up as down cuts half.
 const CUT: f32 = 0.4;
 /// A ground is black or white when it is no further off than this.
@@ -114,12 +114,18 @@ fn plain(picture: &Picture) -> Option<[f32; 3]> {
 
 /// The colour of the ground, whatever it is; `None` where the border is not of one colour.
 pub(in crate::extract) fn seen(picture: &Picture) -> Option<[f32; 3]> {
+    let colour = of_border(picture)?;
+    let border = border(picture);
+    let within = |limit: f32| border.iter().filter(|pixel| distance(pixel, colour) <= limit).count() as f32;
+    (within(CORE) >= OF_NEAR * within(DISTANCE[0])).then_some(colour)
+}
+
+/// The colour that half of the border is near to, which need not be a ground; `None` where there is none.
+pub(in crate::extract) fn of_border(picture: &Picture) -> Option<[f32; 3]> {
     let border = border(picture);
     let colour = medians(&border);
-    let within = |limit: f32| border.iter().filter(|pixel| distance(pixel, colour) <= limit).count() as f32;
-    let near = within(DISTANCE[0]);
-    let is_ground = near >= SHARE * border.len() as f32 && within(CORE) >= OF_NEAR * near;
-    (!border.is_empty() && is_ground).then_some(colour)
+    let count = border.iter().filter(|pixel| is_near(pixel, colour)).count();
+    (!border.is_empty() && count as f32 >= SHARE * border.len() as f32).then_some(colour)
 }
 
 /// The colour that a ground had before noise, from the outermost pixels: their median in each channel, but white or black
@@ -230,6 +236,22 @@ mod tests {
         // A wall has a texture.
         assert!(plain(&disc(0.5, 0.04)).is_none() && colour(&disc(0.5, 0.04)).is_some());
         assert!(plain(&disc(1.0, 0.0)).is_none() && plain(&disc(0.0, 0.0)).is_none());
+    }
+
+    #[test]
+    fn blurred_surroundings_are_no_ground() {
+        // From side to side they change by a third, and all of the border is near to what is in the middle.
+        let side = 64;
+        let pixels = (0..side * side).flat_map(|i| {
+            let across = (i % side) as f32 / side as f32 - 0.5;
+            [0.3 + 0.11 * across, 0.35 - 0.1 * across, 0.25]
+        });
+        let picture = Picture {
+            width: side,
+            height: side,
+            pixels: pixels.collect(),
+        };
+        assert!(of_border(&picture).is_some() && seen(&picture).is_none());
     }
 
     #[test]

@@ -129,10 +129,16 @@ fn without_noise(picture: &Picture) -> Picture {
     let side = WINDOW * picture.width.min(picture.height) as f32;
     let radius = (side / 2.0).round() as usize;
     let smooth = median::filtered(picture, radius.clamp(RADIUS[0], RADIUS[1]));
-    let Some(seen) = ground::seen(&smooth) else {
-        return smooth;
+    let before = ground::before_noise(picture);
+    // Noise that was cut at white or black tells a ground by itself; what is left of it may be far from one colour.
+    let seen = match ground::is_clean(before) {
+        true => ground::of_border(&smooth),
+        false => ground::seen(&smooth),
     };
-    ground::replaced(&smooth, seen, ground::before_noise(picture))
+    match seen {
+        Some(seen) => ground::replaced(&smooth, seen, before),
+        None => smooth,
+    }
 }
 
 #[cfg(test)]
