@@ -108,24 +108,29 @@ pub(in crate::extract) fn colour(picture: &Picture) -> Option<[f32; 3]> {
 fn plain(picture: &Picture) -> Option<[f32; 3]> {
     let ground = colour(picture)?;
     let border = border(picture);
-    let plain = border.iter().filter(|pixel| distance(pixel, ground) <= PLAIN).count();
-    (plain as f32 >= SHARE * border.len() as f32).then_some(ground)
+    (within(&border, ground, PLAIN) >= SHARE * border.len() as f32).then_some(ground)
 }
 
 /// The colour of the ground, whatever it is; `None` where the border is not of one colour.
 pub(in crate::extract) fn seen(picture: &Picture) -> Option<[f32; 3]> {
-    let colour = of_border(picture)?;
     let border = border(picture);
-    let within = |limit: f32| border.iter().filter(|pixel| distance(pixel, colour) <= limit).count() as f32;
-    (within(CORE) >= OF_NEAR * within(DISTANCE[0])).then_some(colour)
+    let colour = near_half(&border)?;
+    (within(&border, colour, CORE) >= OF_NEAR * within(&border, colour, DISTANCE[0])).then_some(colour)
 }
 
 /// The colour that half of the border is near to, which need not be a ground; `None` where there is none.
 pub(in crate::extract) fn of_border(picture: &Picture) -> Option<[f32; 3]> {
-    let border = border(picture);
-    let colour = medians(&border);
-    let count = border.iter().filter(|pixel| is_near(pixel, colour)).count();
-    (!border.is_empty() && count as f32 >= SHARE * border.len() as f32).then_some(colour)
+    near_half(&border(picture))
+}
+
+fn near_half(border: &[[f32; 3]]) -> Option<[f32; 3]> {
+    let colour = medians(border);
+    (!border.is_empty() && within(border, colour, DISTANCE[0]) >= SHARE * border.len() as f32).then_some(colour)
+}
+
+/// How many pixels are no further from a colour.
+fn within(pixels: &[[f32; 3]], colour: [f32; 3], limit: f32) -> f32 {
+    pixels.iter().filter(|pixel| distance(pixel, colour) <= limit).count() as f32
 }
 
 /// The colour that a ground had before noise, from the outermost pixels: their median in each channel, but white or black
