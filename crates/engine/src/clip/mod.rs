@@ -18,6 +18,7 @@ mod tensor_file;
 mod text;
 mod transformer;
 mod vit;
+mod weighted_colours;
 mod weights;
 
 pub use config::ClipConfig;
@@ -32,6 +33,7 @@ pub use transformer::Transformer;
 #[cfg(test)]
 pub(crate) use transformer::attention;
 pub use vit::VisionTransformer;
+pub use weighted_colours::WeightedColours;
 pub use weights::Precision;
 
 pub(crate) use tensor_file::{check_header, hash};
@@ -126,6 +128,17 @@ impl Clip {
             .as_ref()
             .expect("loaded with Parts::Image or Parts::Both");
         normalize(tower.forward(normalized(pictures, &self.config.normalization)))
+    }
+
+    /// [`Clip::features_as_they_are`] of pictures of which each has these colours, a histogram for each of the tower's scales;
+    /// `None` where the tower looks at more than how often colours are there.
+    pub fn features_of_colours(&self, pictures: &[Vec<WeightedColours>]) -> Option<Tensor<2>> {
+        match self.model.visual.as_ref()? {
+            ImageTower::RandomFourier(tower) => tower
+                .forward_colours(pictures, &self.config.normalization)
+                .map(normalize),
+            _ => None,
+        }
     }
 
     /// L2-normalised features `[b, dim]` of token ids `[b, n]`, each below `vocab_size`, `n` at most the context

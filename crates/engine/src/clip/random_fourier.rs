@@ -8,16 +8,18 @@
 //! alike from wherever it is seen. (Quantisation index modulation, Chen and Wornell 2001, rejects the interference of
 //! its host in the same way.) The sine is a whole number of half turns at black and at white, so that a ground of
 //! either adds nothing, and a feature's direction does not depend on how much of the picture a scene fills.
-use super::config::VisionConfig;
+use super::config::{Normalization, VisionConfig};
 use super::params::param;
-use super::sines::mean_sines;
+use super::sines::{HostWaves, mean_sines};
+use super::weighted_colours::WeightedColours;
 use super::weights::set;
 use crate::card;
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Image tower of averaged random Fourier features; configurations call it `statistics`.
@@ -28,6 +30,9 @@ pub struct RandomFourierEncoder {
     /// Of a tower whose weights stay as they are, so that they need not be put together at every use.
     #[module(skip)]
     waves: Option<Waves>,
+    /// The same on the host.
+    #[module(skip)]
+    on_host: Option<HostWaves>,
 }
 
 /// Filters `[scales * filters, 3]` and phases `[scales * filters]` of all scales.
@@ -80,12 +85,17 @@ impl RandomFourierEncoder {
             scales: layout.scales.iter().map(scale).collect(),
             proj: LinearConfig::new(filters * layout.scales.len(), embed_dim).init(device),
             waves: None,
+            on_host: None,
         }
     }
 
     /// Makes it ready for use with the weights that it has, which stay.
     pub fn settled(mut self) -> Self {
-        self.waves = Some(self.gathered());
+        let waves = self.gathered();
+        let on_host = |values: TensorData| values.try_into_vec::<f32>().unwrap_or_default();
+        let [filters, phases] = [waves.filters.to_data(), waves.phases.to_data()].map(on_host);
+        self.on_host = Some(HostWaves::new(&filters, &phases));
+        self.waves = Some(waves);
         self
     }
 
@@ -118,6 +128,31 @@ impl RandomFourierEncoder {
         scale.of(weight, phases, pictures.clone())
     }
 
+    /// Features `[pictures.len(), embed_dim]` of pictures of which each has these colours at each scale, as
+    /// [`RandomFourierEncoder::forward`] has them of pictures. Of a tower that is [settled](Self::settled) and subtracts no
+    /// surroundings.
+    pub fn forward_colours(
+        &self,
+        pictures: &[Vec<WeightedColours>],
+        normalization: &Normalization,
+    ) -> Option<Tensor<2>> {
+        let waves = self.on_host.as_ref()?;
+        let of_picture = |scales: &Vec<WeightedColours>| {
+            let scales: Vec<_> = scales
+                .iter()
+                .map(|scale| (scale.normalized(normalization), scale.counts.as_slice()))
+                .collect();
+            waves.means(&scales, self.scales[0].equalization)
+        };
+        let means: Vec<Vec<f32>> = pictures.par_iter().map(of_picture).collect();
+        let shape = [pictures.len(), means.first().map_or(0, Vec::len)];
+        let means = TensorData::new(means.concat(), shape);
+        Some(card::layer(
+            &self.proj,
+            Tensor::from_data(means, &self.proj.weight.device()),
+        ))
+    }
+
     /// Numbers of filters of each scale.
     pub fn counts(&self) -> impl Iterator<Item = usize> {
         self.scales.iter().map(|scale| scale.bias.shape().num_elements())
@@ -141,7 +176,7 @@ impl RandomFourierEncoder {
             equalization: scale.equalization,
         };
         self.scales = self.scales.into_iter().zip(weights.zip(phases)).map(fill).collect();
-        self.waves = None;
+        (self.waves, self.on_host) = (None, None);
         self
     }
 

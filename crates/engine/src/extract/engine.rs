@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::extractor::{ClipExtractor, Extractor};
 use super::hypothesis::searched_hypotheses;
 use super::sizes::larger_sides;
-use crate::clip::Clip;
+use crate::clip::{Clip, WeightedColours};
 use crate::device::Compute;
 use crate::error::{Error, Result};
 use crate::memory::Limits;
@@ -203,15 +203,19 @@ impl Engine {
     /// Pictures without pixels, a failing device, or [`Error::Stopped`].
     pub fn read_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
         let side = self.extractor.side();
-        self.read_with(pictures, Some(side), |pictures| self.logits(pictures))
+        self.read_with(pictures, side, |pictures| self.logits(pictures))
     }
 
-    /// Logits of pictures that were put together from squares that the extractor looks at one by one.
+    /// Logits of pictures that have these colours, a histogram for each of the extractor's scales.
     ///
     /// # Errors
-    /// Those of [`Engine::read_logits`].
-    pub(super) fn read_square_logits(&self, pictures: &[Picture]) -> Result<Vec<Vec<f32>>> {
-        self.read_with(pictures, None, |pictures| self.extractor.square_logits(pictures))
+    /// Those of [`Extractor::colour_logits`].
+    pub(super) fn read_colours(&self, pictures: &[Vec<WeightedColours>]) -> Result<Vec<Vec<f32>>> {
+        if pictures.is_empty() {
+            return Ok(Vec::new());
+        }
+        let logits = self.to_host(self.extractor.colour_logits(pictures)?)?;
+        Ok(logits.chunks_exact(self.bits).map(<[f32]>::to_vec).collect())
     }
 
     /// Logits of pictures that are made `side` pixels wide and high first: the extractor's own side, or another one where
@@ -224,23 +228,23 @@ impl Engine {
         side: usize,
         pictures: &[P],
     ) -> Result<Vec<Vec<f32>>> {
-        self.read_with(pictures, Some(side), |pictures| self.logits_at(side, pictures))
+        self.read_with(pictures, side, |pictures| self.logits_at(side, pictures))
     }
 
-    /// Logits of pictures, which are made `side` pixels wide and high first if that is given.
+    /// Logits of pictures, which are made `side` pixels wide and high first.
     fn read_with<P: Borrow<Picture> + Sync>(
         &self,
         pictures: &[P],
-        side: Option<usize>,
+        side: usize,
         read: impl Fn(Tensor<4>) -> Result<Tensor<2>> + Send + Sync,
     ) -> Result<Vec<Vec<f32>>> {
         let pictures: Vec<&Picture> = pictures.iter().map(Borrow::borrow).collect();
         let alike = pictures.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height));
         let chunks: Vec<&[&Picture]> = alike.flat_map(|alike| alike.chunks(READ_BATCH)).collect();
         let rows = |chunk: &&[&Picture]| {
-            let made = match side.filter(|side| [chunk[0].width, chunk[0].height] != [*side as u32; 2]) {
-                Some(side) => self.each(chunk, |picture| self.resized_to(side, picture))?,
-                None => Vec::new(),
+            let made = match [chunk[0].width, chunk[0].height] == [side as u32; 2] {
+                true => Vec::new(),
+                false => self.each(chunk, |picture| self.resized_to(side, picture))?,
             };
             let chunk: Vec<&Picture> = match made.is_empty() {
                 true => chunk.to_vec(),

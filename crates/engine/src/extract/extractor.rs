@@ -1,8 +1,8 @@
 //! What reads a message from pictures: the part of the engine that embedding differentiates through, and readings ask.
 use burn::tensor::{Device, Tensor};
 
-use crate::clip::Clip;
 use crate::clip::config::{Tones, VisionTower};
+use crate::clip::{Clip, WeightedColours};
 use crate::error::{Error, Result};
 use crate::message::{Decoding, Key, Reader};
 use crate::resize::resize;
@@ -44,6 +44,24 @@ pub trait Extractor: Send + Sync {
     /// As [`Extractor::logits`].
     fn square_logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
         self.logits(pictures)
+    }
+
+    /// Sides of the squares of a picture over which colours are averaged, where nothing is read but how often each of these
+    /// means is there; none where more is.
+    fn colour_scales(&self) -> &[usize] {
+        &[]
+    }
+
+    /// Logits `[b, bits]` of pictures of which each has these colours, a histogram for each of [`Extractor::colour_scales`].
+    ///
+    /// # Errors
+    /// Where there are no such scales.
+    fn colour_logits(&self, pictures: &[Vec<WeightedColours>]) -> Result<Tensor<2>> {
+        let _ = pictures;
+        Err(Error::BadOption {
+            field: "clip",
+            reason: "it reads more than how often colours are there".into(),
+        })
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]` in [0, 1], positive for 1 and negative for 0; differentiable in the
@@ -124,6 +142,22 @@ impl Extractor for ClipExtractor {
             }
             _ => None,
         }
+    }
+
+    fn colour_scales(&self) -> &[usize] {
+        match (&self.clip.config.vision.tower, self.square()) {
+            (VisionTower::Statistics { scales, .. }, Some(_)) => scales,
+            _ => &[],
+        }
+    }
+
+    fn colour_logits(&self, pictures: &[Vec<WeightedColours>]) -> Result<Tensor<2>> {
+        let features = self.clip.features_of_colours(pictures);
+        let features = features.ok_or_else(|| Error::BadOption {
+            field: "clip",
+            reason: "it reads more than how often colours are there".into(),
+        })?;
+        Ok(self.reader.image_logits(features))
     }
 
     fn square_logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {

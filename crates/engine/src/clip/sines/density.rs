@@ -42,6 +42,7 @@ pub(super) fn weights(instructions: Instructions, pictures: &[f32], views: usize
         views.for_each(|(weights, picture)| {
             instructions.run(Weigh {
                 picture,
+                counts: None,
                 equalization,
                 weights,
             });
@@ -50,9 +51,23 @@ pub(super) fn weights(instructions: Instructions, pictures: &[f32], views: usize
     weights
 }
 
+/// Weights of normalised colours `[3][n]` of which each is there so many times, all of them together; they add up to 1.
+pub(super) fn weights_of(instructions: Instructions, colours: &[f32], counts: &[f32], equalization: f32) -> Vec<f32> {
+    let mut weights = vec![0.0; counts.len()];
+    instructions.run(Weigh {
+        picture: colours,
+        counts: Some(counts),
+        equalization,
+        weights: &mut weights,
+    });
+    weights
+}
+
 /// Of one picture. Nothing is fused: the bytes are the same on every instruction set of an architecture.
 struct Weigh<'a> {
     picture: &'a [f32],
+    /// How often each colour is there; once where that is not given.
+    counts: Option<&'a [f32]>,
     equalization: f32,
     weights: &'a mut [f32],
 }
@@ -68,7 +83,10 @@ impl Vectorised for Weigh<'_> {
         let pixels = self.weights.len();
         for first in (0..pixels).step_by(BLOCK) {
             let (count, plain) = cells.fill(self.picture, pixels, first);
-            cells.count(&mut grid, count, plain);
+            match self.counts {
+                None => cells.count(&mut grid, count, plain),
+                Some(counts) => cells.count_times(&mut grid, &counts[first..][..count], plain),
+            }
         }
         let mut sums = [0.0_f64; BLOCK];
         for (block, weights) in self.weights.chunks_mut(BLOCK).enumerate() {
@@ -80,6 +98,10 @@ impl Vectorised for Weigh<'_> {
                 for k in 0..BLOCK {
                     found[k] = power_of(cells.density(&grid, k), power);
                 }
+            }
+            if let Some(counts) = self.counts {
+                let counts = &counts[block * BLOCK..];
+                found.iter_mut().zip(counts).for_each(|(found, count)| *found *= count);
             }
             for ((weight, found), sum) in weights.iter_mut().zip(&found).zip(&mut sums) {
                 *weight = *found;
@@ -154,6 +176,17 @@ impl Cells {
             (count.min(BLOCK), 1.0)
         };
         for k in 0..pixels {
+            for i in 0..8 {
+                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
+            }
+        }
+    }
+
+    /// Adds colours to the grid of which each is there so many times; only the first was found where all are alike.
+    #[inline(always)]
+    fn count_times(&self, grid: &mut [f32; ROOM], counts: &[f32], plain: bool) {
+        for (k, times) in counts.iter().enumerate() {
+            let k = if plain { 0 } else { k };
             for i in 0..8 {
                 grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
             }

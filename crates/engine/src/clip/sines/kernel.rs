@@ -19,7 +19,7 @@ pub(super) type Lanes = [f32; LANES];
 pub(super) struct Block(pub [Lanes; 3]);
 
 /// A filter and its phase, in turns.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Wave {
     pub filter: [f32; 3],
     pub phase: f32,

@@ -14,6 +14,7 @@ mod density;
 mod flex;
 mod gpu;
 mod kernel;
+mod of_colours;
 mod plain;
 mod pool;
 
@@ -24,6 +25,8 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::Tensor;
+
+pub(super) use of_colours::HostWaves;
 
 /// 2 pi in two parts, for the GPU: multiples of the first by less than 2^15 are exact.
 const TURN: [f32; 2] = [6.281_25, 1.935_307_2e-3];

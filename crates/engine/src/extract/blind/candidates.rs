@@ -1,20 +1,26 @@
 //! All candidates for what was done to one picture, over its parts and changes of tones, as the search goes on.
 use super::parts::Part;
 use super::prior::Prior;
-use super::sample::Sample;
 use super::score::{self, Spread};
-use super::search::{self, Read};
+use super::search::{self, Read, Reader};
 use super::sweep;
-use super::{BATCH, Candidate, joint, undone_on_white};
+use super::trend::Trend;
+use super::{Candidate, joint, reader, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
-use crate::extract::photometric::{ToneChange, ground, white_balance};
+use crate::extract::photometric::{ColourHistogram, Fineness, ToneChange, ground, white_balance};
 use crate::picture::Picture;
 
 /// Logits of each picture.
 type Rows = Vec<Vec<f32>>;
 
-/// Changes that looked best on a sample, and are tried on all of a part.
+/// Histograms on which many changes are looked at; the best of them are looked at, and refined, on [finer ones](Fineness::FINE).
+const ROUGH: Fineness = Fineness {
+    cells: 1.0 / 48.0,
+    most: 2000,
+};
+
+/// Changes that looked best on a rough histogram, and are looked at on a fine one.
 const CHECKED: usize = 16;
 
 /// A search over the parts of a picture.
@@ -23,6 +29,10 @@ pub(super) struct Search<'a> {
     /// The whole, at the side that the extractor takes in: contrast is changed about its mean.
     whole: &'a Picture,
     parts: &'a [(Part, Picture)],
+    /// What is known of each part before anything is read, and the trend of its scores once it was looked at.
+    priors: Vec<Prior<'a>>,
+    /// Histograms of the parts that were looked at.
+    histograms: Vec<Option<ColourHistogram>>,
     /// Logits of the parts before anything is undone.
     as_they_are: Rows,
     found: Vec<Candidate>,
@@ -55,6 +65,8 @@ impl<'a> Search<'a> {
             engine,
             whole,
             parts,
+            priors: parts.iter().map(|(_, small)| Prior::of(small, whole)).collect(),
+            histograms: parts.iter().map(|_| None).collect(),
             as_they_are,
             found,
             refined: Vec::new(),
@@ -62,42 +74,51 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Tries changes of the tones of a part: many on a sample of it, if the extractor reads such, and the best of them on all
-    /// of it.
+    /// Tries changes of the tones of a part: many on a rough histogram of it, if the extractor reads such, and the best of them
+    /// on a fine one.
     ///
     /// # Errors
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn sweep(&mut self, place: usize, hints: &[ToneChange]) -> Result<()> {
         let ((part, small), whole) = (&self.parts[place], self.whole);
-        let prior = Prior::of(small, whole);
+        let mut prior = self.priors[place];
         let ground = ground::colour(small);
         let anchor = ground.map(|ground| move |change: ToneChange| change.with_white(ground, whole));
         let anchor = anchor
             .as_ref()
             .map(|anchor| anchor as &dyn Fn(ToneChange) -> ToneChange);
         let mut changes = sweep::lines(anchor);
-        let square = self.engine.extractor.square();
-        if let Some(sample) = square.and_then(|side| Sample::of(small, side)) {
+        let sides = self.engine.extractor.colour_scales();
+        if !sides.is_empty() {
+            let histogram = ColourHistogram::of(small, sides, ROUGH);
             changes.extend(sweep::tinted());
             if let Some((ground, anchor)) = ground.zip(anchor) {
                 changes.extend(sweep::overlays(ground));
                 let cut = white_balance::cut(ground);
                 changes.extend(cut.map_or_else(Vec::new, |cut| sweep::filters(anchor, cut)));
             }
-            let undone = |change: &ToneChange| sample.undone(change, whole);
             let mut rough = search::tried(
-                &mut reader(self.engine, undone, Engine::read_square_logits),
+                &mut *reader::of_histogram(self.engine, &histogram, whole),
                 &prior,
                 &changes,
             )?;
+            prior.trend = Trend::of(
+                rough
+                    .iter()
+                    .map(|read| (read.change, read.score + prior.cost(&read.change))),
+            );
+            self.priors[place] = prior;
+            for read in &mut rough {
+                read.score -= prior.trend.at(&read.change);
+            }
             self.spread = Spread::of(rough.iter().map(|read| read.score));
             rough.sort_by(|a, b| b.score.total_cmp(&a.score));
             changes = vec![ToneChange::default()];
             changes.extend(rough.iter().take(CHECKED).map(|read| read.change));
         }
         changes.extend_from_slice(hints);
-        let found = search::tried(&mut self.reader(small), &prior, &changes)?;
-        if square.is_none() || self.spread.is_none() {
+        let found = search::tried(&mut *self.reader(place), &prior, &changes)?;
+        if sides.is_empty() || self.spread.is_none() {
             self.spread = Spread::of(found.iter().map(|read| read.score));
         }
         self.add(*part, found);
@@ -113,17 +134,18 @@ impl<'a> Search<'a> {
             let new = |candidate: &&Candidate| self.refined.iter().all(|start| candidate.lies_apart_from(start));
             let best = self.found.iter().filter(new).max_by(|a, b| a.score.total_cmp(&b.score));
             let Some(best) = best.cloned() else { break };
-            let Some((part, small)) = self.parts.iter().find(|(part, _)| *part == best.part) else {
+            let Some(place) = self.parts.iter().position(|(part, _)| *part == best.part) else {
                 break;
             };
+            let (part, prior) = (self.parts[place].0, self.priors[place]);
             let start = Read {
                 change: best.change,
                 logits: best.logits.clone(),
                 score: best.score + part.cost(),
             };
             self.refined.push(best);
-            let found = search::refined(&mut self.reader(small), &Prior::of(small, self.whole), start)?;
-            self.add(*part, found);
+            let found = search::refined(&mut *self.reader(place), &prior, start)?;
+            self.add(part, found);
             if self.is_clear() {
                 break;
             }
@@ -197,31 +219,16 @@ impl<'a> Search<'a> {
         }));
     }
 
-    /// Reads a part with changes undone, and its ground made white where it shows one.
-    fn reader<'b>(
-        &self,
-        small: &'b Picture,
-    ) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, 'b> {
-        let whole = self.whole;
-        let undone = move |change: &ToneChange| undone_on_white(change, small, whole);
-        reader(self.engine, undone, Engine::read_logits)
-    }
-}
-
-/// Reads pictures with changes undone, those that can have been done.
-fn reader<'a, U: Fn(&ToneChange) -> Option<Picture> + Send + Sync>(
-    engine: &'a Engine,
-    undone: U,
-    read: fn(&Engine, &[Picture]) -> Result<Rows>,
-) -> impl FnMut(&[ToneChange]) -> Result<Vec<Option<Vec<f32>>>> + use<'a, U> {
-    move |changes| {
-        let mut logits = Vec::with_capacity(changes.len());
-        for chunk in changes.chunks(BATCH) {
-            let before = engine.each(chunk, |change| Ok(undone(change)))?;
-            let possible: Vec<Picture> = before.iter().flatten().cloned().collect();
-            let mut read = read(engine, &possible)?.into_iter();
-            logits.extend(before.iter().map(|before| before.as_ref().and_then(|_| read.next())));
+    /// Reads a part with changes undone, and its ground made white where it shows one: its histogram, where the extractor reads
+    /// such.
+    fn reader(&mut self, place: usize) -> Box<Reader<'_>> {
+        let (engine, whole, small) = (self.engine, self.whole, &self.parts[place].1);
+        let sides = engine.extractor.colour_scales();
+        if sides.is_empty() {
+            let undone = move |change: &ToneChange| undone_on_white(change, small, whole);
+            return reader::of_pictures(engine, undone);
         }
-        Ok(logits)
+        let histogram = self.histograms[place].get_or_insert_with(|| ColourHistogram::of(small, sides, Fineness::FINE));
+        reader::of_histogram(engine, histogram, whole)
     }
 }

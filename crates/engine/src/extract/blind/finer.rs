@@ -29,14 +29,22 @@ pub(super) fn read(
         let (of_part, others): (Vec<_>, Vec<_>) = chosen.into_iter().partition(|place| candidates[*place].part == part);
         chosen = others;
         let shown = part.of(restored);
-        for side in larger_sides(engine.extractor.as_ref(), shorter_side(&shown)) {
+        // What was read of a histogram is read once more of the picture.
+        let own = Some(engine.extractor.side()).filter(|_| !engine.extractor.colour_scales().is_empty());
+        for side in own
+            .into_iter()
+            .chain(larger_sides(engine.extractor.as_ref(), shorter_side(&shown)))
+        {
             let shown = engine.resized_to(side, &shown)?;
             let undone = engine.each(&of_part, |place| Ok(undone(&candidates[*place], &shown, whole)))?;
             let possible = of_part.iter().copied().zip(undone);
             let (places, pictures): (Vec<usize>, Vec<Picture>) =
                 possible.filter_map(|(place, undone)| Some((place, undone?))).unzip();
             for (place, logits) in places.into_iter().zip(engine.read_logits_at(side, &pictures)?) {
-                readings[place].push(logits);
+                match Some(side) == own {
+                    true => readings[place] = vec![logits],
+                    false => readings[place].push(logits),
+                }
             }
         }
     }

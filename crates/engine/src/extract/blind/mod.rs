@@ -9,12 +9,13 @@ mod finer;
 mod joint;
 mod parts;
 mod prior;
-mod sample;
+mod reader;
 mod score;
 mod search;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod trend;
 
 use std::fmt;
 
@@ -27,7 +28,7 @@ use candidates::Search;
 pub(super) use joint::chosen;
 use parts::{Part, parts};
 
-/// Corrected pictures that are in memory together: a thousand are a gigabyte.
+/// Corrected pictures, or histograms, that are in memory together: a thousand pictures are a gigabyte.
 const BATCH: usize = 64;
 /// Places from which a search is refined, unless one is clear before.
 const STARTS: usize = 2;

@@ -2,6 +2,7 @@
 //!
 //! The size of logits is largest a little beside the truth, and plain colours have large ones under some wrong change. Most
 //! people change one thing or nothing; and what had been a white or black ground tells what can hardly have been done to it.
+use super::trend::Trend;
 use crate::extract::photometric::{ToneChange, ground};
 use crate::picture::Picture;
 
@@ -17,10 +18,13 @@ const GROUND: f64 = 0.3;
 const NEAR: f32 = 0.05;
 
 /// What is known of a picture, or a part of one, before anything is read.
+#[derive(Clone, Copy)]
 pub(super) struct Prior<'a> {
     /// The colour of the ground that it shows now.
     ground: Option<[f32; 3]>,
     whole: &'a Picture,
+    /// How scores of wrong changes vary, once that is known.
+    pub trend: Trend,
 }
 
 impl<'a> Prior<'a> {
@@ -29,10 +33,12 @@ impl<'a> Prior<'a> {
         Self {
             ground: ground::seen(part),
             whole,
+            trend: Trend::default(),
         }
     }
 
-    /// What a change must gain. A tint is what channels differ by from the middle one.
+    /// What a change must gain: what makes it unlikely, and what wrong ones like it score. A tint is what channels differ by from the
+    /// middle one.
     pub fn cost(&self, change: &ToneChange) -> f64 {
         let at = |place: usize| change.coordinates[place];
         let [gains, fades] = [ToneChange::GAINS.map(at), change.fades()].map(from_the_middle);
@@ -41,7 +47,7 @@ impl<'a> Prior<'a> {
         let done = done.chain([BENT * at(ToneChange::BEND)]);
         let share = |v: f32, half: f32| f64::from(v.abs() / (v.abs() + half));
         let ground = self.ground.map_or(0.0, |ground| share(self.off(ground, change), NEAR));
-        COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground
+        COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground + self.trend.at(change)
     }
 
     /// How far a ground was from white and black before a change, in the channel that was farthest. What is white now may

@@ -12,7 +12,7 @@ use crate::simd::Instructions;
 /// Coordinates of a [`ToneChange`].
 pub(in crate::extract) const COORDINATES: usize = 10;
 /// Share of a picture's values that may lie beyond what a change can have been done to.
-const OUTSIDE: f32 = 0.02;
+pub(super) const OUTSIDE: f32 = 0.02;
 
 /// Gains of the channels, a gamma, a fade of each channel, a curve, a saturation and a contrast, done one after the other.
 /// Undone, the last goes first.
@@ -106,7 +106,7 @@ impl ToneChange {
     /// `whole`, of which it is a part.
     pub fn undone(&self, picture: &Picture, whole: &Picture) -> Option<Picture> {
         let (before, outside) = self.undone_with_outside(picture, whole);
-        (outside as f32 <= OUTSIDE * picture.pixels.len() as f32).then_some(before)
+        (outside <= OUTSIDE * picture.pixels.len() as f32).then_some(before)
     }
 
     /// The same of a whole picture, whether or not that can be.
@@ -115,18 +115,19 @@ impl ToneChange {
     }
 
     /// The picture before, and how many of its values would lie outside.
-    fn undone_with_outside(&self, picture: &Picture, whole: &Picture) -> (Picture, usize) {
+    fn undone_with_outside(&self, picture: &Picture, whole: &Picture) -> (Picture, f32) {
         let mut pixels = vec![0.0; picture.pixels.len()];
         let outside = Instructions::widest().run(Undo {
             before: self.before(whole),
             pixels: picture.pixels.as_chunks().0,
+            counts: None,
             out: pixels.as_chunks_mut().0,
         });
         (Picture { pixels, ..*picture }, outside)
     }
 
     /// What undoes it in a part of `whole`.
-    fn before(&self, whole: &Picture) -> Before {
+    pub(super) fn before(&self, whole: &Picture) -> Before {
         let mean = match self.coordinates[Self::CONTRAST] {
             0.0 => 0.0,
             log => contrast::mean_before(whole, log.exp()),

@@ -179,7 +179,8 @@ fn distance(pixel: &[f32; 3], colour: [f32; 3]) -> f32 {
     larger(larger(larger(0.0, red.abs()), green.abs()), blue.abs())
 }
 
-fn border(picture: &Picture) -> Vec<[f32; 3]> {
+/// The outermost pixels of a picture.
+pub(super) fn border(picture: &Picture) -> Vec<[f32; 3]> {
     outermost(picture.width as usize, picture.pixels.as_chunks().0)
 }
 

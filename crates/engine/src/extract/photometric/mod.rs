@@ -8,6 +8,7 @@ mod change;
 mod contrast;
 mod curve;
 pub(super) mod ground;
+mod histogram;
 mod tone;
 mod undo;
 pub(super) mod white_balance;
@@ -15,6 +16,7 @@ pub(super) mod white_balance;
 use guardsplat_codeword::PhotometricCorrection;
 
 pub(super) use change::{COORDINATES, ToneChange};
+pub(super) use histogram::{ColourHistogram, Fineness};
 
 use super::{Engine, Extractor};
 use crate::error::Result;
@@ -53,10 +55,17 @@ pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f3
             different.push(*change);
         }
     }
+    let sides = engine.extractor.colour_scales();
+    let histogram = (!sides.is_empty()).then(|| ColourHistogram::of(&small, sides, Fineness::FINE));
     let mut read = Vec::with_capacity(different.len());
     for chunk in different.chunks(BATCH) {
-        let pictures = engine.each(chunk, |change| Ok(ground::on_white(change.undone_at_any_rate(&small))))?;
-        read.extend(engine.read_logits(&pictures)?);
+        read.extend(match &histogram {
+            Some(histogram) => {
+                engine.read_colours(&engine.each(chunk, |change| Ok(histogram.undone_at_any_rate(change, &small)))?)?
+            }
+            None => engine
+                .read_logits(&engine.each(chunk, |change| Ok(ground::on_white(change.undone_at_any_rate(&small))))?)?,
+        });
     }
     let logits = |change: &Option<ToneChange>| {
         let place = different.iter().position(|other| Some(*other) == *change);

@@ -104,16 +104,23 @@ impl Before {
 pub(super) struct Undo<'a> {
     pub before: Before,
     pub pixels: &'a [[f32; 3]],
+    /// How often each is there; once where that is not given.
+    pub counts: Option<&'a [f32]>,
     pub out: &'a mut [[f32; 3]],
 }
 
 impl Vectorised for Undo<'_> {
-    type Output = usize;
+    type Output = f32;
 
     #[inline(always)]
-    fn run<const FUSED: bool>(self) -> usize {
-        let mut outside = 0;
-        for (out, pixels) in self.out.chunks_mut(BLOCK).zip(self.pixels.chunks(BLOCK)) {
+    fn run<const FUSED: bool>(self) -> f32 {
+        let mut outside = [0.0; BLOCK];
+        let mut times = [1.0; BLOCK];
+        for (block, (out, pixels)) in self.out.chunks_mut(BLOCK).zip(self.pixels.chunks(BLOCK)).enumerate() {
+            if let Some(counts) = self.counts {
+                let counts = &counts[block * BLOCK..][..pixels.len()];
+                times[..counts.len()].copy_from_slice(counts);
+            }
             let mut now: Channels<BLOCK> = [[0.0; BLOCK]; 3];
             for (k, pixel) in pixels.iter().enumerate() {
                 (0..3).for_each(|c| now[c][k] = pixel[c]);
@@ -121,16 +128,18 @@ impl Vectorised for Undo<'_> {
             let mut was = now;
             self.before.undo(&mut was);
             // What a block is filled up with is black, which counts as cut.
-            for (now, was) in now.as_flattened().iter().zip(was.as_flattened_mut()) {
-                let seen = (*now > CUT) & (*now < 1.0 - CUT);
-                let possible = (*was >= -BEYOND) & (*was <= 1.0 + BEYOND);
-                outside += u32::from(seen & !possible);
-                *was = was.clamp(0.0, 1.0);
+            for (now, was) in now.iter().zip(&mut was) {
+                for k in 0..BLOCK {
+                    let seen = (now[k] > CUT) & (now[k] < 1.0 - CUT);
+                    let possible = (was[k] >= -BEYOND) & (was[k] <= 1.0 + BEYOND);
+                    outside[k] += if seen & !possible { times[k] } else { 0.0 };
+                    was[k] = was[k].clamp(0.0, 1.0);
+                }
             }
             for (k, out) in out.iter_mut().enumerate() {
                 *out = [was[0][k], was[1][k], was[2][k]];
             }
         }
-        outside as usize
+        outside.iter().sum()
     }
 }
