@@ -33,12 +33,14 @@ pub(super) struct Search<'a> {
     priors: Vec<Prior<'a>>,
     /// Histograms of the parts that were looked at.
     histograms: Vec<Option<ColourHistogram>>,
+    /// Parts whose tones were searched: of others it is not known what wrong changes score.
+    searched: Vec<Part>,
     /// Logits of the parts before anything is undone.
     as_they_are: Rows,
     found: Vec<Candidate>,
     /// Candidates from which a refinement has begun.
     refined: Vec<Candidate>,
-    /// How scores of wrong candidates are spread.
+    /// How scores of wrong candidates are spread, in the part that was looked at first.
     spread: Option<Spread>,
 }
 
@@ -67,6 +69,7 @@ impl<'a> Search<'a> {
             parts,
             priors: parts.iter().map(|(_, small)| Prior::of(small, whole)).collect(),
             histograms: parts.iter().map(|_| None).collect(),
+            searched: Vec::new(),
             as_they_are,
             found,
             refined: Vec::new(),
@@ -102,16 +105,8 @@ impl<'a> Search<'a> {
                 &prior,
                 &changes,
             )?;
-            prior.trend = Trend::of(
-                rough
-                    .iter()
-                    .map(|read| (read.change, read.score + prior.cost(&read.change))),
-            );
-            self.priors[place] = prior;
-            for read in &mut rough {
-                read.score -= prior.trend.at(&read.change);
-            }
-            self.spread = Spread::of(rough.iter().map(|read| read.score));
+            self.compare(place, &mut rough);
+            prior = self.priors[place];
             rough.sort_by(|a, b| b.score.total_cmp(&a.score));
             changes = vec![ToneChange::default()];
             changes.extend(rough.iter().take(CHECKED).map(|read| read.change));
@@ -122,17 +117,40 @@ impl<'a> Search<'a> {
             self.spread = Spread::of(found.iter().map(|read| read.score));
         }
         self.add(*part, found);
+        self.searched.push(*part);
         Ok(())
     }
 
-    /// Refines the best candidates that lie apart, so many of them, until one is clear.
+    /// Takes off what wrong changes of this part score by brightness alone, and more than those of the part that was looked at
+    /// first: a window of a few plain colours has larger logits, whatever is undone.
+    fn compare(&mut self, place: usize, rough: &mut [Read]) {
+        let prior = &mut self.priors[place];
+        let scores = rough
+            .iter()
+            .map(|read| (read.change, read.score + prior.cost(&read.change)));
+        let mut trend = Trend::of(scores);
+        let spread = Spread::of(rough.iter().map(|read| read.score - trend.at(&read.change)));
+        match self.spread {
+            None => self.spread = spread,
+            Some(first) => trend.level = spread.map_or(0.0, |spread| spread.above(&first)),
+        }
+        prior.trend = trend;
+        rough.iter_mut().for_each(|read| read.score -= trend.at(&read.change));
+        let part = self.parts[place].0;
+        let as_it_is = self.found.iter_mut().filter(|found| found.part == part);
+        as_it_is.for_each(|found| found.score -= trend.level);
+    }
+
+    /// Refines the best candidates of the parts that were searched and that lie apart, so many of them, until one is clear.
     ///
     /// # Errors
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn refine(&mut self, starts: usize) -> Result<()> {
         for _ in 0..starts {
             let new = |candidate: &&Candidate| self.refined.iter().all(|start| candidate.lies_apart_from(start));
-            let best = self.found.iter().filter(new).max_by(|a, b| a.score.total_cmp(&b.score));
+            let of_searched = |candidate: &&Candidate| self.searched.contains(&candidate.part);
+            let best = self.found.iter().filter(of_searched).filter(new);
+            let best = best.max_by(|a, b| a.score.total_cmp(&b.score));
             let Some(best) = best.cloned() else { break };
             let Some(place) = self.parts.iter().position(|(part, _)| *part == best.part) else {
                 break;

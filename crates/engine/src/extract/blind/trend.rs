@@ -17,6 +17,8 @@ const LEAST: usize = 100;
 pub(super) struct Trend {
     /// Of each term; what is constant is the same for all changes, and left out.
     slopes: [f64; TERMS],
+    /// What wrong changes of this part score more than those of the part that was looked at first.
+    pub level: f64,
 }
 
 impl Trend {
@@ -36,16 +38,13 @@ impl Trend {
         }
         let fitted = solve(products, sums, 1e-9).filter(|_| count >= LEAST);
         let slopes = fitted.map_or([0.0; TERMS], |fitted| [0.0, fitted[1][0], fitted[2][0]]);
-        Self { slopes }
+        Self { slopes, level: 0.0 }
     }
 
-    /// What a wrong change like this one scores more than nothing done.
+    /// What a wrong change like this one scores more than nothing done in the part that was looked at first.
     pub fn at(&self, change: &ToneChange) -> f64 {
-        self.slopes
-            .iter()
-            .zip(terms(change))
-            .map(|(slope, term)| slope * term)
-            .sum()
+        let slopes = self.slopes.iter().zip(terms(change));
+        self.level + slopes.map(|(slope, term)| slope * term).sum::<f64>()
     }
 }
 
@@ -78,6 +77,15 @@ mod tests {
         assert!(beyond(30) > beyond(-70) + 0.7);
         // As they were, the wrong one wins by far less.
         assert!(score(-70) > score(30) - 0.3);
+    }
+
+    #[test]
+    fn a_part_whose_wrong_changes_score_more_has_that_taken_off() {
+        let trend = Trend {
+            level: 0.4,
+            ..Trend::default()
+        };
+        assert_eq!((trend.at(&ToneChange::default()), trend.at(&gain(20))), (0.4, 0.4));
     }
 
     #[test]
