@@ -4,7 +4,6 @@ use super::prior::Prior;
 use super::score::{self, Spread};
 use super::search::{self, Read, Reader};
 use super::sweep;
-use super::trend::Trend;
 use super::{Candidate, joint, reader, undone_on_white};
 use crate::error::Result;
 use crate::extract::Engine;
@@ -29,18 +28,16 @@ pub(super) struct Search<'a> {
     /// The whole, at the side that the extractor takes in: contrast is changed about its mean.
     whole: &'a Picture,
     parts: &'a [(Part, Picture)],
-    /// What is known of each part before anything is read, and the trend of its scores once it was looked at.
+    /// What is known of each part before anything is read.
     priors: Vec<Prior<'a>>,
     /// Histograms of the parts that were looked at.
     histograms: Vec<Option<ColourHistogram>>,
-    /// Parts whose tones were searched: of others it is not known what wrong changes score.
-    searched: Vec<Part>,
     /// Logits of the parts before anything is undone.
     as_they_are: Rows,
     found: Vec<Candidate>,
     /// Candidates from which a refinement has begun.
     refined: Vec<Candidate>,
-    /// How scores of wrong candidates are spread, in the part that was looked at first.
+    /// How scores of wrong candidates are spread.
     spread: Option<Spread>,
 }
 
@@ -69,7 +66,6 @@ impl<'a> Search<'a> {
             parts,
             priors: parts.iter().map(|(_, small)| Prior::of(small, whole)).collect(),
             histograms: parts.iter().map(|_| None).collect(),
-            searched: Vec::new(),
             as_they_are,
             found,
             refined: Vec::new(),
@@ -84,7 +80,7 @@ impl<'a> Search<'a> {
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn sweep(&mut self, place: usize, hints: &[ToneChange]) -> Result<()> {
         let ((part, small), whole) = (&self.parts[place], self.whole);
-        let mut prior = self.priors[place];
+        let prior = self.priors[place];
         let ground = ground::colour(small);
         let anchor = ground.map(|ground| move |change: ToneChange| change.with_white(ground, whole));
         let anchor = anchor
@@ -105,8 +101,7 @@ impl<'a> Search<'a> {
                 &prior,
                 &changes,
             )?;
-            self.compare(place, &mut rough);
-            prior = self.priors[place];
+            self.spread = Spread::of(rough.iter().map(|read| read.score));
             rough.sort_by(|a, b| b.score.total_cmp(&a.score));
             changes = vec![ToneChange::default()];
             changes.extend(rough.iter().take(CHECKED).map(|read| read.change));
@@ -117,40 +112,17 @@ impl<'a> Search<'a> {
             self.spread = Spread::of(found.iter().map(|read| read.score));
         }
         self.add(*part, found);
-        self.searched.push(*part);
         Ok(())
     }
 
-    /// Takes off what wrong changes of this part score by brightness alone, and more than those of the part that was looked at
-    /// first: a window of a few plain colours has larger logits, whatever is undone.
-    fn compare(&mut self, place: usize, rough: &mut [Read]) {
-        let prior = &mut self.priors[place];
-        let scores = rough
-            .iter()
-            .map(|read| (read.change, read.score + prior.cost(&read.change)));
-        let mut trend = Trend::of(scores);
-        let spread = Spread::of(rough.iter().map(|read| read.score - trend.at(&read.change)));
-        match self.spread {
-            None => self.spread = spread,
-            Some(first) => trend.level = spread.map_or(0.0, |spread| spread.above(&first)),
-        }
-        prior.trend = trend;
-        rough.iter_mut().for_each(|read| read.score -= trend.at(&read.change));
-        let part = self.parts[place].0;
-        let as_it_is = self.found.iter_mut().filter(|found| found.part == part);
-        as_it_is.for_each(|found| found.score -= trend.level);
-    }
-
-    /// Refines the best candidates of the parts that were searched and that lie apart, so many of them, until one is clear.
+    /// Refines the best candidates that lie apart, so many of them, until one is clear.
     ///
     /// # Errors
     /// A failing device, or [`Error::Stopped`](crate::Error::Stopped).
     pub fn refine(&mut self, starts: usize) -> Result<()> {
         for _ in 0..starts {
             let new = |candidate: &&Candidate| self.refined.iter().all(|start| candidate.lies_apart_from(start));
-            let of_searched = |candidate: &&Candidate| self.searched.contains(&candidate.part);
-            let best = self.found.iter().filter(of_searched).filter(new);
-            let best = best.max_by(|a, b| a.score.total_cmp(&b.score));
+            let best = self.found.iter().filter(new).max_by(|a, b| a.score.total_cmp(&b.score));
             let Some(best) = best.cloned() else { break };
             let Some(place) = self.parts.iter().position(|(part, _)| *part == best.part) else {
                 break;

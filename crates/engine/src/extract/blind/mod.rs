@@ -15,7 +15,6 @@ mod search;
 mod sweep;
 #[cfg(test)]
 mod tests;
-mod trend;
 
 use std::fmt;
 

@@ -2,7 +2,6 @@
 //!
 //! The size of logits is largest a little beside the truth, and plain colours have large ones under some wrong change. Most
 //! people change one thing or nothing; and what had been a white or black ground tells what can hardly have been done to it.
-use super::trend::Trend;
 use crate::extract::photometric::{ToneChange, ground};
 use crate::picture::Picture;
 
@@ -23,8 +22,6 @@ pub(super) struct Prior<'a> {
     /// The colour of the ground that it shows now.
     ground: Option<[f32; 3]>,
     whole: &'a Picture,
-    /// How scores of wrong changes vary, once that is known.
-    pub trend: Trend,
 }
 
 impl<'a> Prior<'a> {
@@ -33,12 +30,10 @@ impl<'a> Prior<'a> {
         Self {
             ground: ground::seen(part),
             whole,
-            trend: Trend::default(),
         }
     }
 
-    /// What a change must gain: what makes it unlikely, and what wrong ones like it score. A tint is what channels differ by from the
-    /// middle one.
+    /// What a change must gain. A tint is what channels differ by from the middle one.
     pub fn cost(&self, change: &ToneChange) -> f64 {
         let at = |place: usize| change.coordinates[place];
         let [gains, fades] = [ToneChange::GAINS.map(at), change.fades()].map(from_the_middle);
@@ -47,7 +42,7 @@ impl<'a> Prior<'a> {
         let done = done.chain([BENT * at(ToneChange::BEND)]);
         let share = |v: f32, half: f32| f64::from(v.abs() / (v.abs() + half));
         let ground = self.ground.map_or(0.0, |ground| share(self.off(ground, change), NEAR));
-        COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground + self.trend.at(change)
+        COST * done.map(|v| share(v, SMALL)).sum::<f64>() + GROUND * ground
     }
 
     /// How far a ground was from white and black before a change, in the channel that was farthest. What is white now may

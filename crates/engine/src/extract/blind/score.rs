@@ -45,11 +45,6 @@ impl Spread {
         })
     }
 
-    /// How much higher the middle of these lies than that of others.
-    pub fn above(&self, other: &Self) -> f64 {
-        self.middle - other.middle
-    }
-
     /// Whether a score is so far above that it is hardly one of these.
     pub fn is_clear(&self, score: f64) -> bool {
         score > self.middle + CLEAR * self.deviation

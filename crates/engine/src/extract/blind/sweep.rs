@@ -33,7 +33,7 @@ const APART: f32 = 2.5;
 /// Step of the gains that are tried together, and how many steps a tint goes either way: the second where brightness is
 /// nearly what it was.
 const GRID: f32 = 0.04;
-const TINTS: [i32; 2] = [2, 5];
+const TINTS: [i32; 2] = [2, 3];
 /// Steps of brightness up to which it nearly is.
 const NEARLY: i32 = 2;
 /// Largest gain, a logarithm, of a channel whose ground is white beside others whose is not.

@@ -11,7 +11,8 @@ use crate::clip::WeightedColours;
 use crate::picture::Picture;
 use crate::simd::Instructions;
 
-/// How fine a histogram is: side of its cells, and how many there are at most; if there are more, cells are made larger.
+/// How fine a histogram is: side of its cells in a picture of usual brightness, and how many there are at most; if there are
+/// more, cells are made larger.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::extract) struct Fineness {
     pub cells: f32,
@@ -26,6 +27,9 @@ impl Fineness {
     };
 }
 
+/// What the brightest colours of a picture are not darker than as a rule, and of that the least that cells are made smaller to.
+const USUAL: f32 = 0.75;
+const DARKEST: f32 = 0.25;
 /// Steps in which it is told how much of a square is not ground.
 const SHARES: f32 = 16.0;
 
@@ -72,6 +76,11 @@ impl ColourHistogram {
                 [pixel[0] * kept, pixel[1] * kept, pixel[2] * kept, kept]
             })
             .collect();
+        // In a picture that was made half as bright, colours lie half as far apart.
+        let fineness = Fineness {
+            cells: fineness.cells * (brightest(&pixels) / USUAL).clamp(DARKEST, 1.0),
+            ..fineness
+        };
         let width = picture.width as usize;
         let of_side = |side: &usize| Scale::of(&averaged(&pixels, width, *side), fineness);
         Self {
@@ -198,6 +207,18 @@ impl Scale {
         }
         scale
     }
+}
+
+/// What nearly all of what is not ground is darker than, in its brightest channel.
+fn brightest(pixels: &[[f32; 4]]) -> f32 {
+    let scene = pixels.iter().filter(|pixel| pixel[3] == 1.0);
+    let mut channels: Vec<f32> = scene.map(|pixel| pixel[0].max(pixel[1]).max(pixel[2])).collect();
+    if channels.is_empty() {
+        return USUAL;
+    }
+    let place = (channels.len() - 1) * 98 / 100;
+    let (_, brightest, _) = channels.select_nth_unstable_by(place, f32::total_cmp);
+    *brightest
 }
 
 /// Means over squares of a side; what a last square lacks is left out.
