@@ -4,7 +4,7 @@
     pip install numpy pillow
     tools/robustness/one_picture.py KEY MESSAGE SEED SCENE WORKER [WORKER]
 
-Each of eleven changes is done to one picture of 800 px, as much as the seed says, and kept as JPEG; a claim about that
+Each of thirteen changes is done to one picture of 800 px, as much as the seed says, and kept as JPEG; a claim about that
 picture alone is read. Of several workers each reads the same pictures, as before and after a change of the code. The first
 one renders. Rows say how many bits are right in the reading that fits best, and the p-value with all hypotheses paid for.
 """
@@ -46,6 +46,8 @@ def changed(picture, random):
         "black at 0 to 0.15": faded(picture, random.uniform(0, 0.15)),
         "warm filter": faded(curve(numpy.clip(picture * [1.08, 1, 0.9], 0, 1), 0.3), 0.05),
         "screenshot": numpy.asarray(page, float) / 255,
+        "brightness 0.5 to 0.7": picture * random.uniform(0.5, 0.7),
+        "brightness 1.3 to 1.5": picture * random.uniform(1.3, 1.5),
     }
 
 
