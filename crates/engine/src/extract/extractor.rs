@@ -58,10 +58,7 @@ pub trait Extractor: Send + Sync {
     /// Where there are no such scales.
     fn colour_logits(&self, pictures: &[Vec<WeightedColours>]) -> Result<Tensor<2>> {
         let _ = pictures;
-        Err(Error::BadOption {
-            field: "clip",
-            reason: "it reads more than how often colours are there".into(),
-        })
+        Err(reads_more_than_colours())
     }
 
     /// Logits `[b, bits]` of pictures `[b, 3, h, w]` in [0, 1], positive for 1 and negative for 0; differentiable in the
@@ -70,6 +67,13 @@ pub trait Extractor: Send + Sync {
     /// # Errors
     /// Pictures that it cannot read.
     fn logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>>;
+}
+
+fn reads_more_than_colours() -> Error {
+    Error::BadOption {
+        field: "clip",
+        reason: "it reads more than how often colours are there".into(),
+    }
 }
 
 /// The published method: CLIP's features of a picture, the key's projection, and its decoder.
@@ -153,10 +157,7 @@ impl Extractor for ClipExtractor {
 
     fn colour_logits(&self, pictures: &[Vec<WeightedColours>]) -> Result<Tensor<2>> {
         let features = self.clip.features_of_colours(pictures);
-        let features = features.ok_or_else(|| Error::BadOption {
-            field: "clip",
-            reason: "it reads more than how often colours are there".into(),
-        })?;
+        let features = features.ok_or_else(reads_more_than_colours)?;
         Ok(self.reader.image_logits(features))
     }
 

@@ -175,21 +175,22 @@ impl Cells {
         } else {
             (count.min(BLOCK), 1.0)
         };
-        for k in 0..pixels {
-            for i in 0..8 {
-                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
-            }
-        }
+        (0..pixels).for_each(|k| self.add(grid, k, times));
     }
 
     /// Adds colours to the grid of which each is there so many times; only the first was found where all are alike.
     #[inline(always)]
     fn count_times(&self, grid: &mut [f32; ROOM], counts: &[f32], plain: bool) {
         for (k, times) in counts.iter().enumerate() {
-            let k = if plain { 0 } else { k };
-            for i in 0..8 {
-                grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
-            }
+            self.add(grid, if plain { 0 } else { k }, *times);
+        }
+    }
+
+    /// Adds a colour to the grid, so many times.
+    #[inline(always)]
+    fn add(&self, grid: &mut [f32; ROOM], k: usize, times: f32) {
+        for i in 0..8 {
+            grid[(self.first[k] as usize + BEHIND[i]) % ROOM] += self.shares[i][k] * times;
         }
     }
 
