@@ -10,6 +10,7 @@ use crate::picture::Picture;
 use crate::quality::{Psnr, covered, mean_psnr, psnr_covered};
 use crate::splat::{CpuRasterizer, Geometry, Rasterizer, WeightCache, sh};
 use crate::view::{Split, ViewSampler};
+use rayon::prelude::*;
 
 /// Held-out views that are compared.
 const VIEWS: u64 = 2;
@@ -45,18 +46,22 @@ pub(crate) fn sufficient_side(geometry: &Geometry<'_>, sampler: &ViewSampler, si
 /// # Errors
 /// A side or cameras out of range.
 pub fn likeness_to_finer(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u32) -> Result<f64> {
-    let draw = |index: u64, side: u32, ground: f32| -> Result<Picture> {
+    let draw = |index: u64, side: u32, grounds: &[f32]| -> Result<Vec<Picture>> {
         let camera = sampler.camera(Split::HeldOut, index, side);
         let view = geometry.prepare_averaged(&camera, stands_for(side), WeightCache::None)?;
         let colours = sh::colours(geometry.sh(), None, &view);
-        CpuRasterizer.render(&view, &colours, [ground; 3])
+        let over = |ground: &f32| CpuRasterizer.render(&view, &colours, [*ground; 3]);
+        grounds.iter().map(over).collect()
     };
-    let mut differences: Vec<Psnr> = Vec::new();
-    for index in 0..VIEWS {
-        let coarse = draw(index, side, 1.0)?;
-        let mask = covered(&coarse, &draw(index, side, 0.0)?)?;
-        differences.extend(psnr_covered(&halved(&draw(index, 2 * side, 1.0)?), &coarse, &mask)?);
-    }
+    let compared = |index: u64| -> Result<Option<Psnr>> {
+        let [coarse, fine] =
+            [(side, &[1.0, 0.0][..]), (2 * side, &[1.0])].map(|(side, grounds)| draw(index, side, grounds));
+        let (coarse, fine) = (coarse?, fine?);
+        let mask = covered(&coarse[0], &coarse[1])?;
+        psnr_covered(&halved(&fine[0]), &coarse[0], &mask)
+    };
+    let compared: Vec<Option<Psnr>> = (0..VIEWS).into_par_iter().map(compared).collect::<Result<_>>()?;
+    let differences: Vec<Psnr> = compared.into_iter().flatten().collect();
     if differences.is_empty() {
         return Ok(f64::INFINITY);
     }

@@ -14,6 +14,7 @@
 //!
 //! A scene *lies on ground* when one thin level sheet at its lower end is wide and carries a good part of the weight:
 //! from below there would be nothing to see but that sheet.
+use super::quantiles::quantiles;
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
 
@@ -44,12 +45,19 @@ impl Extent {
     /// # Errors
     /// [`Error::BadOption`] for a scene without Gaussians, or one larger than 10^12 units.
     pub fn of(gaussians: &Gaussians) -> Result<Extent> {
+        Self::weighed(gaussians, &weights(gaussians))
+    }
+
+    /// Measures a scene whose Gaussians [show](weights) so much.
+    ///
+    /// # Errors
+    /// Those of [`Extent::of`].
+    pub(super) fn weighed(gaussians: &Gaussians, weights: &[f64]) -> Result<Extent> {
         if gaussians.is_empty() {
             return Err(bad("it has no Gaussians, so there is nothing to see".into()));
         }
-        let weights = weights(gaussians);
         let axis = |k: usize| gaussians.positions.iter().map(move |p| f64::from(p[k]));
-        let spans: [[f64; 2]; 3] = std::array::from_fn(|k| quantiles(axis(k), &weights, [0.1, 0.9]));
+        let spans: [[f64; 2]; 3] = std::array::from_fn(|k| quantiles(axis(k), weights, [0.1, 0.9]));
         let centre: [f64; 3] = std::array::from_fn(|k| 0.5 * (spans[k][0] + spans[k][1]));
         let distances = gaussians.positions.iter().map(|p| {
             (0..3)
@@ -57,16 +65,16 @@ impl Extent {
                 .sum::<f64>()
                 .sqrt()
         });
-        let [half, most] = quantiles(distances, &weights, [0.5, 0.95]);
+        let [half, most] = quantiles(distances, weights, [0.5, 0.95]);
         // What a scene of one Gaussian, or of many at one place, shows is as large as the Gaussians are.
-        let size = 2.0 * quantiles(gaussians.log_scales.iter().map(longest), &weights, [0.5])[0];
+        let size = 2.0 * quantiles(gaussians.log_scales.iter().map(longest), weights, [0.5])[0];
         let radius = most.min(2.5 * half).max(size).max(MIN_RADIUS);
         if centre.iter().any(|c| c.abs() > MAX_SIZE) || radius > MAX_SIZE {
             return Err(bad(format!(
                 "centre {centre:?} or radius {radius} is beyond the limit of {MAX_SIZE:e} units"
             )));
         }
-        let (up, on_ground) = up(gaussians, &weights, centre, radius);
+        let (up, on_ground) = up(gaussians, weights, centre, radius);
         Ok(Extent {
             centre: centre.map(|c| c as f32),
             radius: radius as f32,
@@ -106,25 +114,6 @@ pub(super) fn weights(gaussians: &Gaussians) -> Vec<f64> {
     } else {
         ones
     }
-}
-
-/// Weighted quantiles: the smallest values below which lie at least those shares of the weight.
-pub(super) fn quantiles<const N: usize>(
-    values: impl Iterator<Item = f64>,
-    weights: &[f64],
-    shares: [f64; N],
-) -> [f64; N] {
-    let mut sorted: Vec<(f64, f64)> = values.zip(weights.iter().copied()).collect();
-    sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let total: f64 = sorted.iter().map(|(_, w)| w).sum();
-    shares.map(|share| {
-        let mut below = 0.0;
-        let found = sorted.iter().find(|(_, w)| {
-            below += w;
-            below >= share * total
-        });
-        found.or(sorted.last()).map_or(0.0, |(value, _)| *value)
-    })
 }
 
 /// The upward direction, and whether the scene lies on ground.

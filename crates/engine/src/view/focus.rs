@@ -13,8 +13,9 @@
 //!   Each of twelve sectors counts by the sum of opacities times solid angles, at most as a whole.
 use std::f64::consts::TAU;
 
-use super::extent::{Extent, area, quantiles, weights};
+use super::extent::{Extent, area};
 use super::ground::upright;
+use super::quantiles::quantiles;
 use super::vector::{dot, frame, sub};
 use crate::scene::Gaussians;
 
@@ -43,9 +44,8 @@ pub(super) struct Focus {
 }
 
 impl Focus {
-    /// Finds the focus of a scene of that extent.
-    pub fn of(gaussians: &Gaussians, whole: &Extent) -> Self {
-        let shown = weights(gaussians);
+    /// Finds the focus of a scene of that extent, whose Gaussians [show](super::extent::weights) so much.
+    pub fn of(gaussians: &Gaussians, shown: &[f64], whole: &Extent) -> Self {
         let fine = fineness(gaussians);
         let centre: [f64; 3] = std::array::from_fn(|k| {
             let positions = gaussians.positions.iter().map(|p| f64::from(p[k]));
@@ -59,7 +59,7 @@ impl Focus {
         let distances: Vec<f64> = gaussians.positions.iter().map(distance).collect();
         let [most] = quantiles(distances.iter().copied(), &fine, [MOST]);
         let radius = RADIUS * most;
-        let [far] = quantiles(distances.iter().copied(), &shown, [MOST]);
+        let [far] = quantiles(distances.iter().copied(), shown, [MOST]);
         // Where all that is fine is at one place there is nothing to go around.
         if !(radius > 0.0 && radius.is_finite()) {
             return Self {
@@ -74,7 +74,7 @@ impl Focus {
             radius: radius as f32,
             ..near
         };
-        extent.up = upright(gaussians, &shown, &extent);
+        extent.up = upright(gaussians, shown, &extent);
         Self {
             spread: (far / most) as f32,
             surrounded: surrounded(gaussians, &distances, &extent),

@@ -65,9 +65,10 @@ impl SceneKind {
     /// # Errors
     /// Those of [`Extent::of`]: an empty scene, or one too large for single precision.
     pub fn of(gaussians: &Gaussians) -> crate::Result<(SceneKind, Openness)> {
-        let extent = Extent::of(gaussians)?;
-        let grid = SolidGrid::of(gaussians, &weights(gaussians));
-        let openness = Openness::of(gaussians, &extent, &Focus::of(gaussians, &extent), &grid);
+        let shown = weights(gaussians);
+        let extent = Extent::weighed(gaussians, &shown)?;
+        let focus = Focus::of(gaussians, &shown, &extent);
+        let openness = Openness::of(gaussians, &shown, &extent, &focus, &SolidGrid::of(gaussians, &shown));
         Ok((Self::by(&openness), openness))
     }
 

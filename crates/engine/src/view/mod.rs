@@ -17,6 +17,7 @@ mod lattice;
 mod openness;
 mod orbit;
 mod placing;
+mod quantiles;
 mod sampler;
 mod solid;
 pub(crate) mod vector;

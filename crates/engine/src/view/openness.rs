@@ -3,9 +3,10 @@
 //! 4096 Gaussians, drawn by what they show, look along 64 even directions through the [grid](super::solid). A look that leaves
 //! the grid has *escaped*: from that side the Gaussian is seen. The first two cells are passed over, since layers of one
 //! surface lie there. From free cells the same looks tell how far they are *closed in*.
-use super::extent::{Extent, weights};
+use super::extent::Extent;
 use super::focus::Focus;
 use super::lattice::lattice;
+use super::quantiles::quantiles;
 use super::solid::SolidGrid;
 use super::vector::dot;
 use crate::scene::Gaussians;
@@ -67,11 +68,12 @@ pub struct Openness {
 }
 
 impl Openness {
-    /// Measures a scene with its focus and its grid; the same scene gives the same figures, whatever its colours.
-    pub(super) fn of(gaussians: &Gaussians, extent: &Extent, focus: &Focus, grid: &SolidGrid) -> Self {
+    /// Measures a scene, whose Gaussians [show](super::extent::weights) so much, with its focus and its grid; the same scene
+    /// gives the same figures, whatever its colours.
+    pub(super) fn of(gaussians: &Gaussians, shown: &[f64], extent: &Extent, focus: &Focus, grid: &SolidGrid) -> Self {
         let looks: Vec<[f32; 3]> = lattice(LOOKS).collect();
         let length = grid.side * *grid.counts.iter().max().unwrap_or(&1) as f32;
-        let rows = drawn(&weights(gaussians));
+        let rows = drawn(shown);
         let count = rows.len().max(1) as f32;
         let cones: Vec<u64> = looks.iter().map(|side| cone(*side, &looks)).collect();
         let (mut inside, mut seen_from, mut hidden_from) = (0, [0.0f32; LOOKS], [0.0f32; LOOKS]);
@@ -115,7 +117,7 @@ impl Openness {
             hidden_from_front: hidden[front],
             hidden_from_behind: hidden[behind],
             seen_from_above: seen[nearest(extent.up)],
-            flatness: flatness(gaussians, extent),
+            flatness: flatness(gaussians, shown, extent),
             spread: focus.spread,
             surrounded: focus.surrounded,
         }
@@ -145,24 +147,22 @@ fn drawn(weights: &[f64]) -> Vec<usize> {
 fn hollow(grid: &SolidGrid, looks: &[[f32; 3]], up: [f32; 3]) -> f32 {
     let looks: Vec<_> = looks.iter().filter(|look| dot(**look, up) < STEEP).collect();
     let most = (ESCAPES * looks.len() as f32) as usize;
-    let (mut cells, mut closed_in) = (0, 0);
-    for cell in (0..grid.len()).filter(|cell| grid.numbers(*cell).iter().all(|n| n % STRIDE == 0)) {
-        cells += 1;
-        if grid.is_free(cell) {
-            let place = grid.middle(cell);
-            let mut escapes = looks.iter().filter(|look| grid.way(place, ***look, 0.0).is_none());
-            closed_in += usize::from(escapes.nth(most).is_none());
-        }
-    }
-    closed_in as f32 / cells.max(1) as f32
+    let looked_from = |cell: &usize| grid.numbers(*cell).iter().all(|n| n % STRIDE == 0);
+    let cells: Vec<usize> = (0..grid.len()).filter(looked_from).collect();
+    let is_closed_in = |cell: &&usize| {
+        let place = grid.middle(**cell);
+        let mut escapes = looks.iter().filter(|look| grid.way(place, ***look, 0.0).is_none());
+        grid.is_free(**cell) && escapes.nth(most).is_none()
+    };
+    let closed_in = cells.par_iter().with_min_len(64).filter(is_closed_in).count();
+    closed_in as f32 / cells.len().max(1) as f32
 }
 
 /// Height over width of the middle nine tenths.
-fn flatness(gaussians: &Gaussians, extent: &Extent) -> f32 {
-    let weights = weights(gaussians);
+fn flatness(gaussians: &Gaussians, shown: &[f64], extent: &Extent) -> f32 {
     let spans: [f64; 3] = std::array::from_fn(|k| {
         let values = gaussians.positions.iter().map(|p| f64::from(p[k]));
-        let [low, high] = super::extent::quantiles(values, &weights, [0.05, 0.95]);
+        let [low, high] = quantiles(values, shown, [0.05, 0.95]);
         high - low
     });
     let vertical = (0..3).fold(0, |best: usize, k| {

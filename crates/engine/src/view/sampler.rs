@@ -99,15 +99,16 @@ impl ViewSampler {
     /// # Errors
     /// Those of [`Extent::of`] and [`GivenViews::new`], and [`Error::BadOption`] for a room without a free place inside.
     pub fn seen_from(gaussians: &Gaussians, seed: u64, viewpoints: Viewpoints<'_>) -> Result<ViewSampler> {
-        let mut extent = Extent::of(gaussians)?;
+        let shown = weights(gaussians);
+        let mut extent = Extent::weighed(gaussians, &shown)?;
         let given = match viewpoints.cameras {
             [] => None,
             cameras => Some(Arc::new(GivenViews::new(gaussians, cameras)?)),
         };
         // Given cameras decide by themselves.
         let known = viewpoints.kind.or(given.is_some().then_some(SceneKind::Object));
-        let grid = || SolidGrid::of(gaussians, &weights(gaussians));
-        let find_focus = || Focus::of(gaussians, &extent);
+        let grid = || SolidGrid::of(gaussians, &shown);
+        let find_focus = || Focus::of(gaussians, &shown, &extent);
         let mut random = stream(seed, u64::MAX);
         let (mut inside, mut orbit) = (None, None);
         let (kind, front, focus, grid) = match known {
@@ -116,7 +117,7 @@ impl ViewSampler {
             Some(kind @ SceneKind::Room) => (kind, extent.up, None, Some(grid())),
             Some(SceneKind::Forward) | None => {
                 let (focus, grid) = (find_focus(), grid());
-                let found = Openness::of(gaussians, &extent, &focus, &grid);
+                let found = Openness::of(gaussians, &shown, &extent, &focus, &grid);
                 let kind = known.unwrap_or(SceneKind::by(&found));
                 (kind, found.front, Some(focus), Some(grid))
             }

@@ -3,7 +3,8 @@
 //! The grid spans the middle 96 % of what the scene shows along each axis, with a margin, or as much as it is told, in cubes of
 //! a 48th of its longest side. A cell is solid when Gaussians cover at least a quarter of one of its faces; each counts with its
 //! opacity, spread over its two longer axes. Fields of a grid are coarse on purpose: a shell of several layers is one layer.
-use super::extent::{quantiles, shortest_axis};
+use super::extent::shortest_axis;
+use super::quantiles::quantiles;
 use super::vector::along;
 use crate::scene::Gaussians;
 
