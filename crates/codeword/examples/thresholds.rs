@@ -3,11 +3,12 @@ use guardsplat_codeword::{DEFAULT_FALSE_POSITIVE_RATE, Result, signed_rank};
 
 const BITS: u32 = 64;
 /// How a suspect was read, with what such a reading pays (`shares`).
-const READINGS: [(&str, u64); 5] = [
+const READINGS: [(&str, u64); 6] = [
     ("a scene, read in one way", 1),
     ("pictures, as given", 2),
     ("pictures, as estimated", 4),
-    ("pictures, the best of 279 guesses", 4 * 279),
+    ("a picture, the best of three next estimates", 8 * 3),
+    ("a picture, the best of 279 guesses", 8 * 279),
     ("several pictures, the best of 512 in which one leads", 8 * 512),
 ];
 /// Assets of the key.

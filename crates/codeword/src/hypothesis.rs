@@ -42,10 +42,17 @@ pub enum PhotometricCorrection {
     /// Whatever was done to its tones, and whichever part of it shows the scene, was estimated from the picture and the
     /// key alone. The message that is claimed has no say in it, so however many were looked at, one is paid for.
     Estimated,
+    /// The same by what was nearly believed instead: the second best estimate, the third and so on ([`NEXT_ESTIMATES`] of
+    /// them), each a hypothesis of its own.
+    NextEstimate(u32),
     /// It is compared with the unmarked original, registered with it: what it shows otherwise is read, and whatever lies behind
     /// the scene is not. The message that is claimed has no say in it, either.
     Registered(RegisteredTones),
 }
+
+/// Places of estimates that are read besides the best one, of a picture that is read alone. Where the best is wrong, the
+/// right one is among these about every third time.
+pub const NEXT_ESTIMATES: std::ops::RangeInclusive<u32> = 2..=4;
 
 /// How the tones of a picture are taken that is compared with the original. Both ways are read, and whoever takes the better
 /// one pays for both: a fit undoes any filter, and a part of the mark with it.
@@ -111,6 +118,14 @@ impl Hypothesis {
         }
     }
 
+    /// What was done to a picture is what the estimate at this place says, 1 being the best.
+    pub fn estimated_next(place: u32) -> Self {
+        Self {
+            correction: PhotometricCorrection::NextEstimate(place),
+            ..Self::default()
+        }
+    }
+
     /// Each picture is compared with the original.
     pub fn registered(tones: RegisteredTones) -> Self {
         Self {
@@ -130,6 +145,9 @@ impl fmt::Display for Hypothesis {
             PhotometricCorrection::WhiteBalance(beyond) => undone.push(white_balance(beyond)),
             PhotometricCorrection::Tone(tone) => undone.push(format!("{tone} undone")),
             PhotometricCorrection::Estimated => undone.push("tones and part estimated from each picture".into()),
+            PhotometricCorrection::NextEstimate(place) => {
+                undone.push(format!("tones and part by estimate {place} of this picture"));
+            }
             PhotometricCorrection::Registered(tones) => undone.push(tones.to_string()),
         }
         if self.quarter_turns > 0 {

@@ -32,7 +32,7 @@ pub use code::{Code, Decoded, Layout, PAPER_LENGTHS, Payload, Scheme};
 pub use decision::Decision;
 pub use error::{Error, Result};
 pub use hypothesis::{
-    Hypothesis, PhotometricCorrection, RegisteredTones, Tone, WINDOW_STEPS, Window, tint_without_ground,
+    Hypothesis, NEXT_ESTIMATES, PhotometricCorrection, RegisteredTones, Tone, WINDOW_STEPS, Window, tint_without_ground,
 };
 pub use limits::{MAX_BITS, VERSION};
 pub use message::{Message, MessageLength};

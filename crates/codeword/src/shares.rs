@@ -2,8 +2,8 @@
 //!
 //! Most suspects are as they were given, and what was done to others can mostly be estimated; guesses come last, and many
 //! at once. So half of the rate is for files as given, half of the rest for what differs from the original where that is at
-//! hand, half of what is left then for the estimate, half of the rest for guesses about one picture that the others follow,
-//! and all that is left for guesses about all pictures, alike within a kind. A reading with one part in t of the rate pays
+//! hand, half of what is left then for the estimate, half of the rest for the next best ones, then for guesses about one
+//! picture that the others follow, and all that is left for guesses about all pictures, alike within a kind. A reading with one part in t of the rate pays
 //! as one of t hypotheses would: its tail times t. The shares depend on what was read and not on any message, and together
 //! are no more than the rate (a weighted union bound, Holm 1979).
 use crate::hypothesis::{Hypothesis, PhotometricCorrection};
@@ -14,16 +14,18 @@ enum Kind {
     AsGiven,
     Registered,
     Estimated,
+    NextEstimate,
     Led,
     Guessed,
 }
 
 impl Kind {
     /// From what is likely beforehand to what is a guess.
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::AsGiven,
         Self::Registered,
         Self::Estimated,
+        Self::NextEstimate,
         Self::Led,
         Self::Guessed,
     ];
@@ -36,6 +38,7 @@ fn kind(hypothesis: &Hypothesis) -> Kind {
         other => match other.correction {
             PhotometricCorrection::Registered(_) => Kind::Registered,
             PhotometricCorrection::Estimated => Kind::Estimated,
+            PhotometricCorrection::NextEstimate(_) => Kind::NextEstimate,
             _ => Kind::Guessed,
         },
     }
@@ -59,7 +62,7 @@ pub fn shares(hypotheses: &[Hypothesis]) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hypothesis::{RegisteredTones, Tone};
+    use crate::hypothesis::{NEXT_ESTIMATES, RegisteredTones, Tone};
 
     fn guess(i: usize) -> Hypothesis {
         Hypothesis {
@@ -111,6 +114,12 @@ mod tests {
             [2, 4, 8, 8]
         );
         assert_eq!(shares(&[guess(1), given, guess(2)]), [4, 2, 4]);
+        let next = NEXT_ESTIMATES.map(Hypothesis::estimated_next);
+        let alone = [given, Hypothesis::estimated()].into_iter().chain(next);
+        assert_eq!(
+            shares(&alone.chain([guess(1)]).collect::<Vec<_>>()),
+            [2, 4, 24, 24, 24, 8]
+        );
         assert_eq!(
             shares(&[given, Hypothesis::estimated(), led(1), led(2), guess(1)]),
             [2, 4, 16, 16, 8]

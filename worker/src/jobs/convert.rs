@@ -231,6 +231,7 @@ fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
         }
         PhotometricCorrection::WhiteBackground => (Kind::Ground, 1.0),
         PhotometricCorrection::Estimated => (Kind::Estimated, 1.0),
+        PhotometricCorrection::NextEstimate(place) => (Kind::Estimated, place as f32),
         PhotometricCorrection::Registered(RegisteredTones::AsGiven) => (Kind::Original, 1.0),
         PhotometricCorrection::Registered(RegisteredTones::Fitted) => (Kind::OriginalFitted, 1.0),
         PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),

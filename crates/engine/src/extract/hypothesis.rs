@@ -1,7 +1,7 @@
 //! Hypotheses about what was done to a picture (turned, mirrored, put into a frame, its tones changed), and their undoing.
 //!
 //! Each is read for itself, and is paid for by whoever decides on the best of them.
-use guardsplat_codeword::Hypothesis;
+use guardsplat_codeword::{Hypothesis, NEXT_ESTIMATES};
 
 use super::photometric::{corrections, read_corrections};
 use super::window::windows;
@@ -19,7 +19,9 @@ const LEAST_SIDE: u32 = 16;
 /// the most that a claim about a picture pays for. Where what was done is estimated without the claimed message, a picture
 /// whose estimate is clear has the first two only.
 pub fn searched_hypotheses(extractor: &dyn Extractor) -> Vec<Hypothesis> {
-    let estimated = (extractor.tones() == Tones::Estimated).then(Hypothesis::estimated);
+    let next = NEXT_ESTIMATES.map(Hypothesis::estimated_next);
+    let estimated = std::iter::once(Hypothesis::estimated()).chain(next);
+    let estimated = estimated.filter(|_| extractor.tones() == Tones::Estimated);
     let whole = [false, true].map(|trimmed| whole_hypotheses(extractor, trimmed));
     let mut all: Vec<_> = whole.into_iter().flatten().chain(part_hypotheses(extractor)).collect();
     all.splice(1..1, estimated);
@@ -269,7 +271,8 @@ mod tests {
         assert_eq!(of(false, Tones::Searched).len(), 16);
         let estimated = of(true, Tones::Estimated);
         assert_eq!(estimated[..2], [Hypothesis::default(), Hypothesis::estimated()]);
-        assert_eq!(estimated[2..], exact[1..]);
+        assert_eq!(estimated[4], Hypothesis::estimated_next(4));
+        assert_eq!(estimated[5..], exact[1..]);
         assert_eq!(exact[0], Hypothesis::default());
         for (place, hypothesis) in exact.iter().enumerate() {
             assert!(!exact[..place].contains(hypothesis), "{hypothesis}");

@@ -1,5 +1,5 @@
 //! One picture read under every hypothesis, and pictures of one suspect taken together.
-use guardsplat_codeword::Hypothesis;
+use guardsplat_codeword::{Hypothesis, NEXT_ESTIMATES};
 
 use super::blind::{BlindReading, Candidate, chosen};
 use super::hypothesis::{part_hypotheses, read_whole, whole_hypotheses};
@@ -66,6 +66,12 @@ impl PictureLogits {
     pub fn as_given(&self) -> &[f32] {
         &self.as_given
     }
+
+    /// What was estimated to have been done to it.
+    #[cfg(test)]
+    pub(super) fn blind(&self) -> &BlindReading {
+        self.blind.as_ref().unwrap()
+    }
 }
 
 impl Searched {
@@ -92,7 +98,7 @@ impl Searched {
 ///
 /// Where what was done is estimated that is the second hypothesis, and the only other one if all estimates are clear. The
 /// message has no part in that, so that only what is here has to be paid for. A picture whose estimate is clear is read so
-/// under all guesses.
+/// under all guesses. The next best estimates follow for a picture that is alone: of several, what agrees is right.
 ///
 /// # Errors
 /// No pictures, or logits that are not finite.
@@ -110,6 +116,11 @@ pub fn hypotheses(engine: &Engine, pictures: &[PictureLogits]) -> Result<Vec<(Hy
         .collect();
     if engine.extractor.tones() == Tones::Estimated {
         readings.push(pooled(Hypothesis::estimated(), estimated.clone())?);
+        if let [picture] = pictures {
+            for (hypothesis, logits) in picture.next_estimates() {
+                readings.push(pooled(hypothesis, vec![logits])?);
+            }
+        }
     }
     let extractor = engine.extractor.as_ref();
     let under = |read: fn(&Searched, usize) -> &[f32], place: usize| {
@@ -157,6 +168,13 @@ fn read_under(hypotheses: Vec<Hypothesis>, logits: &[Vec<f32>]) -> impl Iterator
 }
 
 impl PictureLogits {
+    /// What is read of it by the next best estimates, unless the best is clear.
+    fn next_estimates(&self) -> impl Iterator<Item = (Hypothesis, &[f32])> {
+        let unclear = self.blind.iter().filter(|_| self.searched.is_some());
+        let next = unclear.flat_map(|blind| blind.candidates().map(Candidate::logits).skip(1));
+        NEXT_ESTIMATES.map(Hypothesis::estimated_next).zip(next)
+    }
+
     /// All ways in which it was read: as it is `estimated` only, where that is clear.
     fn ways<'a>(&'a self, extractor: &dyn Extractor, estimated: &'a [f32]) -> Ways<'a> {
         let estimate = (Hypothesis::estimated(), estimated);

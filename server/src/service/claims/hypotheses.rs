@@ -97,7 +97,10 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
             None | Some((Kind::Unspecified, _)) => PhotometricCorrection::None, // refused
             Some((Kind::Ground, _)) => PhotometricCorrection::WhiteBackground,
             Some((Kind::WhiteBalance, _)) => PhotometricCorrection::WhiteBalance(channels),
-            Some((Kind::Estimated, _)) => PhotometricCorrection::Estimated,
+            Some((Kind::Estimated, place)) => match place as u32 {
+                ..=1 => PhotometricCorrection::Estimated,
+                place => PhotometricCorrection::NextEstimate(place),
+            },
             Some((Kind::Original, _)) => PhotometricCorrection::Registered(RegisteredTones::AsGiven),
             Some((Kind::OriginalFitted, _)) => PhotometricCorrection::Registered(RegisteredTones::Fitted),
             Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),

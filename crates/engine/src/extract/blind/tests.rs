@@ -3,7 +3,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::tensor::{Tensor, TensorData};
-use guardsplat_codeword::{Hypothesis, Message, Reading, chance};
+use guardsplat_codeword::{Hypothesis, Message, NEXT_ESTIMATES, Reading, chance};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -242,6 +242,43 @@ fn pictures_of_one_message_with_tones_of_their_own_are_read_together() {
         words[0].contains("brightness x 0.7") && words[2].contains("without borders"),
         "{words:?}"
     );
+}
+
+#[test]
+fn the_next_best_estimates_of_a_picture_alone_are_hypotheses_of_their_own() {
+    let (engine, _, _) = engine();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let unmarked = || -> Picture {
+        let colours: Vec<[f32; 3]> = (0..BITS)
+            .map(|_| std::array::from_fn(|_| rng.random_range(0.0..1.0)))
+            .collect();
+        picture(&colours)
+    };
+    let read: Vec<_> = std::iter::repeat_with(unmarked)
+        .map(|picture| PictureLogits::read(&engine, &picture, None, &[]).unwrap())
+        .filter(|read| !read.blind().is_clear())
+        .take(2)
+        .collect();
+    let next = NEXT_ESTIMATES.map(Hypothesis::estimated_next);
+    let alone = hypotheses(&engine, &read[..1]).unwrap();
+    let candidates = read[0].blind().candidates();
+    for ((hypothesis, logits), (place, candidate)) in alone[1..].iter().zip((1..=4).zip(candidates)) {
+        let expected = match place {
+            1 => Hypothesis::estimated(),
+            place => Hypothesis::estimated_next(place),
+        };
+        assert_eq!((*hypothesis, &logits.summed[..]), (expected, candidate.logits()));
+    }
+    assert_eq!(
+        alone
+            .iter()
+            .filter(|(way, _)| next.clone().any(|next| next == *way))
+            .count(),
+        3
+    );
+    // Those of several agree.
+    let together = hypotheses(&engine, &read).unwrap();
+    assert!(together.iter().all(|(way, _)| next.clone().all(|next| next != *way)));
 }
 
 #[test]

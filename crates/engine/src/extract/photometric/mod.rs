@@ -79,7 +79,10 @@ pub fn read_corrections(engine: &Engine, picture: &Picture) -> Result<Vec<Vec<f3
 fn change(correction: PhotometricCorrection, picture: &Picture) -> Option<ToneChange> {
     match correction {
         // What was estimated is undone where it was found, and what is compared with an original is read elsewhere.
-        PhotometricCorrection::None | PhotometricCorrection::Estimated | PhotometricCorrection::Registered(_) => None,
+        PhotometricCorrection::None
+        | PhotometricCorrection::Estimated
+        | PhotometricCorrection::NextEstimate(_)
+        | PhotometricCorrection::Registered(_) => None,
         PhotometricCorrection::WhiteBackground => Some(ToneChange::default()),
         PhotometricCorrection::WhiteBalance(beyond) => {
             white_balance::gains(picture, beyond).map(|gains| ToneChange::of_gains(gains.map(f32::ln)))

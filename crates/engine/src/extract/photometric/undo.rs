@@ -7,6 +7,11 @@ use crate::simd::Vectorised;
 
 /// Values this near to black or white were cut there by what was done, and say nothing of what they had been.
 pub(super) const CUT: f32 = 0.5 / 255.0;
+/// The same of values that were averaged or compressed since.
+const NEARLY_CUT: f32 = 1.5 / 255.0;
+/// Where undoing moves a value that was cut by more than this, nobody knows what it had been. Its colour is made white, which
+/// says nothing: as one colour of many pixels it would say something wrong.
+const UNKNOWN: f32 = 4.0 / 255.0;
 /// How far beyond black and white a change may have put values: what compression does besides.
 const BEYOND: f32 = 0.03;
 /// What black may have become at least and at most.
@@ -127,6 +132,7 @@ impl Vectorised for Undo<'_> {
             }
             let mut was = now;
             self.before.undo(&mut was);
+            let mut lost = [0.0_f32; BLOCK];
             // What a block is filled up with is black, which counts as cut.
             for (now, was) in now.iter().zip(&mut was) {
                 for k in 0..BLOCK {
@@ -134,10 +140,13 @@ impl Vectorised for Undo<'_> {
                     let possible = (was[k] >= -BEYOND) & (was[k] <= 1.0 + BEYOND);
                     outside[k] += if seen & !possible { times[k] } else { 0.0 };
                     was[k] = was[k].clamp(0.0, 1.0);
+                    let sure = (now[k] > NEARLY_CUT) & (now[k] < 1.0 - NEARLY_CUT);
+                    let is_lost = !sure & ((was[k] - now[k]).abs() > UNKNOWN);
+                    lost[k] = if is_lost { 1.0 } else { lost[k] };
                 }
             }
             for (k, out) in out.iter_mut().enumerate() {
-                *out = [was[0][k], was[1][k], was[2][k]];
+                *out = [0, 1, 2].map(|c| was[c][k].max(lost[k]));
             }
         }
         outside.iter().sum()

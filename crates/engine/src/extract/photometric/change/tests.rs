@@ -106,6 +106,24 @@ fn contrast_is_undone_about_the_mean_from_before_a_ground_was_cut() {
 }
 
 #[test]
+fn nothing_is_said_by_colours_that_were_cut() {
+    // Twice as bright: red was cut, so that nobody knows the first colour any more.
+    let now = picture([[1.0, 0.4, 0.2], [0.6, 0.4, 0.2], [0.0, 0.4, 0.2]].concat());
+    let before = ToneChange::of_gains([2.0_f32.ln(); 3]).undone_at_any_rate(&now);
+    let expected = [1.0, 1.0, 1.0, 0.3, 0.2, 0.1, 0.0, 0.2, 0.1];
+    for (a, b) in before.pixels.iter().zip(expected) {
+        assert!((a - b).abs() < 1e-6, "{:?}", before.pixels);
+    }
+    // Levels stretched to black, and a gamma, which leaves black where it is.
+    let stretched = ToneChange::of_shape(0.0, -0.1).undone_at_any_rate(&now);
+    assert_eq!(stretched.pixels[6..], [1.0; 3]);
+    assert!(stretched.pixels[3..6].iter().all(|v| *v < 0.9));
+    let gamma = ToneChange::of_tone(Tone::Gamma(1.2)).undone_at_any_rate(&now);
+    assert!(gamma.pixels[0] > 0.999 && gamma.pixels[6] < 1e-6);
+    assert!(gamma.pixels[7] < 0.9);
+}
+
+#[test]
 fn what_cannot_have_been_done_is_told() {
     let dim = picture(vec![0.9; 30]);
     let change = ToneChange::of_gains([-0.4; 3]);
