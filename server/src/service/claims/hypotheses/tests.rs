@@ -114,6 +114,31 @@ fn an_estimate_is_one_framing_whatever_it_took() {
 }
 
 #[test]
+fn the_next_best_estimates_share_what_one_kind_has() {
+    let estimate = |place: f32| FramedReading {
+        undone: Some(Undone {
+            kind: Kind::Estimated.into(),
+            factor: place,
+            ..Undone::default()
+        }),
+        ..reading(0, false, false)
+    };
+    let mut readings = vec![reading(0, false, false)];
+    readings.extend([1.0, 2.0, 3.0, 4.0].map(estimate));
+    readings.extend([brightened(0.81), brightened(1.5)]);
+    let read = checked(&readings, 64).unwrap();
+    assert_eq!(read[3].name, "tones and part by estimate 3 of this picture");
+    let groups: Vec<_> = kinds(&readings, &read)
+        .iter()
+        .map(|group| (group.kind, group.variants, group.tries))
+        .collect();
+    use evidence::HypothesisKind::{AsGiven, Estimated, Tone};
+    let expected = [(AsGiven, 1, 2), (Estimated, 1, 4), (Estimated, 3, 24), (Tone, 2, 16)];
+    assert_eq!(groups, expected.map(|(kind, count, tries)| (kind, count, Some(tries))));
+    assert!(checked(&[estimate(2.0), estimate(2.0)], 64).is_err());
+}
+
+#[test]
 fn what_differs_from_the_original_has_half_of_what_is_left() {
     let undone = |kind: Kind| FramedReading {
         undone: Some(Undone {
