@@ -5,7 +5,7 @@
     tools/colour_difference.py WORKER ORIGINAL MARKED [SEED]
 
 Ten views of 800 px of both are compared where the scene covers them, by CIEDE2000: pixel by pixel, and averaged over what
-a viewer's eye takes together (a Gaussian of 4 pixels, about a sixteenth of a degree on a screen at arm's length). About
+a viewer's eye takes together (a Gaussian of 4 pixels, about a tenth of a degree on a screen at arm's length). About
 1 is just seen side by side, 2.3 is seen. Chroma says how colourful the original is there: on greys a tint shows most.
 """
 import subprocess
