@@ -50,8 +50,8 @@ pub enum PhotometricCorrection {
     Registered(RegisteredTones),
 }
 
-/// Places of estimates that are read besides the best one, of a picture that is read alone. Where the best is wrong, the
-/// right one is among these about every third time.
+/// Places of estimates that are read besides the best one, of a picture that is read alone: where the best is wrong, the
+/// right one may be among these.
 pub const NEXT_ESTIMATES: std::ops::RangeInclusive<u32> = 2..=4;
 
 /// How the tones of a picture are taken that is compared with the original. Both ways are read, and whoever takes the better

@@ -3,9 +3,9 @@
 //! Most suspects are as they were given, and what was done to others can mostly be estimated; guesses come last, and many
 //! at once. So half of the rate is for files as given, half of the rest for what differs from the original where that is at
 //! hand, half of what is left then for the estimate, half of the rest for the next best ones, then for guesses about one
-//! picture that the others follow, and all that is left for guesses about all pictures, alike within a kind. A reading with one part in t of the rate pays
-//! as one of t hypotheses would: its tail times t. The shares depend on what was read and not on any message, and together
-//! are no more than the rate (a weighted union bound, Holm 1979).
+//! picture that the others follow, and all that is left for guesses about all pictures, alike within a kind. A reading with
+//! one part in t of the rate pays as one of t hypotheses would: its tail times t. The shares depend on what was read and not
+//! on any message, and together are no more than the rate (a weighted union bound, Holm 1979).
 use crate::hypothesis::{Hypothesis, PhotometricCorrection};
 
 /// Kinds of hypotheses, as they are shared with.

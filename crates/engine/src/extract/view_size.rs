@@ -54,9 +54,7 @@ pub fn likeness_to_finer(geometry: &Geometry<'_>, sampler: &ViewSampler, side: u
         grounds.iter().map(over).collect()
     };
     let compared = |index: u64| -> Result<Option<Psnr>> {
-        let [coarse, fine] =
-            [(side, &[1.0, 0.0][..]), (2 * side, &[1.0])].map(|(side, grounds)| draw(index, side, grounds));
-        let (coarse, fine) = (coarse?, fine?);
+        let (coarse, fine) = (draw(index, side, &[1.0, 0.0])?, draw(index, 2 * side, &[1.0])?);
         let mask = covered(&coarse[0], &coarse[1])?;
         psnr_covered(&halved(&fine[0]), &coarse[0], &mask)
     };

@@ -1,6 +1,6 @@
 //! Weighted quantiles of many numbers, without sorting them: a scene's extent, kind and focus ask for some thirty.
 //!
-//! Numbers are told apart by their bits, a dozen at a time from the highest in which they differ: each time the weights of all
+//! Numbers are told apart by their bits, eleven at a time from the highest in which they differ: each time the weights of all
 //! that are alike in these are summed, and what is alike to the one that is sought is looked at further (a radix selection).
 
 /// Bits that are looked at at a time.
@@ -40,12 +40,14 @@ fn selected(all: &[Weighed], target: f64) -> f64 {
         for (order, weight) in among {
             sums[place(*order)] += weight;
         }
-        let reached = (0..place(high)).find(|place| {
-            let reached = below + sums[*place] >= target;
-            below += if reached { 0.0 } else { sums[*place] };
-            reached
-        });
-        let reached = reached.unwrap_or(place(high));
+        let mut reached = place(high);
+        for (place, sum) in sums[..reached].iter().enumerate() {
+            if below + sum >= target {
+                reached = place;
+                break;
+            }
+            below += sum;
+        }
         let of_it = among.iter().filter(|(order, _)| place(*order) == reached);
         alike = of_it.copied().collect();
         among = &alike;
