@@ -98,6 +98,7 @@ fn kind_text(kind: &Found) -> String {
         flatness,
         spread,
         surrounded,
+        vantage,
         ..
     } = kind.openness;
     let percent = |share: f32| format!("{:.0} %", 100.0 * share);
@@ -106,8 +107,17 @@ fn kind_text(kind: &Found) -> String {
         Some(used) => format!("{used}, as was said, found to be {}", kind.found),
         None => format!("{}, which says nothing where cameras are given", kind.found),
     };
+    let views = vantage.map_or_else(String::new, |seen| {
+        format!(
+            "; {} of its Gaussians are seen from all around, {} from the front; {} come through there, {} inside",
+            percent(seen.seen_from_around),
+            percent(seen.seen_from_front),
+            percent(seen.clear_from_around),
+            percent(seen.clear_from_inside)
+        )
+    });
     format!(
-        "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width; goes {:.1} times as far as what is fine in it, around which {} of the horizon is covered",
+        "{used}: {} hollow, {} seen from inside only; {} seen from the front and {} hidden, {} hidden from behind; {} seen from above; height {:.2} of its width; goes {:.1} times as far as what is fine in it, around which {} of the horizon is covered{views}",
         percent(hollow),
         percent(inside),
         percent(seen_from_front),

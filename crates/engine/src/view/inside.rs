@@ -7,6 +7,7 @@
 //! the first counts from which one sees far enough that way, so that no picture is full of one near wall; else the one from
 //! which one sees farthest. Views of both splits stand at any place; their directions never meet.
 use rand::{Rng, RngExt};
+use rayon::prelude::*;
 
 use super::camera::Camera;
 use super::extent::Extent;
@@ -59,7 +60,11 @@ impl InsideViews {
         };
         // Where nothing is solid nothing has a distance to it.
         let roomy = |cell: &usize| (LEAST_CELLS..u32::MAX).contains(&clearances[*cell]);
-        let mut places: Vec<usize> = (0..grid.len()).filter(roomy).filter(closed_in).collect();
+        let mut places: Vec<usize> = (0..grid.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .filter(|cell| roomy(cell) && closed_in(cell))
+            .collect();
         let height = |cell: usize| dot(grid.middle(cell), extent.up);
         let (low, high) = places
             .iter()

@@ -4,7 +4,9 @@
 //!
 //! * *unbounded*: what is drawn finest is a small part of it, amid surroundings on most sides,
 //! * *terrain*: flat and seen from above,
-//! * *room*: a good part of it is hollow, and something inside is seen by nobody outside,
+//! * *forward*: much is hidden from every side, and [views](Vantage) from the front see much more than those from all around,
+//! * *room*: a good part of it is hollow, and something inside is seen by nobody outside; or much is hidden from every side,
+//!   and to views from inside much more comes through than to those from all around,
 //! * *forward*: from one level side most is seen and nearly nothing is hidden, and much more is hidden from behind,
 //! * *object*: all others.
 //!
@@ -18,11 +20,12 @@ use super::extent::{Extent, weights};
 use super::focus::Focus;
 use super::openness::Openness;
 use super::solid::SolidGrid;
+use super::vantage::Vantage;
 use crate::scene::Gaussians;
 
 /// An unbounded scene goes so much farther than what is fine in it, and covers so much of the horizon there.
 const SPREAD: f32 = 4.0;
-const SURROUNDED: f32 = 0.5;
+const SURROUNDED: f32 = 0.25;
 /// A room's least share of cells that are free and closed in.
 const HOLLOW: f32 = 0.25;
 /// A room's least share that only those see who are inside.
@@ -37,6 +40,8 @@ const FROM_FRONT: f32 = 0.6;
 const HIDDEN: f32 = 0.09;
 const BEHIND: f32 = 0.08;
 const MORE_BEHIND: f32 = 0.04;
+/// Where so much is hidden from the best side, views tell whether it is an object.
+const MUCH_HIDDEN: f32 = 0.28;
 /// Fewer Gaussians than these say nothing.
 const FEWEST: usize = 100;
 
@@ -68,19 +73,38 @@ impl SceneKind {
         let shown = weights(gaussians);
         let extent = Extent::weighed(gaussians, &shown)?;
         let focus = Focus::of(gaussians, &shown, &extent);
-        let openness = Openness::of(gaussians, &shown, &extent, &focus, &SolidGrid::of(gaussians, &shown));
-        Ok((Self::by(&openness), openness))
+        let grid = SolidGrid::of(gaussians, &shown);
+        Ok(Self::found(gaussians, &shown, &extent, &focus, &grid))
+    }
+
+    /// The same, of a scene whose extent, focus and grid are known.
+    pub(super) fn found(
+        gaussians: &Gaussians,
+        shown: &[f64],
+        extent: &Extent,
+        focus: &Focus,
+        grid: &SolidGrid,
+    ) -> (SceneKind, Openness) {
+        let mut found = Openness::of(gaussians, shown, extent, focus, grid);
+        let known = found.gaussians < FEWEST || found.hidden_from_front < MUCH_HIDDEN;
+        if !known && matches!(Self::by(&found), Self::Object | Self::Room) {
+            found.vantage = Some(Vantage::of(gaussians, extent, found.front, grid));
+        }
+        (Self::by(&found), found)
     }
 
     /// What the rule says.
     pub fn by(found: &Openness) -> SceneKind {
+        let by_sight = found.vantage.map_or(Self::Object, |vantage| vantage.kind());
         if found.gaussians < FEWEST {
             Self::Object
         } else if found.spread >= SPREAD && found.surrounded >= SURROUNDED {
             Self::Unbounded
         } else if found.flatness <= FLAT && found.seen_from_above >= FROM_ABOVE {
             Self::Terrain
-        } else if found.hollow >= HOLLOW && found.inside >= INSIDE {
+        } else if by_sight == Self::Forward {
+            Self::Forward
+        } else if by_sight == Self::Room || (found.hollow >= HOLLOW && found.inside >= INSIDE) {
             Self::Room
         } else if found.seen_from_front >= FROM_FRONT
             && found.hidden_from_front <= HIDDEN

@@ -155,6 +155,45 @@ fn glass_and_floaters_leave_an_object_an_object() {
     }
 }
 
+/// Adds splats of that size on a shell around the scene, where `keeps` says.
+fn with_floaters(scene: &Gaussians, count: usize, log_scale: f32, keeps: impl Fn([f32; 3]) -> bool) -> Gaussians {
+    let extent = Extent::of(scene).unwrap();
+    let mut out = scene.clone();
+    let per_gaussian = scene.sh.coefficients.len() / scene.len();
+    for (number, direction) in super::lattice::lattice(count).enumerate() {
+        if keeps(direction) {
+            let reach = extent.radius * (1.2 + 0.6 * (0.618 * number as f32).fract());
+            out.positions.push(super::vector::along(extent.centre, reach, direction));
+            out.log_scales.push([log_scale; 3]);
+            out.rotations.push([1.0, 0.0, 0.0, 0.0]);
+            out.opacity_logits.push(1.0);
+            out.sh.coefficients.extend(vec![0.0; per_gaussian]);
+        }
+    }
+    out
+}
+
+#[test]
+fn captures_from_one_side_amid_floaters_are_seen_from_there() {
+    for seed in 0..4 {
+        let stage = scene(SceneKind::Forward, seed);
+        // Captors stood before it, at low z, and saw no floaters there but a few.
+        let amid = with_floaters(&stage, 900, -1.2, |direction| direction[2] > -0.8);
+        let (kind, openness) = SceneKind::of(&amid).unwrap();
+        assert_eq!(kind, SceneKind::Forward, "seed {seed}: {openness:?}");
+        assert!(openness.vantage.is_some() && openness.front[2] < -0.5, "{openness:?}");
+    }
+}
+
+#[test]
+fn rooms_amid_floaters_are_seen_from_inside() {
+    for seed in 0..4 {
+        let amid = with_floaters(&scene(SceneKind::Room, seed), 900, -0.9, |_| true);
+        let (kind, openness) = SceneKind::of(&amid).unwrap();
+        assert_eq!(kind, SceneKind::Room, "seed {seed}: {openness:?}");
+    }
+}
+
 #[test]
 fn viewers_of_an_unbounded_scene_stand_around_what_it_was_captured_for() {
     for seed in 0..3 {

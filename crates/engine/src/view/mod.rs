@@ -19,7 +19,9 @@ mod orbit;
 mod placing;
 mod quantiles;
 mod sampler;
+mod sight;
 mod solid;
+mod vantage;
 pub(crate) mod vector;
 
 pub use camera::Camera;
@@ -30,3 +32,4 @@ pub use inside::InsideViews;
 pub use kind::SceneKind;
 pub use openness::Openness;
 pub use sampler::{Split, ViewSampler, Viewpoints};
+pub use vantage::Vantage;

@@ -8,6 +8,7 @@ use super::focus::Focus;
 use super::lattice::lattice;
 use super::quantiles::quantiles;
 use super::solid::SolidGrid;
+use super::vantage::Vantage;
 use super::vector::dot;
 use crate::scene::Gaussians;
 use rayon::prelude::*;
@@ -65,6 +66,10 @@ pub struct Openness {
     pub spread: f32,
     /// Share of the horizon, as seen from there, that surroundings cover.
     pub surrounded: f32,
+    /// What views from several places see, where the other figures make it an object or a room of which much is
+    /// hidden.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vantage: Option<Vantage>,
 }
 
 impl Openness {
@@ -120,6 +125,7 @@ impl Openness {
             flatness: flatness(gaussians, shown, extent),
             spread: focus.spread,
             surrounded: focus.surrounded,
+            vantage: None,
         }
     }
 }

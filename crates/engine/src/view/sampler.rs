@@ -117,9 +117,14 @@ impl ViewSampler {
             Some(kind @ SceneKind::Room) => (kind, extent.up, None, Some(grid())),
             Some(SceneKind::Forward) | None => {
                 let (focus, grid) = (find_focus(), grid());
-                let found = Openness::of(gaussians, &shown, &extent, &focus, &grid);
-                let kind = known.unwrap_or(SceneKind::by(&found));
-                (kind, found.front, Some(focus), Some(grid))
+                let (kind, front) = match known {
+                    Some(kind) => (kind, Openness::of(gaussians, &shown, &extent, &focus, &grid).front),
+                    None => {
+                        let (kind, found) = SceneKind::found(gaussians, &shown, &extent, &focus, &grid);
+                        (kind, found.front)
+                    }
+                };
+                (kind, front, Some(focus), Some(grid))
             }
         };
         if let (SceneKind::Unbounded, Some(focus)) = (kind, focus) {
