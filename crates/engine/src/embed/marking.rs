@@ -103,6 +103,11 @@ pub(super) fn verified(
         }
         weakened += 1;
     }
+    if let (false, true, Some(kind)) = (missed.is_empty(), work.cameras.is_empty(), settings.kind) {
+        missed.push(format!(
+            "views were those of the kind {kind}: where viewers stand elsewhere, give cameras or another kind"
+        ));
+    }
     let outcome = Outcome {
         verification,
         missed,

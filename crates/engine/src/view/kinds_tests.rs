@@ -163,7 +163,8 @@ fn with_floaters(scene: &Gaussians, count: usize, log_scale: f32, keeps: impl Fn
     for (number, direction) in super::lattice::lattice(count).enumerate() {
         if keeps(direction) {
             let reach = extent.radius * (1.2 + 0.6 * (0.618 * number as f32).fract());
-            out.positions.push(super::vector::along(extent.centre, reach, direction));
+            out.positions
+                .push(super::vector::along(extent.centre, reach, direction));
             out.log_scales.push([log_scale; 3]);
             out.rotations.push([1.0, 0.0, 0.0, 0.0]);
             out.opacity_logits.push(1.0);

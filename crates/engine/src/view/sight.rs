@@ -23,6 +23,8 @@ const MOST: usize = 20_000;
 const LARGE: usize = 10_000;
 /// Most points that stand for one in a view.
 const MOST_POINTS: usize = 128;
+/// Pixels that one covers at most.
+const MOST_COVERED: f32 = 1e9;
 /// Share of its opacity that has to come through, so that it is seen.
 const SEEN: f32 = 0.3;
 /// What is fainter shows nothing.
@@ -40,13 +42,13 @@ pub(super) struct Sight {
 }
 
 /// Gaussians that stand for a scene.
-pub(super) struct Crowd {
-    members: Vec<Member>,
+pub(super) struct PointSplats {
+    splats: Vec<PointSplat>,
     /// Random places of a normal distribution, from which the points of Gaussians are taken.
     cloud: Vec<[f32; 3]>,
 }
 
-struct Member {
+struct PointSplat {
     place: [f32; 3],
     opacity: f32,
     /// Axes as long as the standard deviations.
@@ -59,20 +61,24 @@ struct Member {
     stands_for: f32,
 }
 
-impl Crowd {
+impl PointSplats {
     /// Of large scenes takes the largest, and of the others every so manieth: what is large hides what is behind by itself.
     pub fn of(gaussians: &Gaussians) -> Self {
         let areas: Vec<f64> = gaussians.log_scales.iter().map(area).collect();
         let large = match gaussians.len() > MOST {
-            true => quantiles(areas.iter().copied(), &vec![1.0; areas.len()], [1.0 - LARGE as f64 / areas.len() as f64])[0],
+            true => quantiles(
+                areas.iter().copied(),
+                &vec![1.0; areas.len()],
+                [1.0 - LARGE as f64 / areas.len() as f64],
+            )[0],
             false => 0.0,
         };
         let step = gaussians.len().div_ceil(MOST - LARGE);
-        let members = (0..gaussians.len()).filter(|row| areas[*row] >= large || row % step == 0);
-        let member = |row: usize| {
+        let splats = (0..gaussians.len()).filter(|row| areas[*row] >= large || row % step == 0);
+        let splat = |row: usize| {
             let scales = gaussians.log_scales[row].map(f32::exp);
             let (axes, _) = shortest_axis(gaussians, row);
-            Member {
+            PointSplat {
                 place: gaussians.positions[row],
                 opacity: gaussians.opacity(row),
                 stands_for: if areas[row] >= large { 1.0 } else { step as f32 },
@@ -81,10 +87,11 @@ impl Crowd {
                 area: std::f32::consts::TAU * areas[row] as f32,
             }
         };
-        let shows = |member: &Member| member.opacity > FAINTEST && member.longest.is_finite() && member.area.is_finite();
+        let shows =
+            |splat: &PointSplat| splat.opacity > FAINTEST && splat.longest.is_finite() && splat.area.is_finite();
         let mut random = ChaCha8Rng::seed_from_u64(0);
         Self {
-            members: members.map(member).filter(shows).collect(),
+            splats: splats.map(splat).filter(shows).collect(),
             cloud: (0..MOST_POINTS)
                 .map(|_| [0; 3].map(|_| random.sample(StandardNormal)))
                 .collect(),
@@ -94,10 +101,10 @@ impl Crowd {
     /// What views of [`SIDE`] by [`SIDE`] pixels see; nothing without views.
     pub fn seen_by(&self, cameras: &[Camera]) -> Sight {
         let views: Vec<Vec<f32>> = cameras.par_iter().map(|camera| self.shares(camera)).collect();
-        let opacity = |number: usize| f64::from(self.members[number].opacity * self.members[number].stands_for);
+        let opacity = |number: usize| f64::from(self.splats[number].opacity * self.splats[number].stands_for);
         let sum = |of: &dyn Fn(usize) -> bool| -> f64 {
-            let members = (0..self.members.len()).filter(|number| of(*number));
-            members.map(opacity).sum::<f64>().max(f64::MIN_POSITIVE)
+            let splats = (0..self.splats.len()).filter(|number| of(*number));
+            splats.map(opacity).sum::<f64>().max(f64::MIN_POSITIVE)
         };
         let seen = sum(&|number| views.iter().any(|shares| shares[number] > SEEN));
         let clear = views.iter().map(|shares| {
@@ -111,14 +118,14 @@ impl Crowd {
         }
     }
 
-    /// The share of every member that comes through in a view; below zero where it is not in the view.
+    /// The share of every splat that comes through in a view; below zero where it is not in the view.
     fn shares(&self, camera: &Camera) -> Vec<f32> {
-        let mut points: Vec<Point> = Vec::with_capacity(2 * self.members.len());
-        for (number, member) in self.members.iter().enumerate() {
-            self.draw(member, number, camera, &mut points);
+        let mut points: Vec<Point> = Vec::with_capacity(2 * self.splats.len());
+        for (number, splat) in self.splats.iter().enumerate() {
+            self.draw(splat, number, camera, &mut points);
         }
         points.sort_unstable_by_key(|point| (point.place, point.number));
-        let (mut whole, mut through) = (vec![0.0f32; self.members.len()], vec![0.0f32; self.members.len()]);
+        let (mut whole, mut through) = (vec![0.0f32; self.splats.len()], vec![0.0f32; self.splats.len()]);
         for of_pixel in points.chunk_by(|a, b| a.place >> 32 == b.place >> 32) {
             let mut left = 1.0;
             for point in of_pixel {
@@ -131,23 +138,24 @@ impl Crowd {
         through.into_iter().zip(whole).map(share).collect()
     }
 
-    /// Adds the points of a member that are in a view.
-    fn draw(&self, member: &Member, number: usize, camera: &Camera, points: &mut Vec<Point>) {
-        let depth = camera.to_camera(member.place)[2];
+    /// Adds the points of a splat that are in a view.
+    fn draw(&self, splat: &PointSplat, number: usize, camera: &Camera, points: &mut Vec<Point>) {
+        let depth = camera.to_camera(splat.place)[2];
         let side = SIDE as f32;
         let unit = camera.fy / depth;
-        let reach = REACH * unit * member.longest;
+        let reach = REACH * unit * splat.longest;
         let near = |x: &f32| (-reach..side + reach).contains(x);
-        if !(depth > 0.0 && camera.pixel(member.place).iter().all(near)) {
+        if !(depth > 0.0 && camera.pixel(splat.place).iter().all(near)) {
             return;
         }
-        let covered = member.area * member.stands_for * unit * unit;
+        // What is flat, or right before the camera, has no area or more than any number.
+        let covered = (splat.area * splat.stands_for * unit * unit).min(MOST_COVERED);
         let count = (covered.ceil() as usize).clamp(1, MOST_POINTS);
-        // A point stands for a part of what the member covers, or for several layers of it.
+        // A point stands for a part of what the splat covers, or for several layers of it.
         let layers = covered / count as f32;
         let opacity = match layers > 1.0 {
-            true => 1.0 - (1.0 - member.opacity).powf(layers),
-            false => member.opacity * layers,
+            true => 1.0 - (1.0 - splat.opacity).powf(layers),
+            false => splat.opacity * layers,
         };
         for index in 0..count {
             let deviates = match count {
@@ -155,7 +163,7 @@ impl Crowd {
                 // Each takes other points of the cloud.
                 _ => self.cloud[(97 * number + index) % MOST_POINTS],
             };
-            let place = (0..3).fold(member.place, |place, k| along(place, deviates[k], member.axes[k]));
+            let place = (0..3).fold(splat.place, |place, k| along(place, deviates[k], splat.axes[k]));
             let depth = camera.to_camera(place)[2];
             let [x, y] = camera.pixel(place);
             if depth > 0.0 && (0.0..side).contains(&x) && (0.0..side).contains(&y) {
@@ -171,10 +179,84 @@ impl Crowd {
     }
 }
 
-/// A part of a member before a pixel.
+/// A part of a splat before a pixel.
 struct Point {
     /// The pixel, and below it the bits of the depth.
     place: u64,
     number: u32,
     opacity: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square wall of `side` by `side` splats before a quarter as many tiny ones.
+    fn wall(side: usize, opacity_logit: f32) -> Gaussians {
+        let mut scene = Gaussians::default();
+        let mut add = |position, size: f32| {
+            scene.positions.push(position);
+            scene.log_scales.push([size.ln(); 3]);
+            scene.rotations.push([1.0, 0.0, 0.0, 0.0]);
+            scene.opacity_logits.push(opacity_logit);
+        };
+        let step = 2.0 / side as f32;
+        for i in 0..side * side {
+            let [x, y] = [i % side, i / side].map(|n| (n as f32 + 0.5) * step - 1.0);
+            add([x, y, 0.0], step);
+            if i % 4 == 0 {
+                add([0.5 * x, 0.5 * y, 0.5], 0.1 * step);
+            }
+        }
+        scene
+    }
+
+    fn from(z: f32) -> Camera {
+        Camera::look_at([0.0, 0.0, z], [0.0; 3], [0.0, -1.0, 0.0], 0.8, SIDE, SIDE)
+    }
+
+    #[test]
+    fn a_wall_hides_what_is_behind_it_from_one_side() {
+        // Of the larger scene some splats stand for all.
+        for side in [60, 240] {
+            let splats = PointSplats::of(&wall(side, 6.0));
+            let of_tiny = |camera: &Camera| {
+                let shares = splats.shares(camera);
+                let tiny = splats
+                    .splats
+                    .iter()
+                    .zip(shares)
+                    .filter(|(splat, _)| splat.longest < 0.5 / side as f32);
+                let shares: Vec<f32> = tiny.map(|(_, share)| share).collect();
+                shares.iter().sum::<f32>() / shares.len() as f32
+            };
+            let [before, behind] = [-3.0, 3.0].map(from);
+            assert!(
+                of_tiny(&before) < 0.05 && of_tiny(&behind) > 0.95,
+                "{side}: {} {}",
+                of_tiny(&before),
+                of_tiny(&behind)
+            );
+            let seen = |cameras: &[Camera]| splats.seen_by(cameras).seen;
+            assert!(seen(&[before.clone()]) + 0.15 < seen(&[behind.clone()]));
+            assert!(seen(&[before, behind.clone()]) >= seen(&[behind]));
+        }
+    }
+
+    #[test]
+    fn haze_hides_little_and_no_view_sees_nothing() {
+        let splats = PointSplats::of(&wall(60, -3.0));
+        let seen = splats.seen_by(&[from(-3.0)]);
+        assert!(seen.seen > 0.95 && seen.clear > 0.7, "{seen:?}");
+        assert!(splats.seen_by(&[]).seen < 1e-6 && splats.seen_by(&[]).clear == 0.0);
+        // Looking away.
+        let away = Camera::look_at([0.0, 0.0, -3.0], [0.0, 0.0, -9.0], [0.0, -1.0, 0.0], 0.8, SIDE, SIDE);
+        assert!(splats.seen_by(&[away]).seen < 1e-6);
+        assert!(
+            PointSplats::of(&Gaussians::default())
+                .seen_by(&[from(-3.0)])
+                .seen
+                .is_finite()
+        );
+    }
 }

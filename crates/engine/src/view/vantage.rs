@@ -13,7 +13,7 @@ use super::inside::InsideViews;
 use super::kind::SceneKind;
 use super::placing::Placing;
 use super::sampler::Split;
-use super::sight::{Crowd, SIDE};
+use super::sight::{PointSplats, SIDE};
 use super::solid::SolidGrid;
 use crate::scene::Gaussians;
 
@@ -55,15 +55,15 @@ impl Vantage {
             let view = |index| placing.camera(directions.held_out(index, &mut random), &mut random);
             (0..VIEWS).map(view).collect()
         };
-        let crowd = Crowd::of(gaussians);
-        let around = crowd.seen_by(&views(SceneKind::Object, &around));
-        let facing = crowd.seen_by(&views(SceneKind::Forward, &facing));
+        let splats = PointSplats::of(gaussians);
+        let around = splats.seen_by(&views(SceneKind::Object, &around));
+        let facing = splats.seen_by(&views(SceneKind::Forward, &facing));
         let inside = InsideViews::new(grid.clone(), extent).map_or(0.0, |inside| {
             let look = |index| {
                 let direction = level.held_out(index, &mut random);
                 inside.look(direction, extent.up, SIDE, &mut random)
             };
-            crowd.seen_by(&(0..VIEWS).map(look).collect::<Vec<_>>()).clear
+            splats.seen_by(&(0..VIEWS).map(look).collect::<Vec<_>>()).clear
         });
         Self {
             seen_from_around: around.seen,

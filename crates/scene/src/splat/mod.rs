@@ -34,8 +34,8 @@ struct Splat {
 ///
 /// Nothing in a file says that it is one, so it must look like one to be read: a whole number of rows, at least one;
 /// and at least half of them with a position that is finite, standard deviations that are finite and not negative, and
-/// a rotation of length 1, which writers make them. Zeros, text, pictures and noise fail that. Rows whose numbers are
-/// not such are bad even there.
+/// a rotation of length 1, which writers make them, unless they are [balls](is_ball). Zeros, text, pictures and noise fail that.
+/// Rows whose numbers are not such are bad even there.
 pub(crate) fn read(
     path: &Path,
     source: &mut BufReader<impl Read>,
@@ -110,7 +110,7 @@ fn check_rows(body: &[u8]) -> Result<(), String> {
             continue;
         }
         let length = rotation(row).iter().map(|v| v * v).sum::<f32>().sqrt();
-        units += usize::from((length - 1.0).abs() <= UNIT);
+        units += usize::from((length - 1.0).abs() <= UNIT || is_ball(row));
     }
     let rows = body.len() / ROW;
     if units >= rows.div_ceil(2) {
@@ -118,8 +118,15 @@ fn check_rows(body: &[u8]) -> Result<(), String> {
     }
     Err(match first {
         Some((i, fault)) => fault.of_row(i),
-        None => format!("only {units} of {rows} rows have a rotation of length 1"),
+        None => format!("only {units} of {rows} rows have a rotation of length 1 or are balls"),
     })
+}
+
+/// Whether a row is as large along all axes, so that its rotation means nothing: programs that make splats of point clouds write
+/// any. Its place must be other numbers than its size, as a repeated byte's are not.
+fn is_ball(row: &[u8]) -> bool {
+    let [x, y, z, a, b, c] = floats(row);
+    a > 0.0 && a == b && b == c && [x, y, z] != [a; 3]
 }
 
 /// A number of a row that can't be: which of [`floats`], and what it is.

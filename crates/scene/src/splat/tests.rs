@@ -126,6 +126,19 @@ fn zeros_text_and_numbers_are_no_scene() {
     assert!(refused(&[usual(), still.clone(), still].concat()).contains("only 1 of 3 rows"));
 }
 
+/// Programs that turn point clouds into splats write rotations of any length.
+#[test]
+fn balls_need_no_rotation() {
+    let ball = |size: f32| row([48.0, -46.0, 0.5, size, size, size], [48, 54, 48, 255], [255, 0, 0, 0]);
+    let bytes = [ball(0.01), ball(2.0), ball(1e-3)].concat();
+    let scene = read(&bytes).unwrap();
+    assert_eq!(scene.gaussians.len(), 3);
+    assert!(written(&scene, &scene.gaussians.sh) == bytes);
+    // A ball has a size, and bytes of one value are none.
+    assert!(refused(&ball(0.0)).contains("only 0 of 1 rows"));
+    assert!(refused(&[65; 320]).contains("only 0 of 10 rows"));
+}
+
 /// A file may begin like a PLY's first word but not like its first line.
 #[test]
 fn positions_may_spell_words() {
