@@ -37,7 +37,7 @@ const FROM_ABOVE: f32 = 0.75;
 /// much more. What is hidden from no side, as glass and floaters, is an object: a mark that is made for one side is not read
 /// from another, while one that is made from all around is read from the front as well.
 const FROM_FRONT: f32 = 0.6;
-const HIDDEN: f32 = 0.09;
+const HIDDEN: f32 = 0.06;
 const BEHIND: f32 = 0.08;
 const MORE_BEHIND: f32 = 0.04;
 /// Where so much is hidden from the best side, views tell whether it is an object.
