@@ -136,7 +136,7 @@ fn balls_need_no_rotation() {
     assert!(written(&scene, &scene.gaussians.sh) == bytes);
     // A ball has a size, and bytes of one value are none.
     assert!(refused(&ball(0.0)).contains("only 0 of 1 rows"));
-    assert!(refused(&[65; 320]).contains("only 0 of 10 rows"));
+    assert!(refused(&[90; 320]).contains("only 0 of 10 rows"));
 }
 
 /// A file may begin like a PLY's first word but not like its first line.
