@@ -23,6 +23,8 @@ const VIEWS: u64 = 12;
 const MORE_FROM_FRONT: f32 = 1.2;
 /// One in which so much more comes through to those who stand inside was captured from there.
 const CLEARER_INSIDE: f32 = 2.3;
+/// And from all around at most this comes through: floaters and walls are many layers, while few large splats are few.
+const CLUTTERED: f32 = 0.07;
 
 /// What views of three kinds see of a scene; shares are of its Gaussians, by their opacity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -77,7 +79,9 @@ impl Vantage {
     pub fn kind(&self) -> SceneKind {
         if self.seen_from_front > MORE_FROM_FRONT * self.seen_from_around {
             SceneKind::Forward
-        } else if self.clear_from_inside > CLEARER_INSIDE * self.clear_from_around {
+        } else if self.clear_from_around <= CLUTTERED
+            && self.clear_from_inside > CLEARER_INSIDE * self.clear_from_around
+        {
             SceneKind::Room
         } else {
             SceneKind::Object
