@@ -109,7 +109,7 @@ fn kind_text(kind: &Found) -> String {
     };
     let views = vantage.map_or_else(String::new, |seen| {
         format!(
-            "; {} of its Gaussians are seen from all around, {} from the front; {} come through there, {} inside",
+            "; views from all around see {} of its Gaussians, those from the front {}; from all around {} of what is in view comes through, from inside {}",
             percent(seen.seen_from_around),
             percent(seen.seen_from_front),
             percent(seen.clear_from_around),

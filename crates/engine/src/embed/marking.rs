@@ -103,7 +103,10 @@ pub(super) fn verified(
         }
         weakened += 1;
     }
-    if let (false, true, Some(kind)) = (missed.is_empty(), work.cameras.is_empty(), settings.kind) {
+    if !missed.is_empty()
+        && work.cameras.is_empty()
+        && let Some(kind) = settings.kind
+    {
         missed.push(format!(
             "views were those of the kind {kind}: where viewers stand elsewhere, give cameras or another kind"
         ));

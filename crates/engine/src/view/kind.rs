@@ -2,7 +2,7 @@
 //!
 //! A scene of fewer than a hundred Gaussians is an object. Else the first of these that holds, on the figures of [`Openness`]:
 //!
-//! * *unbounded*: what is drawn finest is a small part of it, amid surroundings on most sides,
+//! * *unbounded*: what is drawn finest is a small part of it, and surroundings cover a quarter of the horizon there,
 //! * *terrain*: flat and seen from above,
 //! * *forward*: much is hidden from every side, and [views](Vantage) from the front see much more than those from all around,
 //! * *room*: a good part of it is hollow, and something inside is seen by nobody outside; or much is hidden from every side,

@@ -1,5 +1,6 @@
 //! Tests of kinds of scenes: which is found, and where its views are.
-use super::vector::{cross, dot, sub};
+use super::lattice::lattice;
+use super::vector::{along, cross, dot, sub};
 use super::{Camera, Extent, SceneKind, Split, ViewSampler, Viewpoints};
 use crate::sample::sample_of;
 use crate::scene::Gaussians;
@@ -160,11 +161,10 @@ fn with_floaters(scene: &Gaussians, count: usize, log_scale: f32, keeps: impl Fn
     let extent = Extent::of(scene).unwrap();
     let mut out = scene.clone();
     let per_gaussian = scene.sh.coefficients.len() / scene.len();
-    for (number, direction) in super::lattice::lattice(count).enumerate() {
+    for (number, direction) in lattice(count).enumerate() {
         if keeps(direction) {
             let reach = extent.radius * (1.2 + 0.6 * (0.618 * number as f32).fract());
-            out.positions
-                .push(super::vector::along(extent.centre, reach, direction));
+            out.positions.push(along(extent.centre, reach, direction));
             out.log_scales.push([log_scale; 3]);
             out.rotations.push([1.0, 0.0, 0.0, 0.0]);
             out.opacity_logits.push(1.0);
@@ -192,6 +192,23 @@ fn rooms_amid_floaters_are_seen_from_inside() {
         let amid = with_floaters(&scene(SceneKind::Room, seed), 900, -0.9, |_| true);
         let (kind, openness) = SceneKind::of(&amid).unwrap();
         assert_eq!(kind, SceneKind::Room, "seed {seed}: {openness:?}");
+        // The grid says so too: what views see must be enough by itself.
+        assert_eq!(
+            openness.vantage.unwrap().kind(),
+            SceneKind::Room,
+            "seed {seed}: {openness:?}"
+        );
+    }
+}
+
+/// Among a few large splats one can stand, and sees more from there.
+#[test]
+fn objects_of_few_splats_are_no_rooms() {
+    for (count, seed) in [(200, 0), (200, 3), (300, 5), (500, 2)] {
+        let few = sample_of(SceneKind::Object, count, 0, seed).unwrap().gaussians;
+        let (kind, openness) = SceneKind::of(&few).unwrap();
+        assert_eq!(kind, SceneKind::Object, "{count}, seed {seed}: {openness:?}");
+        assert!(openness.vantage.is_some());
     }
 }
 

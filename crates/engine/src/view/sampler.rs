@@ -117,14 +117,11 @@ impl ViewSampler {
             Some(kind @ SceneKind::Room) => (kind, extent.up, None, Some(grid())),
             Some(SceneKind::Forward) | None => {
                 let (focus, grid) = (find_focus(), grid());
-                let (kind, front) = match known {
-                    Some(kind) => (kind, Openness::of(gaussians, &shown, &extent, &focus, &grid).front),
-                    None => {
-                        let (kind, found) = SceneKind::found(gaussians, &shown, &extent, &focus, &grid);
-                        (kind, found.front)
-                    }
+                let (kind, found) = match known {
+                    Some(kind) => (kind, Openness::of(gaussians, &shown, &extent, &focus, &grid)),
+                    None => SceneKind::found(gaussians, &shown, &extent, &focus, &grid),
                 };
-                (kind, front, Some(focus), Some(grid))
+                (kind, found.front, Some(focus), Some(grid))
             }
         };
         if let (SceneKind::Unbounded, Some(focus)) = (kind, focus) {

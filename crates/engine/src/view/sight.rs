@@ -19,7 +19,7 @@ use crate::scene::Gaussians;
 pub(super) const SIDE: u32 = 48;
 /// Most Gaussians that are looked at.
 const MOST: usize = 20_000;
-/// The largest of these are not drawn for others.
+/// So many of these are the largest, each for itself.
 const LARGE: usize = 10_000;
 /// Most points that stand for one in a view.
 const MOST_POINTS: usize = 128;
@@ -62,7 +62,7 @@ struct PointSplat {
 }
 
 impl PointSplats {
-    /// Of large scenes takes the largest, and of the others every so manieth: what is large hides what is behind by itself.
+    /// Of large scenes, the largest Gaussians and every n-th of the others: what is large hides what is behind by itself.
     pub fn of(gaussians: &Gaussians) -> Self {
         let areas: Vec<f64> = gaussians.log_scales.iter().map(area).collect();
         let large = match gaussians.len() > MOST {
@@ -74,7 +74,7 @@ impl PointSplats {
             false => 0.0,
         };
         let step = gaussians.len().div_ceil(MOST - LARGE);
-        let splats = (0..gaussians.len()).filter(|row| areas[*row] >= large || row % step == 0);
+        let rows = (0..gaussians.len()).filter(|row| areas[*row] >= large || row % step == 0);
         let splat = |row: usize| {
             let scales = gaussians.log_scales[row].map(f32::exp);
             let (axes, _) = shortest_axis(gaussians, row);
@@ -91,7 +91,7 @@ impl PointSplats {
             |splat: &PointSplat| splat.opacity > FAINTEST && splat.longest.is_finite() && splat.area.is_finite();
         let mut random = ChaCha8Rng::seed_from_u64(0);
         Self {
-            splats: splats.map(splat).filter(shows).collect(),
+            splats: rows.map(splat).filter(shows).collect(),
             cloud: (0..MOST_POINTS)
                 .map(|_| [0; 3].map(|_| random.sample(StandardNormal)))
                 .collect(),
@@ -142,14 +142,14 @@ impl PointSplats {
     fn draw(&self, splat: &PointSplat, number: usize, camera: &Camera, points: &mut Vec<Point>) {
         let depth = camera.to_camera(splat.place)[2];
         let side = SIDE as f32;
-        let unit = camera.fy / depth;
-        let reach = REACH * unit * splat.longest;
+        let pixels_a_unit = camera.fy / depth;
+        let reach = REACH * pixels_a_unit * splat.longest;
         let near = |x: &f32| (-reach..side + reach).contains(x);
         if !(depth > 0.0 && camera.pixel(splat.place).iter().all(near)) {
             return;
         }
         // What is flat, or right before the camera, has no area or more than any number.
-        let covered = (splat.area * splat.stands_for * unit * unit).min(MOST_COVERED);
+        let covered = (splat.area * splat.stands_for * pixels_a_unit * pixels_a_unit).min(MOST_COVERED);
         let count = (covered.ceil() as usize).clamp(1, MOST_POINTS);
         // A point stands for a part of what the splat covers, or for several layers of it.
         let layers = covered / count as f32;
@@ -222,11 +222,8 @@ mod tests {
             let splats = PointSplats::of(&wall(side, 6.0));
             let of_tiny = |camera: &Camera| {
                 let shares = splats.shares(camera);
-                let tiny = splats
-                    .splats
-                    .iter()
-                    .zip(shares)
-                    .filter(|(splat, _)| splat.longest < 0.5 / side as f32);
+                let all = splats.splats.iter().zip(shares);
+                let tiny = all.filter(|(splat, _)| splat.longest < 0.5 / side as f32);
                 let shares: Vec<f32> = tiny.map(|(_, share)| share).collect();
                 shares.iter().sum::<f32>() / shares.len() as f32
             };
@@ -237,9 +234,12 @@ mod tests {
                 of_tiny(&before),
                 of_tiny(&behind)
             );
-            let seen = |cameras: &[Camera]| splats.seen_by(cameras).seen;
-            assert!(seen(&[before.clone()]) + 0.15 < seen(&[behind.clone()]));
-            assert!(seen(&[before, behind.clone()]) >= seen(&[behind]));
+            let seen = |cameras: &[&Camera]| {
+                let cameras: Vec<Camera> = cameras.iter().map(|camera| (*camera).clone()).collect();
+                splats.seen_by(&cameras).seen
+            };
+            assert!(seen(&[&before]) + 0.15 < seen(&[&behind]));
+            assert!(seen(&[&before, &behind]) >= seen(&[&behind]));
         }
     }
 

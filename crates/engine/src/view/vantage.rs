@@ -23,7 +23,7 @@ const VIEWS: u64 = 12;
 const MORE_FROM_FRONT: f32 = 1.2;
 /// One in which so much more comes through to those who stand inside was captured from there.
 const CLEARER_INSIDE: f32 = 2.3;
-/// And from all around at most this comes through: floaters and walls are many layers, while few large splats are few.
+/// If at most this comes through from all around: floaters and walls are many layers, while a few large splats are not.
 const CLUTTERED: f32 = 0.07;
 
 /// What views of three kinds see of a scene; shares are of its Gaussians, by their opacity.

@@ -101,9 +101,9 @@ impl ToneChange {
         Some(change)
     }
 
-    /// The picture before this was done to it, values cut to [0, 1], and white where nobody knows them any more; `None` where that can't be: what was done can only
-    /// have been done to values in [0, 1], and many would lie outside. Its contrast was changed about the mean of
-    /// `whole`, of which it is a part.
+    /// The picture before this was done to it, values cut to [0, 1], and white where nobody knows them any more; `None` where
+    /// that can't be: what was done can only have been done to values in [0, 1], and many would lie outside. Its contrast was
+    /// changed about the mean of `whole`, of which it is a part.
     pub fn undone(&self, picture: &Picture, whole: &Picture) -> Option<Picture> {
         let (before, outside) = self.undone_with_outside(picture, whole);
         (outside <= OUTSIDE * picture.pixels.len() as f32).then_some(before)

@@ -104,8 +104,8 @@ impl Before {
     }
 }
 
-/// Undoes a change, makes white what was cut by it, and counts values that it can't have been done to. Nothing is fused: the bytes are the same on every
-/// instruction set of an architecture.
+/// Undoes a change, makes white what was cut by it, and counts values that it can't have been done to. Nothing is fused: the
+/// bytes are the same on every instruction set of an architecture.
 pub(super) struct Undo<'a> {
     pub before: Before,
     pub pixels: &'a [[f32; 3]],
