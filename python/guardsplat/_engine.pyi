@@ -39,6 +39,7 @@ class EmbedOptions(TypedDict):
 class ForecastOptions(TypedDict):
     key: Key | None
     bits: int
+    message: str | None
     preset: str
     device: str
 

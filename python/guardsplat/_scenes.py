@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _cameras, _engine, _splats
 from ._cameras import Camera, CamerasFrom
-from ._options import KeyOrPath, key_of, memory_of, rgb_of, seed_of, within
+from ._options import KeyOrPath, key_of, memory_of, message_of, rgb_of, seed_of, within
 from ._progress import ProgressTo
 from ._reports import Inspection, report_of
 from .errors import BadOption
@@ -27,20 +27,28 @@ def inspect(
     forecast: str | None = None,
     key: KeyOrPath | None = None,
     bits: int = 32,
+    message: str | bytes | None = None,
     device: str = "auto",
 ) -> Inspection:
     """Tells what a scene file holds, and whether marking it fits in memory.
 
     ``views`` counts the Gaussians that so many training views show, which takes a while.
     ``forecast`` is a preset for which a short trial, of an eighth of its steps, tells what a mark would come to: with
-    ``key``, or with a key of ``bits`` that is made for it; on ``device``.
+    ``key``, or with a key of ``bits`` that is made for it; on ``device``. A ``message`` is that of the later mark; any other
+    is tried without one, of which scenes that are hard to mark read another share of the bits.
     """
     if forecast is None and key is not None:
         raise BadOption("key: a key is for a forecast, and none is asked for", field="key", limit="with forecast")
     trial: _engine.ForecastOptions | None = None
     if forecast is not None:
         of = None if key is None else key_of(key)
-        trial = {"key": of, "bits": within("bits", bits, 1, 150), "preset": forecast, "device": device}
+        trial = {
+            "key": of,
+            "bits": within("bits", bits, 1, 150),
+            "message": None if message is None else message_of(message),
+            "preset": forecast,
+            "device": device,
+        }
     views = None if views is None else within("views", views, 1, 1000)
     given = _cameras.to_engine(cameras)
     text = _engine.inspect(os.fspath(path), views, given, kind, bool(ignore_bad_rows), memory_of(memory), trial)

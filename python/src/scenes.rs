@@ -59,6 +59,7 @@ pub fn inspect(
 pub struct ForecastOptions {
     key: Option<Py<Key>>,
     bits: usize,
+    message: Option<String>,
     preset: String,
     device: String,
 }
@@ -72,6 +73,7 @@ impl ForecastOptions {
                 (key.path.clone(), key.inner.clone())
             }),
             bits: self.bits,
+            message: self.message,
             preset: self.preset.parse().map_err(wrong)?,
             device: self.device.parse().map_err(wrong)?,
             stop: Stop::default(),

@@ -93,6 +93,10 @@ def test_what_a_mark_would_come_to(scene: Path, key: guardsplat.Key) -> None:
     told = guardsplat.inspect(scene, forecast="draft", key=key, device="cpu").forecast
     assert told is not None and told["bits"] == key.bits and told["preset"] == "draft"
     assert 0.6 < told["bit_accuracy"] <= 1 and told["seconds"] > 0
+    of_message = guardsplat.inspect(scene, forecast="draft", key=key, message=bytes(4), device="cpu").forecast
+    assert of_message is not None and 0.5 <= of_message["bit_accuracy"] <= 1
+    with pytest.raises(guardsplat.GuardSplatError, match="32 bits"):
+        guardsplat.inspect(scene, forecast="draft", key=key, message=bytes(5), device="cpu")
     with pytest.raises(guardsplat.BadOption, match="paper"):
         guardsplat.inspect(scene, forecast="paper", key=key, device="cpu")
     with pytest.raises(guardsplat.BadOption, match="forecast"):

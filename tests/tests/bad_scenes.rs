@@ -70,7 +70,8 @@ fn rendering_a_bad_scene_names_what_is_wrong() {
         );
     }
     environment.refuses("render none.ply views --views 1", &["none.ply", "No such file"]);
-    environment.refuses("render . views --views 1", &["not a regular file"]);
+    let reason = "a folder without the files of a SOG: meta.json and means_l.webp, or lod-meta.json";
+    environment.refuses("render . views --views 1", &[reason]);
 }
 
 /// The files above are bad for one reason each: without it they are read.

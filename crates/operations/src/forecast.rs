@@ -29,6 +29,8 @@ pub struct Wish {
     pub key: Option<(PathBuf, Arc<Key>)>,
     /// Bits of the message, where no key says them.
     pub bits: usize,
+    /// The message, in hexadecimal: which bits a scene reads by itself decides where marks are hard. Any other without one.
+    pub message: Option<String>,
     /// The preset.
     pub preset: Preset,
     /// Where to compute.
@@ -59,7 +61,7 @@ pub struct Told {
 /// `memory`, if not all of the machine's.
 ///
 /// # Errors
-/// Those of loading a key, and of [`forecast`].
+/// Those of loading a key, a message that does not fit the key, and those of [`forecast`].
 pub fn tell(
     scene: &Scene,
     wish: &Wish,
@@ -76,6 +78,7 @@ pub fn tell(
         let short = Wish {
             key: None,
             bits: SHORT,
+            message: None,
             preset,
             ..wish.clone()
         };
@@ -117,7 +120,10 @@ fn one(scene: &Scene, wish: &Wish, cameras: &[Camera], kind: Option<SceneKind>, 
         ..Choices::default()
     }
     .settings()?;
-    let message = any_message(bits)?;
+    let message = match &wish.message {
+        Some(text) => key.message(text)?,
+        None => any_message(bits)?,
+    };
     let forecast = forecast(&engine, scene, &message, &settings, cameras, &mut |_| {})?;
     Ok(Told {
         preset: wish.preset.name(),

@@ -4,7 +4,7 @@ use crate::container::{Container, Format};
 use crate::error::bad;
 use crate::gaussians::{Gaussians, Sh};
 use crate::ignored::{BadRows, Ignored};
-use crate::sniff::{announced, is_loose_sog};
+use crate::sniff::{announced, is_loose_sog, not_a_file};
 use crate::{Error, Result, gltf, ksplat, ply, sog, splat, spz};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -100,7 +100,7 @@ impl Scene {
         let file = File::open(path).map_err(Error::io(path))?;
         let metadata = file.metadata().map_err(Error::io(path))?;
         if !metadata.is_file() {
-            return Err(bad(path, "not a regular file".to_string()));
+            return Err(not_a_file(path));
         }
         let mut source = BufReader::with_capacity(1 << 16, file);
         Scene::read_from(path, &mut source, metadata.len(), bad_rows, memory, folder)

@@ -53,6 +53,18 @@ pub fn is_loose_sog(folder: &Path) -> bool {
     has("meta.json") && has("means_l.webp") || has(sog::INDEX)
 }
 
+/// Why what is no regular file holds no scene.
+pub(crate) fn not_a_file(path: &Path) -> Error {
+    let reason = if !path.is_dir() {
+        "not a regular file"
+    } else if is_loose_sog(path) {
+        "a folder, where one file is asked for"
+    } else {
+        "a folder without the files of a SOG: meta.json and means_l.webp, or lod-meta.json"
+    };
+    bad(path, reason.to_string())
+}
+
 impl Format {
     /// The format of a file.
     ///
@@ -63,7 +75,7 @@ impl Format {
         let mut file = File::open(path).map_err(Error::io(path))?;
         let metadata = file.metadata().map_err(Error::io(path))?;
         if !metadata.is_file() {
-            return Err(bad(path, "not a regular file".to_string()));
+            return Err(not_a_file(path));
         }
         let mut head = Vec::new();
         let mut start = (&mut file).take(HEAD as u64);
@@ -212,12 +224,8 @@ mod tests {
             assert_eq!(reason(bytes), expected);
         }
         assert!(reason(b"Dear diary").contains("photo.png: not a scene: neither a PLY"));
-        assert!(
-            Format::of(folder.path())
-                .unwrap_err()
-                .to_string()
-                .contains("not a regular file")
-        );
+        let of_folder = Format::of(folder.path()).unwrap_err().to_string();
+        assert!(of_folder.contains("a folder without the files of a SOG"), "{of_folder}");
         assert!(matches!(Format::of(&folder.path().join("none")), Err(Error::Io { .. })));
     }
 }

@@ -46,6 +46,9 @@ pub struct Arguments {
     /// Bits of the message that the forecast is for
     #[arg(long, requires = "forecast", conflicts_with = "key", default_value_t = 32)]
     bits: usize,
+    /// The message of the later mark in hexadecimal, for a forecast that is right about it; any other unless given
+    #[arg(long, value_name = "HEX", requires = "forecast")]
+    message: Option<String>,
     /// The preset that the forecast is for: draft, standard, robust or thorough
     #[arg(long, requires = "forecast", default_value = "standard")]
     preset: Preset,
@@ -64,6 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let wish = Wish {
         key: arguments.key.as_ref().map(read).transpose()?,
         bits: arguments.bits,
+        message: arguments.message.clone(),
         preset: arguments.preset,
         device: arguments.device,
         stop: Stop::default(),
@@ -139,6 +143,9 @@ fn forecast_text(told: &Told) -> String {
     };
     let verdict = match told.meets_target {
         true => "will be written",
+        false if of.is_stuck() => {
+            "would miss its target and not be written; its wrong bits hardly move, so that another key or message helps rather than more steps"
+        }
         false => "would miss its target and not be written",
     };
     format!(

@@ -84,6 +84,12 @@ fn a_scene_can_be_inspected() {
     // Where it would miss, a message of 16 bits is tried.
     assert_eq!(told["shorter"].is_null(), told["meets_target"] == true);
 
+    // Of the message that will be hidden, another forecast; one that is too long for the key is refused.
+    let of_message = |message: &str| format!("{line} --message {message}");
+    let other = &bench.json(&of_message("ffffffff"), 0)["forecast"];
+    assert_ne!(other["reach"], told["reach"]);
+    assert!(bench.fails(&of_message("ffffffff00")).contains("32 bits"));
+
     // With less memory, and with NaN.
     let small = bench.json("inspect in.ply --memory 60 --json", 0);
     assert_eq!(

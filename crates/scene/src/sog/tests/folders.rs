@@ -53,12 +53,8 @@ fn a_folder_is_the_scene_of_its_bundle() {
         (scene.format(), scene.is_one_file(), scene.learnable_degree()),
         (Format::Sog, false, 0)
     );
-    assert!(
-        Scene::read(&path)
-            .unwrap_err()
-            .to_string()
-            .contains("not a regular file")
-    );
+    let refused = Scene::read(&path).unwrap_err().to_string();
+    assert!(refused.contains("a folder, where one file is asked for"), "{refused}");
 }
 
 #[test]
