@@ -48,6 +48,9 @@ pub enum PhotometricCorrection {
     /// It is compared with the unmarked original, registered with it: what it shows otherwise is read, and whatever lies behind
     /// the scene is not. The message that is claimed has no say in it, either.
     Registered(RegisteredTones),
+    /// It is compared with the unmarked original, and what it shows otherwise with the change that each bit asks for (a matched
+    /// filter). The message that is claimed has no say in it, either.
+    MatchedFilter,
 }
 
 /// Places of estimates that are read besides the best one, of a picture that is read alone: where the best is wrong, the
@@ -126,6 +129,14 @@ impl Hypothesis {
         }
     }
 
+    /// What pictures show otherwise than the original is compared with what each bit asks for.
+    pub fn matched_filter() -> Self {
+        Self {
+            correction: PhotometricCorrection::MatchedFilter,
+            ..Self::default()
+        }
+    }
+
     /// Each picture is compared with the original.
     pub fn registered(tones: RegisteredTones) -> Self {
         Self {
@@ -149,6 +160,9 @@ impl fmt::Display for Hypothesis {
                 undone.push(format!("tones and part by estimate {place} of this picture"));
             }
             PhotometricCorrection::Registered(tones) => undone.push(tones.to_string()),
+            PhotometricCorrection::MatchedFilter => {
+                undone.push("compared with the original by a matched filter".into());
+            }
         }
         if self.quarter_turns > 0 {
             undone.push(format!("turned by {} degrees", 90 * u32::from(self.quarter_turns)));
@@ -231,6 +245,10 @@ mod tests {
         assert_eq!(
             Hypothesis::registered(RegisteredTones::Fitted).to_string(),
             "compared with the original, tones fitted to it"
+        );
+        assert_eq!(
+            Hypothesis::matched_filter().to_string(),
+            "compared with the original by a matched filter"
         );
         let led = Hypothesis {
             leader: Some(2),

@@ -36,7 +36,7 @@ fn kind(hypothesis: &Hypothesis) -> Kind {
         given if given == Hypothesis::default() => Kind::AsGiven,
         led if led.leader.is_some() => Kind::Led,
         other => match other.correction {
-            PhotometricCorrection::Registered(_) => Kind::Registered,
+            PhotometricCorrection::Registered(_) | PhotometricCorrection::MatchedFilter => Kind::Registered,
             PhotometricCorrection::Estimated => Kind::Estimated,
             PhotometricCorrection::NextEstimate(_) => Kind::NextEstimate,
             _ => Kind::Guessed,
@@ -129,6 +129,11 @@ mod tests {
         assert_eq!(
             shares(&[given, Hypothesis::estimated(), guess(1), as_they_are, fitted]),
             [2, 8, 8, 8, 8]
+        );
+        let matched = Hypothesis::matched_filter();
+        assert_eq!(
+            shares(&[given, Hypothesis::estimated(), as_they_are, fitted, matched]),
+            [2, 4, 12, 12, 12]
         );
     }
 }

@@ -1,4 +1,5 @@
-//! From where pictures were taken as it is found with the unmarked original, and how many bits are right then, as CSV:
+//! From where pictures were taken as it is found with the unmarked original, and how many bits are right then, and by the matched filter
+//! of each picture and of all, as CSV:
 //! `cargo run --release --example registered_pictures -- KEY MESSAGE ORIGINAL SEED PICTURE...`. Pictures are those of
 //! `guardsplat-worker render MARKED FOLDER --seed SEED`, changed in any way that leaves things where they are, with the number
 //! of the view last in their names. An error is the median distance of Gaussians' centres from where they are in the true
@@ -9,7 +10,7 @@ use std::time::Instant;
 use guardsplat_codeword::{Message, Reading, RegisteredTones};
 use guardsplat_engine::clip::{Parts, ShippedClip};
 use guardsplat_engine::device::{DeviceChoice, open};
-use guardsplat_engine::extract::{Engine, Original, read_given};
+use guardsplat_engine::extract::{Engine, Original, PooledLogits, RegisteredPicture, read_given};
 use guardsplat_engine::message::Key;
 use guardsplat_engine::quality::read_picture;
 use guardsplat_engine::scene::{Gaussians, Scene};
@@ -53,7 +54,8 @@ fn main() -> Result<()> {
     let engine = Engine::new(compute, clip, &key, None)?;
     let rendered_from = ViewSampler::new(&gaussians, seed)?;
     let original = Original::new(&engine, &gaussians, ViewSampler::new(&gaussians, 0)?);
-    println!("picture,as_given_percent,explained,error_px,compared_percent,fitted_percent,seconds");
+    println!("picture,as_given_percent,explained,error_px,compared_percent,fitted_percent,matched_percent,seconds");
+    let mut kept = Vec::new();
     for file in arguments {
         let start = Instant::now();
         let picture = read_picture(file.as_ref(), [1.0; 3])?;
@@ -66,21 +68,29 @@ fn main() -> Result<()> {
         let truth = rendered_from.camera(Split::HeldOut, digits.parse()?, 800);
         let given = percent(&read_given(&engine, &picture)?, &message)?;
         let Some(found) = original.register(&picture)? else {
-            println!("{file},{given:.1},,,,,{:.1}", start.elapsed().as_secs_f32());
+            println!("{file},{given:.1},,,,,,{:.1}", start.elapsed().as_secs_f32());
             continue;
         };
         let mut read = Vec::new();
         for tones in RegisteredTones::ALL {
             read.push(percent(&original.read(&picture, &found, tones)?, &message)?);
         }
+        let small = RegisteredPicture::of(&picture, &found)?;
+        let matched = original.read_matched(std::slice::from_ref(&small))?;
+        let matched = matched.map_or(Ok(f64::NAN), |logits| percent(&logits[0], &message))?;
+        kept.push(small);
         println!(
-            "{file},{given:.1},{:.3},{:.2},{:.1},{:.1},{:.1}",
+            "{file},{given:.1},{:.3},{:.2},{:.1},{:.1},{matched:.1},{:.1}",
             found.explained,
             error(&gaussians, &truth, &found.camera),
             read[0],
             read[1],
             start.elapsed().as_secs_f32()
         );
+    }
+    let together = original.read_matched(&kept)?.map(PooledLogits::new).transpose()?;
+    if let Some(together) = together {
+        println!("together,,,,,,{:.1},", percent(&together.summed, &message)?);
     }
     Ok(())
 }

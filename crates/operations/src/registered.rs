@@ -3,7 +3,8 @@ use std::path::Path;
 
 use guardsplat_codeword::{Hypothesis, RegisteredTones};
 use guardsplat_engine::Result;
-use guardsplat_engine::extract::{Engine, Original, PooledLogits};
+use guardsplat_engine::extract::{Engine, MATCHED_FILTER_BYTES, Original, PooledLogits, RegisteredPicture};
+use guardsplat_engine::memory::picture_bytes;
 
 use crate::suspect::Suspect;
 use crate::thumbnails::Thumbnails;
@@ -17,7 +18,8 @@ const MOST: usize = 16;
 
 /// What was read of pictures that show the original's scene.
 pub struct RegisteredReadings {
-    /// A reading for each way to take tones; none if no picture shows the scene.
+    /// A reading for each way to take tones, and one of the pictures alone by the matched filter; none if no picture shows the
+    /// scene.
     pub readings: Vec<(Hypothesis, PooledLogits)>,
     /// Of each picture how much of it the original explains; `None` where it explains nothing, or was not compared.
     pub explained: Vec<Option<f64>>,
@@ -36,25 +38,38 @@ pub(crate) fn read_registered(
     of_scenes: &[Vec<f32>],
     mut progress: impl FnMut(usize, usize),
 ) -> Result<RegisteredReadings> {
-    let gaussians = loaded(engine, original, views, LARGEST)?.into_gaussians();
+    let gaussians = loaded(
+        engine,
+        original,
+        views,
+        picture_bytes(LARGEST, LARGEST) + MATCHED_FILTER_BYTES,
+    )?
+    .into_gaussians();
     let original = Original::new(engine, &gaussians, views.sampler(&gaussians)?);
     let mut logits = RegisteredTones::ALL.map(|_| of_scenes.to_vec());
     let mut explained = vec![None; suspect.pictures.len()];
     let compared = spread(suspect.pictures.len());
     let count = compared.len();
+    let mut kept = Vec::new();
     for (done, index) in compared.into_iter().enumerate() {
         let picture = suspect.pictures[index].pixels(views.background)?;
         if let Some(registration) = original.register(&picture)? {
             for (logits, tones) in logits.iter_mut().zip(RegisteredTones::ALL) {
                 logits.push(original.read(&picture, &registration, tones)?);
             }
+            kept.push(RegisteredPicture::of(&picture, &registration)?);
             explained[index] = Some(registration.explained);
         }
         progress(done + 1, count);
     }
     let shown = explained.iter().any(Option::is_some);
     let readings = RegisteredTones::ALL.into_iter().zip(logits).filter(|_| shown);
-    let readings = readings.map(|(tones, logits)| Ok((Hypothesis::registered(tones), PooledLogits::new(logits)?)));
+    let readings = readings.map(|(tones, logits)| (Hypothesis::registered(tones), logits));
+    let matched = original
+        .read_matched(&kept)?
+        .map(|logits| (Hypothesis::matched_filter(), logits));
+    let readings = readings.chain(matched);
+    let readings = readings.map(|(way, logits)| Ok((way, PooledLogits::new(logits)?)));
     Ok(RegisteredReadings {
         readings: readings.collect::<Result<_>>()?,
         explained,

@@ -92,12 +92,8 @@ fn read_scenes(
     let total = count(suspect, views);
     for path in &suspect.scenes {
         // A scene of fine splats is drawn at twice the side, and is not read yet.
-        let scene = loaded(
-            engine,
-            path,
-            views,
-            views.size.unwrap_or_else(|| 2 * default_size(engine)),
-        )?;
+        let largest = views.size.unwrap_or_else(|| 2 * default_size(engine));
+        let scene = loaded(engine, path, views, picture_bytes(largest, largest))?;
         ignored.extend(scene.ignored().cloned());
         let gaussians = scene.into_gaussians();
         let before = logits.len();
@@ -116,11 +112,11 @@ fn read_scenes(
     Ok((logits, ignored))
 }
 
-/// A scene of the suspect or the original, if memory has room for it beside views with sides of `largest` pixels.
-pub(crate) fn loaded(engine: &Engine, path: &Path, views: &Views, largest: u32) -> Result<Scene> {
+/// A scene of the suspect or the original, if memory has room for it beside pictures of so many bytes.
+pub(crate) fn loaded(engine: &Engine, path: &Path, views: &Views, pictures: u64) -> Result<Scene> {
     let rest = MemoryRequirements {
         models: engine.model_bytes(false),
-        pictures: picture_bytes(largest, largest),
+        pictures,
         ..MemoryRequirements::of_program()
     };
     admission::admit_reading(path, &engine.limits, rest)?;

@@ -234,6 +234,7 @@ fn undone(correction: PhotometricCorrection) -> Option<api::Undone> {
         PhotometricCorrection::NextEstimate(place) => (Kind::Estimated, place as f32),
         PhotometricCorrection::Registered(RegisteredTones::AsGiven) => (Kind::Original, 1.0),
         PhotometricCorrection::Registered(RegisteredTones::Fitted) => (Kind::OriginalFitted, 1.0),
+        PhotometricCorrection::MatchedFilter => (Kind::OriginalMatched, 1.0),
         PhotometricCorrection::Tone(Tone::Brightness(factor)) => (Kind::Brightness, factor),
         PhotometricCorrection::Tone(Tone::Gamma(exponent)) => (Kind::Gamma, exponent),
         PhotometricCorrection::Tone(Tone::Contrast(factor)) => (Kind::Contrast, factor),

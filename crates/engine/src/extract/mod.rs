@@ -26,7 +26,7 @@ pub use photometric::{corrections, read_corrections};
 pub use picture_logits::{PictureLogits, estimates, hypotheses};
 pub use pictures::{MAX_PICTURES, Source, find_source};
 pub use pooled::{Comparison, PooledLogits};
-pub use registration::{Original, Registration};
+pub use registration::{MATCHED_FILTER_BYTES, Original, RegisteredPicture, Registration};
 pub use restore::{StaticBackground, read_given, read_rendered};
 pub use suspect_kind::SuspectKind;
 pub(crate) use view_size::sufficient_side;

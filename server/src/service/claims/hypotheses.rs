@@ -103,6 +103,7 @@ fn hypothesis(reading: &FramedReading) -> Hypothesis {
             },
             Some((Kind::Original, _)) => PhotometricCorrection::Registered(RegisteredTones::AsGiven),
             Some((Kind::OriginalFitted, _)) => PhotometricCorrection::Registered(RegisteredTones::Fitted),
+            Some((Kind::OriginalMatched, _)) => PhotometricCorrection::MatchedFilter,
             Some((Kind::Brightness, factor)) => PhotometricCorrection::Tone(Tone::Brightness(factor)),
             Some((Kind::Gamma, exponent)) => PhotometricCorrection::Tone(Tone::Gamma(exponent)),
             Some((Kind::Contrast, factor)) => PhotometricCorrection::Tone(Tone::Contrast(factor)),
@@ -129,7 +130,7 @@ pub fn kinds(told: &[FramedReading], readings: &[HypothesisReading]) -> Vec<evid
         _ if reading.leading_picture > 0 => Led,
         _ if let Some(undone) = &reading.undone => match undone.kind() {
             Kind::Estimated => Estimated,
-            Kind::Original | Kind::OriginalFitted => Registered,
+            Kind::Original | Kind::OriginalFitted | Kind::OriginalMatched => Registered,
             _ => Tone,
         },
         _ if reading.part.is_some() => Crop,

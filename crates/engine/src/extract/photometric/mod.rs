@@ -82,7 +82,8 @@ fn change(correction: PhotometricCorrection, picture: &Picture) -> Option<ToneCh
         PhotometricCorrection::None
         | PhotometricCorrection::Estimated
         | PhotometricCorrection::NextEstimate(_)
-        | PhotometricCorrection::Registered(_) => None,
+        | PhotometricCorrection::Registered(_)
+        | PhotometricCorrection::MatchedFilter => None,
         PhotometricCorrection::WhiteBackground => Some(ToneChange::default()),
         PhotometricCorrection::WhiteBalance(beyond) => {
             white_balance::gains(picture, beyond).map(|gains| ToneChange::of_gains(gains.map(f32::ln)))

@@ -9,15 +9,19 @@
 //! ```
 //!
 //! So whatever is behind the scene, and whatever else is in the picture, is gone, and what was done to its tones is seen
-//! from two pictures of one view instead of being guessed. Picture, original and key decide all of it: a message that is
-//! claimed has no part, so a p-value pays for the two ways in which tones are taken, and for nothing else.
+//! from two pictures of one view instead of being guessed. Besides, it is read without the tower, by a matched
+//! filter (`matched_filter.rs`). Picture, original and key decide all of it: a message that is claimed has no part, so a p-value
+//! pays for the two ways in which tones are taken and for the filter, and for nothing else.
 //!
 //! A camera has nine numbers: where it is, how it is turned, its focal length, and its principal point, since a picture may
 //! be cropped. No gradient to them exists in the rasteriser, so slopes are differences of small views.
+mod bit_changes;
 mod coarse;
 mod common_colours;
 mod drawn;
 mod fit;
+mod least_squares;
+mod matched_filter;
 mod observed;
 mod overlay;
 mod pose;
@@ -33,8 +37,10 @@ use crate::picture::Picture;
 use crate::scene::Gaussians;
 use crate::splat::Geometry;
 use crate::view::{Camera, ViewSampler};
+pub use bit_changes::MATCHED_FILTER_BYTES;
 use coarse::guesses;
 use fit::Fit;
+pub use matched_filter::RegisteredPicture;
 use observed::Observed;
 use pose::dollied;
 use refine::{Freedoms, refined};

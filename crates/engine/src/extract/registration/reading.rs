@@ -67,7 +67,7 @@ impl Original<'_> {
 }
 
 /// Colours of the scene alone, as far as the mean colour of what is seen beside it says what shines through.
-fn without_behind(seen: &[[f32; 3]], coverage: &[f32]) -> Vec<[f32; 3]> {
+pub(super) fn without_behind(seen: &[[f32; 3]], coverage: &[f32]) -> Vec<[f32; 3]> {
     let (mut count, mut sum) = (0.0, [0.0_f64; 3]);
     for (colour, _) in seen.iter().zip(coverage).filter(|(_, coverage)| **coverage <= BEHIND) {
         count += 1.0;

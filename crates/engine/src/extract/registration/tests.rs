@@ -1,10 +1,11 @@
 //! A sample before a photograph, seen by cameras that nobody tells.
 use burn::tensor::Tensor;
-use guardsplat_codeword::RegisteredTones;
+use guardsplat_codeword::{Message, RegisteredTones};
 
 use super::*;
 use crate::device::{DeviceChoice, open};
-use crate::extract::Extractor;
+use crate::embed::{Preset, Settings, optimise};
+use crate::extract::{Extractor, PooledLogits};
 use crate::sample::sample;
 use crate::view::Split;
 
@@ -112,6 +113,97 @@ fn the_camera_is_found_whatever_is_behind_the_scene_and_read_is_what_differs() {
     assert!(as_given[0] > on_white[0] + 0.01, "{as_given:?} {on_white:?}");
     assert!(near(&as_given[1..], &on_white[1..], 0.01), "{as_given:?} {on_white:?}");
     assert!(near(&fitted, &on_white, 0.01), "{fitted:?} {on_white:?}");
+}
+
+/// Reads means of sines of colours, as the shipped tower does.
+struct Ripples;
+
+impl Extractor for Ripples {
+    fn bits(&self) -> usize {
+        16
+    }
+
+    fn side(&self) -> usize {
+        128
+    }
+
+    fn parameters(&self) -> usize {
+        0
+    }
+
+    fn reads_exact_colours(&self) -> bool {
+        true
+    }
+
+    fn logits(&self, pictures: Tensor<4>) -> Result<Tensor<2>> {
+        let [count, _, height, width] = pictures.dims();
+        let flat = pictures.reshape([count, 3, height * width]);
+        let ripple = |bit: usize| {
+            let radians = [0, 1, 2].map(|k| 25.0 + 40.0 * ((7 * bit + 5 * k) % 11) as f32 / 11.0);
+            let turned = |k: usize| flat.clone().narrow(1, k, 1) * radians[k];
+            (turned(0) + turned(1) - turned(2))
+                .sin()
+                .mean_dim(2)
+                .reshape([count, 1])
+        };
+        Ok(Tensor::cat((0..16).map(ripple).collect(), 1) * 60.0)
+    }
+}
+
+#[test]
+fn a_mark_that_compression_takes_from_the_tower_is_found_by_the_matched_filter() {
+    let engine = Engine::with_extractor(open(DeviceChoice::Cpu).unwrap(), Box::new(Ripples), None);
+    let scene = sample(4000, 1, 8).unwrap();
+    let message = Message::parse("b1d2", 16).unwrap();
+    let settings = Settings {
+        steps: 40,
+        extension: None,
+        early_stop: None,
+        ..Preset::Draft.settings()
+    };
+    let mark = optimise(&engine, &scene, &message, &settings, &[], &mut |_| {}).unwrap();
+    let marked = Gaussians {
+        sh: mark.learned.kept_colours(&scene.gaussians.sh),
+        ..scene.gaussians.clone()
+    };
+    let original = Original::new(
+        &engine,
+        &scene.gaussians,
+        ViewSampler::new(&scene.gaussians, 0).unwrap(),
+    );
+    let sampler = ViewSampler::new(&scene.gaussians, 5).unwrap();
+    let read = |shown: &Gaussians| {
+        let geometry = Geometry::new(shown);
+        let pictures: Vec<RegisteredPicture> = (0..8)
+            .map(|index| {
+                let camera = sampler.camera(Split::HeldOut, index, 400);
+                let [picture] = engine.pictures(&geometry, &camera, [[1.0; 3]]).unwrap();
+                let registration = Registration {
+                    camera,
+                    explained: 1.0,
+                    covered: 0.5,
+                };
+                RegisteredPicture::of(&compressed(&picture, 20), &registration).unwrap()
+            })
+            .collect();
+        let logits = original.read_matched(&pictures).unwrap().expect("colours are compared");
+        assert_eq!(logits.len(), 8);
+        PooledLogits::new(logits).unwrap().reading().matches(&message).unwrap()
+    };
+    let (of_marked, of_original) = (read(&marked), read(&scene.gaussians));
+    assert!(of_marked >= 13, "{of_marked} of 16");
+    assert!((3..=13).contains(&of_original), "{of_original} of 16");
+    assert_eq!(original.read_matched(&[]).unwrap(), None);
+}
+
+/// A picture after JPEG of this quality.
+fn compressed(picture: &Picture, quality: u8) -> Picture {
+    let bytes: Vec<u8> = picture.pixels.iter().map(|v| (255.0 * v).round() as u8).collect();
+    let mut file = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality);
+    let image = image::RgbImage::from_raw(picture.width, picture.height, bytes).unwrap();
+    image.write_with_encoder(encoder).unwrap();
+    crate::quality::decode_picture(&file, [1.0; 3]).unwrap()
 }
 
 #[test]

@@ -148,7 +148,12 @@ fn what_differs_from_the_original_has_half_of_what_is_left() {
         }),
         ..reading(0, false, false)
     };
-    let kinds_told = [Kind::Estimated, Kind::Original, Kind::OriginalFitted];
+    let kinds_told = [
+        Kind::Estimated,
+        Kind::Original,
+        Kind::OriginalFitted,
+        Kind::OriginalMatched,
+    ];
     let readings: Vec<_> = std::iter::once(reading(0, false, false))
         .chain(kinds_told.map(undone))
         .chain([brightened(0.81)])
@@ -156,12 +161,13 @@ fn what_differs_from_the_original_has_half_of_what_is_left() {
     let read = checked(&readings, 64).unwrap();
     assert_eq!(read[2].name, "compared with the original, tones as given");
     assert_eq!(read[3].name, "compared with the original, tones fitted to it");
+    assert_eq!(read[4].name, "compared with the original by a matched filter");
     let groups = kinds(&readings, &read);
     use evidence::HypothesisKind::{AsGiven, Estimated, Registered, Tone};
     let told: Vec<_> = groups.iter().map(|g| (g.kind, g.variants, g.tries.unwrap())).collect();
     assert_eq!(
         told,
-        [(AsGiven, 1, 2), (Registered, 2, 8), (Estimated, 1, 8), (Tone, 1, 8)]
+        [(AsGiven, 1, 2), (Registered, 3, 12), (Estimated, 1, 8), (Tone, 1, 8)]
     );
 }
 
